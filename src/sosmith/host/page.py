@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import logging
 import math
 import secrets
 import threading
@@ -14,11 +13,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from sosmith.host.loopback import Loopback, page_policy
 from sosmith.host.readings import Readings
 from sosmith.model.templates import render
 
 if TYPE_CHECKING:
-    from websockets.http11 import Request, Response
     from websockets.sync.server import ServerConnection
 
 INTERVAL = 0.25
@@ -49,33 +48,15 @@ class LivePage:
     """
 
     def __init__(self, readings: Readings) -> None:
-        from websockets.sync.server import serve
-
         self._readings = readings
-        self._token, nonce = secrets.token_urlsafe(24), secrets.token_urlsafe(16)
-        self._html = page(readings, nonce)
-        self._policy = (
-            f"default-src 'none'; script-src 'nonce-{nonce}'; style-src 'unsafe-inline'; img-src data:; "
-            "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
-        )
+        nonce = secrets.token_urlsafe(16)
+        html = page(readings, nonce)
         self._changed = threading.Condition()
         self._picture, self._number, self._ended, self._readers = "", 0, False, 0
         self._due = -math.inf
         self._show("connected")
-        # What a browser or a stranger does to a connection is of no interest to who reads the terminal.
-        silent = logging.Logger("sosmith.host.page", logging.CRITICAL + 1)
-        self._server = serve(
-            self._serve,
-            "127.0.0.1",
-            0,
-            process_request=self._answer,
-            close_timeout=1,
-            server_header=None,
-            logger=silent,
-        )
-        self.address = f"http://127.0.0.1:{self._server.socket.getsockname()[1]}/{self._token}/"
-        self._thread = threading.Thread(target=self._server.serve_forever, daemon=True)
-        self._thread.start()
+        self._server = Loopback({"": lambda: (html, page_policy(nonce))}, self._serve)
+        self.address = self._server.address
 
     def update(self) -> None:
         """Send the readings to all who look, but not too often."""
@@ -98,8 +79,7 @@ class LivePage:
         self._show("ended")
         with self._changed:
             self._changed.wait_for(lambda: self._readers == 0, FAREWELL)
-        self._server.shutdown()
-        self._thread.join()
+        self._server.close()
 
     def __enter__(self) -> LivePage:
         """Return the page."""
@@ -117,21 +97,6 @@ class LivePage:
         with self._changed:
             self._picture, self._number = made, self._number + 1
             self._changed.notify_all()
-
-    def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
-        """Answer a request for the page; let one for its websocket pass."""
-        if secrets.compare_digest(request.path.encode(), f"/{self._token}/live".encode()):
-            return None
-        if not secrets.compare_digest(request.path.encode(), f"/{self._token}/".encode()):
-            return connection.respond(404, "There is nothing here.\n")
-        response = connection.respond(200, self._html)
-        del response.headers["Content-Type"]
-        response.headers["Content-Type"] = "text/html; charset=utf-8"
-        response.headers["Content-Security-Policy"] = self._policy
-        response.headers["Referrer-Policy"] = "no-referrer"
-        response.headers["X-Content-Type-Options"] = "nosniff"
-        response.headers["Cache-Control"] = "no-store"
-        return response
 
     def _serve(self, connection: ServerConnection) -> None:
         """Send each new picture, or the newest one if several were made meanwhile."""

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import logging
-import os
 import secrets
 import threading
 import time
@@ -12,16 +10,13 @@ from contextlib import suppress
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from sosmith import Specification, SpecificationError, __version__
+from sosmith import Specification, __version__
+from sosmith.host.loopback import REPORT_POLICY, Loopback, page_policy, take_messages
 from sosmith.model.templates import render
-from sosmith.studio.session import MAX_FILE, MessageError, Session
+from sosmith.studio.session import MAX_FILE, Session
 
 if TYPE_CHECKING:
-    from websockets.http11 import Request, Response
     from websockets.sync.server import ServerConnection
-
-POLICY_VIOLATION = 1008
-"""Code with which a websocket is closed that says what no page of ours says."""
 
 FAREWELL = 2.0
 """Seconds that pages have at most, all together, to hear that it is the end."""
@@ -49,11 +44,9 @@ class Studio:
     """
 
     def __init__(self, session: Session, port: int = 0) -> None:
-        from websockets.sync.server import serve
-
         self._session = session
-        self._token, nonce = secrets.token_urlsafe(24), secrets.token_urlsafe(16)
-        self._html = render(
+        nonce = secrets.token_urlsafe(16)
+        html = render(
             ("sosmith.studio", "sosmith.gen.report"),
             "studio.html.jinja",
             nonce=nonce,
@@ -61,33 +54,10 @@ class Studio:
             version=__version__,
             choices=Specification.choices(),
         )
-        only = (
-            "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'; "
-            "frame-ancestors 'none'; "
-        )
-        self._policy = only + f"script-src 'nonce-{nonce}'; connect-src 'self'"
-        self._report_policy = only + "script-src 'unsafe-inline'"
-        # What a browser or a stranger does to a connection is of no interest to who reads the terminal.
-        silent = logging.Logger("sosmith.studio", logging.CRITICAL + 1)
-        try:
-            self._server = serve(
-                self._serve,
-                "127.0.0.1",
-                port,
-                process_request=self._answer,
-                max_size=4 * MAX_FILE,
-                close_timeout=1,
-                server_header=None,
-                logger=silent,
-            )
-        except OSError as error:
-            raise SpecificationError(f"--port must be free, not {port}: {os.strerror(error.errno or 0)}") from None
-        taken = self._server.socket.getsockname()[1]
-        self._hosts = {f"127.0.0.1:{taken}", f"localhost:{taken}"}
-        self.address = f"http://127.0.0.1:{taken}/{self._token}/"
+        pages = {"": lambda: (html, page_policy(nonce)), "report": self._report}
+        self._server = Loopback(pages, self._serve, port, max_message=4 * MAX_FILE)
+        self.address = self._server.address
         self._tellers: set[threading.Thread] = set()
-        self._thread = threading.Thread(target=self._server.serve_forever, daemon=True)
-        self._thread.start()
 
     def close(self) -> None:
         """End the session and the server."""
@@ -97,8 +67,7 @@ class Studio:
         end = time.monotonic() + FAREWELL
         for teller in self._tellers.copy():
             teller.join(max(0.0, end - time.monotonic()))
-        self._server.shutdown()
-        self._thread.join()
+        self._server.close()
 
     def __enter__(self) -> Studio:
         """Return the studio."""
@@ -110,37 +79,11 @@ class Studio:
         """End."""
         self.close()
 
-    def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
-        """Answer a request for the page or the report; let one for the websocket pass."""
-        if request.headers.get("Host") not in self._hosts:
-            # a name that another machine has made to point here
-            return connection.respond(403, "The host must be 127.0.0.1 or localhost, with the port of the studio.\n")
-        origin = request.headers.get("Origin")
-        if origin is not None and origin.removeprefix("http://") not in self._hosts:
-            return connection.respond(403, "The origin must be the studio's own page.\n")
-        place = request.path.encode()
-
-        def asked(name: str) -> bool:
-            return secrets.compare_digest(place, f"/{self._token}/{name}".encode())
-
-        if asked("live"):
-            return None
-        if asked(""):
-            return self._page(connection, self._html, self._policy)
-        if asked("report"):
-            with suppress(OSError):
-                return self._page(connection, self._session.report.read_text(encoding="utf-8"), self._report_policy)
-        return connection.respond(404, "There is nothing here.\n")
-
-    def _page(self, connection: ServerConnection, html: str, policy: str) -> Response:
-        response = connection.respond(200, html)
-        del response.headers["Content-Type"]
-        response.headers["Content-Type"] = "text/html; charset=utf-8"
-        response.headers["Content-Security-Policy"] = policy
-        response.headers["Referrer-Policy"] = "no-referrer"
-        response.headers["X-Content-Type-Options"] = "nosniff"
-        response.headers["Cache-Control"] = "no-store"
-        return response
+    def _report(self) -> tuple[str, str] | None:
+        """Return the report and its content policy, if there is one."""
+        with suppress(OSError):
+            return self._session.report.read_text(encoding="utf-8"), REPORT_POLICY
+        return None
 
     def _serve(self, connection: ServerConnection) -> None:
         """Do what a page says, and tell it what is new."""
@@ -152,11 +95,7 @@ class Studio:
             teller = threading.Thread(target=self._tell, args=(connection, left), daemon=True)
             teller.start()
             self._tellers.add(teller)
-            for text in connection:
-                try:
-                    self._session.handle(json.loads(text), client)
-                except (MessageError, ValueError):
-                    connection.close(POLICY_VIOLATION)
+            take_messages(connection, lambda message: self._session.handle(message, client))
         left.set()
         self._session.nudge()
 
