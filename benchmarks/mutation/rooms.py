@@ -124,7 +124,7 @@ ROOMS = {
         without=_HDL,
     ),
     "folded": Room(
-        files=("hdl/folded.py", "hdl/instruction.py", "hdl/plan/folded_clocks.py", "hdl/plan/instructions.py"),
+        files=("hdl/cores/folded.py", "hdl/instruction.py", "hdl/plan/folded_clocks.py", "hdl/plan/instructions.py"),
         tests=("tests/hdl",),
         without=_HDL,
     ),

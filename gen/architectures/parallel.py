@@ -53,7 +53,7 @@ class Parallel(Architecture):
 
     @property
     def _is_block(self) -> bool:
-        """Whether the hardware is a `sosmith.hdl.block_core.BlockCore`."""
+        """Whether the hardware is a `sosmith.hdl.cores.block.BlockCore`."""
         return self.look_ahead or self.samples_per_clock > 1
 
     @property
@@ -78,8 +78,8 @@ class Parallel(Architecture):
         return parallel_clocks.clock_estimate(self.datapath, lanes, look_ahead=self.look_ahead)
 
     def _core(self, *, before: bool = False) -> Component:
-        from sosmith.hdl.block_core import BlockCore  # only what makes hardware loads Amaranth
-        from sosmith.hdl.core import Core
+        from sosmith.hdl.cores.block import BlockCore  # only what makes hardware loads Amaranth
+        from sosmith.hdl.cores.parallel import Core
 
         if self._is_block:
             adders = () if self.look_ahead else self.adders

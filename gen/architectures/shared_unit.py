@@ -104,7 +104,7 @@ class SharedUnit(Architecture):
         return self._cycles_per_sample
 
     def _core(self, *, before: bool = False) -> Component:
-        from sosmith.hdl.folded import FoldedCore  # only what makes hardware loads Amaranth
+        from sosmith.hdl.cores.folded import FoldedCore  # only what makes hardware loads Amaranth
 
         return FoldedCore(
             self.datapath.behind_decimator,

@@ -39,9 +39,9 @@ from amaranth.lib import data, wiring
 from amaranth.lib.wiring import In, Out
 
 from sosmith.hdl.axi_stream import codes_of, core_members, extended
-from sosmith.hdl.core import Core
+from sosmith.hdl.cores.folded import FoldedCore
+from sosmith.hdl.cores.parallel import Core
 from sosmith.hdl.decimation.channel_decimator import ChannelDecimator
-from sosmith.hdl.folded import FoldedCore
 from sosmith.hdl.plan.streams import width
 from sosmith.hdl.status import OF_INPUT, at_rail
 from sosmith.model.dataflow.datapath import Datapath
@@ -244,7 +244,7 @@ class DecimatedCore(wiring.Component):
     Members
     -------
     aclk, aresetn, s_axis_*, m_axis_*
-        As in `sosmith.hdl.core.Core`.
+        As in `sosmith.hdl.cores.parallel.Core`.
     """
 
     def __init__(

@@ -22,7 +22,8 @@ As an example, the recursion of `sosmith.hdl.stages.pipelined`, for 3 channels, 
                                    [channel1] --+                        +-- [channel2], address in 2
 
 Both memories of v are written in stage 3, addressed by [channel3]. As that of v2 is addressed in stage 1, a channel may
-come again 3 - 1 + 1 = 3 samples later, `Schedule.distance`; `sosmith.hdl.core` holds back a sample that comes too soon.
+come again 3 - 1 + 1 = 3 samples later, `Schedule.distance`; `sosmith.hdl.cores.parallel` holds back a sample that comes
+too soon.
 The channels 0, 1, 2, 0, 1 with the codes 1, 1, -2, 1, 1 give::
 
     clock            0    1    2    3    4    5    6    7    8

@@ -1,7 +1,7 @@
 """The frozen datapath: a chain of stages between ports, and its bit-true computation.
 
 This object is the one source of truth: the software (`Datapath.compute`), the C model, the hardware
-(`sosmith.hdl.core`) and the manifest are made from the dataflow graphs of its stages alone.
+(`sosmith.hdl.cores.parallel`) and the manifest are made from the dataflow graphs of its stages alone.
 """
 
 from __future__ import annotations

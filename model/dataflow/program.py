@@ -11,7 +11,7 @@ with ``digit_bits = 2``, -7 is the digits 1, -2 (lowest first), since -7 = 1 + (
       states ..        values      t     operand
       words-1          always 1
 
-`sosmith.model.dataflow.folding` makes programs; `sosmith.hdl.folded` runs them.
+`sosmith.model.dataflow.folding` makes programs; `sosmith.hdl.cores.folded` runs them.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from amaranth.hdl import Module
 from tests.hdl.bus.axi_lite_bench import OKAY
 
-from sosmith.hdl.folded import FoldedCore
+from sosmith.hdl.cores.folded import FoldedCore
 from sosmith.hdl.plan.streams import fields
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.program import Program

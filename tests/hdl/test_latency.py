@@ -8,8 +8,8 @@ from tests.gen.designs import example_design
 from tests.hdl.axi_stream.adders import A, B, adder
 from tests.hdl.axi_stream.stream_bench import run
 
-from sosmith.hdl.core import Core
-from sosmith.hdl.folded import FoldedCore
+from sosmith.hdl.cores.folded import FoldedCore
+from sosmith.hdl.cores.parallel import Core
 from sosmith.hdl.plan import folded_clocks, parallel_clocks
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.folding import program

@@ -8,8 +8,8 @@ import pytest
 from tests.hdl.axi_stream.adders import A, B, Ends, adder
 from tests.hdl.axi_stream.stream_bench import run
 
-from sosmith.hdl.core import Core
-from sosmith.hdl.folded import FoldedCore
+from sosmith.hdl.cores.folded import FoldedCore
+from sosmith.hdl.cores.parallel import Core
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.folding import program
 from sosmith.model.dataflow.status import Flag

@@ -26,7 +26,7 @@ from sosmith.gen.reload.register_writes import register_writes
 from sosmith.gen.reload.reload import OtherSet, other_set, room_of
 from sosmith.gen.specification.specification import load
 from sosmith.gen.specification.wear_limits import WearSpec
-from sosmith.hdl.folded import FoldedCore
+from sosmith.hdl.cores.folded import FoldedCore
 from sosmith.hdl.plan.streams import fields
 from sosmith.hdl.reload import ReloadPort
 from sosmith.model.polynomial import Polynomial

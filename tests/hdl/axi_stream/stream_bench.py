@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 from amaranth.hdl import ClockDomain, ClockSignal, Module, ResetSignal
 from amaranth.sim import Simulator
 
-from sosmith.hdl.core import Core
-from sosmith.hdl.folded import FoldedCore
+from sosmith.hdl.cores.folded import FoldedCore
+from sosmith.hdl.cores.parallel import Core
 from sosmith.hdl.plan.streams import fields
 
 _LONGEST = 2000  # clocks after which a sample counts as lost

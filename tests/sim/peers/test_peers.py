@@ -10,7 +10,7 @@ from tests.suite.extras import needs
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.gen.realizations.registry import REALIZATIONS
 from sosmith.hdl.check_bits import CheckBits
-from sosmith.hdl.folded import FoldedCore
+from sosmith.hdl.cores.folded import FoldedCore
 
 pytestmark = needs("cocotbext.axi")
 

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.commands.command_line import FILTER, reloadable
-from tests.gen.report.reports import report
-from tests.instrument.calibration.measuring import readings, write_csv
 
 from sosmith.cli import main
 from sosmith.model.text_files import to_json
+from tests.commands.command_line import FILTER, reloadable
+from tests.gen.report.reports import report
+from tests.instrument.calibration.measuring import readings, write_csv
 
 ROOT = Path(__file__).parents[2]
 MESSAGE = os.strerror(errno.ENOSPC)

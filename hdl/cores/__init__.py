@@ -1,0 +1,1 @@
+"""The cores: parallel, of several samples a clock, and the folded one; each with the shell around it."""
