@@ -2,7 +2,8 @@
 
 An entry is a folder named by a key, a digest of everything that went into it. It is made beside its final place and
 renamed, so that a killed process leaves no half of it; the digests of its files are held against them at each use, and
-a damaged entry is made again. Locks let one process at a time make, use or remove an entry.
+a damaged entry is made again. The digests are keyed, and all belongs to the user alone, so that nobody else can slip in
+a library, which would be loaded and run. Locks let one process at a time make, use or remove an entry.
 """
 
 from __future__ import annotations
@@ -10,11 +11,16 @@ from __future__ import annotations
 import contextlib
 import fcntl
 import hashlib
+import hmac
 import json
 import os
+import secrets
 import shutil
+import stat
 from collections.abc import Callable, Iterator
 from pathlib import Path
+
+from sosmith.model.errors import SpecificationError
 
 LIMIT = 256 * 2**20
 """Bytes that all entries together may take; beyond, those that were not used for the longest time are removed."""
@@ -22,6 +28,8 @@ LIMIT = 256 * 2**20
 _DIGESTS = "digests.json"
 _NEW = ".new"
 _LOCKS = "locks"
+_KEY = "key"
+_KEY_BYTES = 32
 
 
 def cache_folder() -> Path | None:
@@ -49,6 +57,11 @@ class BuildCache:
         The folder; made if it is missing.
     limit : int
         Bytes that all entries together may take.
+
+    Raises
+    ------
+    SpecificationError
+        By all methods, if the folder, its locks or its key belong to someone else.
     """
 
     def __init__(self, folder: Path, limit: int = LIMIT) -> None:
@@ -56,7 +69,7 @@ class BuildCache:
 
     def has(self, kind: str, key: str) -> bool:
         """Whether there is an undamaged entry."""
-        return _is_whole(self._place(kind, key))
+        return _is_whole(self._place(kind, key), self._key())
 
     @contextlib.contextmanager
     def entry(self, kind: str, key: str, make: Callable[[Path], None]) -> Iterator[Path]:
@@ -75,17 +88,45 @@ class BuildCache:
         place = self._place(kind, key)
         with self._locked(place) as locked:
             assert locked
-            if not _is_whole(place):
+            secret = self._key()
+            if not _is_whole(place, secret):
                 new = place.with_name(place.name + _NEW)
                 for rest in (new, place):  # of a killed process, and damaged
                     shutil.rmtree(rest, ignore_errors=True)
-                new.mkdir()
+                new.mkdir(mode=0o700)
                 make(new)
-                (new / _DIGESTS).write_text(json.dumps(_digests(new)), encoding="utf-8")
+                (new / _DIGESTS).write_text(json.dumps(_digests(new, secret)), encoding="utf-8")
                 new.rename(place)
                 self._shrink(place)
             os.utime(place)
             yield place
+
+    def _make_private(self) -> None:
+        """Make the folders if they are missing, and close them to all others."""
+        (self._folder / _LOCKS).mkdir(parents=True, exist_ok=True, mode=0o700)
+        for place in (self._folder, self._folder / _LOCKS):
+            _check_owner(place, place.stat())
+            if stat.S_IMODE(place.stat().st_mode) & 0o077:
+                place.chmod(0o700)
+
+    def _key(self) -> bytes:
+        """Return what only this user knows: made anew, which ends all entries, if missing or once open to others."""
+        self._make_private()
+        path = self._folder / _LOCKS / _KEY
+        handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o600)
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX)
+            found = os.fstat(handle)
+            _check_owner(path, found)
+            secret = os.pread(handle, _KEY_BYTES + 1, 0)
+            if len(secret) != _KEY_BYTES or stat.S_IMODE(found.st_mode) & 0o077:
+                secret = secrets.token_bytes(_KEY_BYTES)
+                os.fchmod(handle, 0o600)
+                os.ftruncate(handle, 0)
+                os.pwrite(handle, secret, 0)
+            return secret
+        finally:
+            os.close(handle)
 
     def clear(self) -> int:
         """Remove all entries that no process is using; return the number of bytes."""
@@ -123,9 +164,9 @@ class BuildCache:
     def _locked(self, place: Path, *, wait: bool = True) -> Iterator[bool]:
         """Lock what may be at `place`; yield whether that could be done, which is sure with `wait`."""
         kind, _, key = place.name.rpartition("-")
-        (self._folder / _LOCKS).mkdir(parents=True, exist_ok=True)
+        self._make_private()
         # A few entries share a lock: locks are never removed, which could not be done safely.
-        handle = os.open(self._folder / _LOCKS / f"{kind}-{key[:2]}", os.O_RDWR | os.O_CREAT, 0o666)
+        handle = os.open(self._folder / _LOCKS / f"{kind}-{key[:2]}", os.O_RDWR | os.O_CREAT, 0o600)
         try:
             try:
                 fcntl.flock(handle, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
@@ -137,16 +178,28 @@ class BuildCache:
             os.close(handle)
 
 
-def _is_whole(place: Path) -> bool:
+def _check_owner(place: Path, found: os.stat_result) -> None:
+    if found.st_uid != os.geteuid():
+        raise SpecificationError(
+            f"{place} must belong to the user who runs this, not to user {found.st_uid}; "
+            "set XDG_CACHE_HOME to a folder of your own"
+        )
+
+
+def _is_whole(place: Path, secret: bytes) -> bool:
     try:
-        return bool(json.loads((place / _DIGESTS).read_text(encoding="utf-8")) == _digests(place))
+        _check_owner(place, place.stat())
+        told = json.loads((place / _DIGESTS).read_text(encoding="utf-8"))
+        return bool(told == _digests(place, secret))
     except (OSError, ValueError):
         return False
 
 
-def _digests(place: Path) -> dict[str, str]:
+def _digests(place: Path, secret: bytes) -> dict[str, str]:
+    """Digest of each file of an entry, with its name and that of the entry: nothing can be put in another's place."""
+    entry = place.name.removesuffix(_NEW)
     return {
-        path.name: hashlib.sha256(path.read_bytes()).hexdigest()
+        path.name: hmac.new(secret, f"{entry}/{path.name}\0".encode() + path.read_bytes(), hashlib.sha256).hexdigest()
         for path in sorted(place.iterdir())
         if path.name != _DIGESTS
     }
