@@ -8,8 +8,8 @@ from typing import Any
 
 import click
 
+from sosmith.interface.files import check_file
 from sosmith.model.errors import SpecificationError
-from sosmith.model.text_files import check_file
 
 STDOUT = Path("-")
 

@@ -3,6 +3,6 @@
 from __future__ import annotations
 
 from sosmith.gen.specification.examples import DEFAULT, contents, titles
-from sosmith.model.text_files import to_json, write_contents, write_file, write_files
+from sosmith.model.text_files import check_file, to_json, write_contents, write_file, write_files
 
-__all__ = ["DEFAULT", "contents", "titles", "to_json", "write_contents", "write_file", "write_files"]
+__all__ = ["DEFAULT", "check_file", "contents", "titles", "to_json", "write_contents", "write_file", "write_files"]
