@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 from rich.console import Console
+from sosmith.commands.tables.design import print_design
 
 from sosmith.commands.tables.console import TableConsole, new_table
-from sosmith.commands.tables.design import print_design
 from sosmith.terminal import NARROWEST, width
 from tests.interface.small import filter_design
 

@@ -12,8 +12,7 @@ from pathlib import Path
 from sosmith.gen.fpga.boards import BOARDS, BUILDABLE, MODELLED, PROJECTS, SYNTHESIZED
 from sosmith.gen.fpga.boards import find_board as _find_board
 from sosmith.gen.picture import format_of as picture_format
-from sosmith.gen.realizations.registry import ERROR_FEEDBACK
-from sosmith.gen.specification.choices import CORES, REALIZATIONS
+from sosmith.gen.specification.choices import CORES, ERROR_FEEDBACK, REALIZATIONS
 from sosmith.gen.specification.verilog_names import identifier_from
 from sosmith.instrument.scenarios.summaries import SUMMARIES, check_scenario, fitting
 from sosmith.instrument.vehicle.choices import LEVELS, MODELS, TRACK_NAMES
