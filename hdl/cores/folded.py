@@ -70,13 +70,13 @@ from amaranth.lib.memory import Memory
 
 from sosmith.hdl.axi_stream import extended
 from sosmith.hdl.check_bits import CheckBits
-from sosmith.hdl.fault_guard import FaultGuard
 from sosmith.hdl.instruction import PipelinedInstruction
 from sosmith.hdl.pipelined_logic import limits
 from sosmith.hdl.plan.folded_clocks import FOLDED_DEPTH, SERIAL_DEPTH, memory_depth, overlaps
 from sosmith.hdl.plan.instructions import address_bits, encoded, instruction_bits
 from sosmith.hdl.plan.streams import channel_bits
 from sosmith.hdl.reload import ReloadPort
+from sosmith.hdl.shell.fault_guard import FaultGuard
 from sosmith.hdl.shell.shell import Shell
 from sosmith.hdl.status import OF_INPUT, at_rail, status_of_result, with_fault
 from sosmith.model.dataflow.datapath import Datapath

@@ -50,11 +50,11 @@ from amaranth.lib import data
 
 from sosmith.hdl.axi_stream import StreamBuffer
 from sosmith.hdl.constant_banks import NO_CONSTANTS, ConstantBanks
-from sosmith.hdl.fault_guard import FaultGuard
 from sosmith.hdl.pipelined_logic import banks_in_use
 from sosmith.hdl.plan.parallel_clocks import depths
 from sosmith.hdl.plan.streams import channel_bits
 from sosmith.hdl.reload import ReloadPort
+from sosmith.hdl.shell.fault_guard import FaultGuard
 from sosmith.hdl.shell.pipeline import Sample, delayed, through
 from sosmith.hdl.shell.shell import Shell
 from sosmith.hdl.stages.interleaved import InterleavedStage

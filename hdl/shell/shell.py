@@ -23,9 +23,9 @@ from amaranth.lib import data, wiring
 
 from sosmith.hdl.axi_stream import StreamBuffer, codes_of, core_members, extended
 from sosmith.hdl.bus.axi_lite import forward_slave, slave_members
-from sosmith.hdl.fault_guard import FaultGuard
 from sosmith.hdl.plan.streams import channel_bits, width
 from sosmith.hdl.reload import ReloadPort
+from sosmith.hdl.shell.fault_guard import FaultGuard
 from sosmith.hdl.status import (
     OF_INPUT,
     at_rail,
