@@ -245,19 +245,67 @@ class FileEntry(_Part):
     sha256: Sha256
 
 
+class FieldEntry(_Part):
+    """A quantity in a stream: its lowest bit in ``tdata``, its bits, and what a code means."""
+
+    name: Text
+    offset: Annotated[int, Field(strict=True, ge=0, le=1 << 12)]
+    width: Annotated[int, Field(strict=True, ge=2, le=32)]
+    signed: Annotated[bool, Field(strict=True)]
+    lsb: Rational
+    zero: Rational
+
+
+class StreamEntry(_Part):
+    """A stream: the widths of ``tdata``, ``tdest`` and ``tuser`` in bits, 0 if there is none, and the fields."""
+
+    width: Annotated[int, Field(strict=True, ge=8, le=1 << 12)]
+    dest_width: Annotated[int, Field(strict=True, ge=0, le=32)] = 0
+    user_width: Annotated[int, Field(strict=True, ge=0, le=1 << 12)] = 0
+    fields: Annotated[tuple[FieldEntry, ...], Field(min_length=1, max_length=2)]
+
+
+_Architecture = Literal["parallel", "folded", "serial", "online"]
+_Count = Annotated[int, Field(strict=True, ge=1, le=1 << 12)]
+
+
+class ItemEntry(_Part):
+    """What the item is: everything that decides which proof its hardware needs, and that a user connects it by.
+
+    `ahead` is the architecture of the calibration before a decimator, `samples` the number of samples of a beat, `hold`
+    whether a result of a decimator leaves as often as samples enter, and `reload` whether constants can be loaded.
+    `flags` are the bits of ``tuser`` by their names.
+    """
+
+    core: Literal["instrument", "filter", "calibration"]
+    architecture: _Architecture
+    ahead: _Architecture | None = None
+    channels: _Count
+    samples: _Count
+    start: Literal["zero", "steady"]
+    hold: Annotated[bool, Field(strict=True)]
+    protect: Literal["none", "detect", "correct"]
+    reload: Annotated[bool, Field(strict=True)]
+    flags: dict[Text, Annotated[int, Field(strict=True, ge=0, lt=64)]]
+    taken: StreamEntry
+    given: StreamEntry
+
+
 class AboutEntry(_Part):
     """What the certificate is about.
 
     `specification` is the whole text of the specification, TOML, `sha256` that of its UTF-8 bytes, and `options` holds
     what was asked for beside it: core, realization, widths_of, board. `measurements` is the file that the calibration
-    was fitted to. `files` are the files that were written with the certificate, and `versions` those of the tools that
-    made them. `certificate` is the SHA-256 of the certificate's own text with 64 zeros in this place.
+    was fitted to. `item` says what the core is; without it, nothing of its hardware is proven. `files` are the files
+    that were written with the certificate, and `versions` those of the tools that made them. `certificate` is the
+    SHA-256 of the certificate's own text with 64 zeros in this place.
     """
 
     specification: LongText
     sha256: Sha256
     options: dict[Text, Text]
     measurements: FileEntry | None = None
+    item: ItemEntry | None = None
     files: Annotated[tuple[FileEntry, ...], Field(max_length=100)]
     versions: dict[Text, Text]
     certificate: Sha256

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
 
 from sosmith.verify.certificate_file import AboutEntry, Certificate, certificate_text, sealed
 from sosmith.verify.graph import RejectedError, require
@@ -70,7 +68,7 @@ def check_files(about: AboutEntry, directory: Path) -> int:
     for entry in about.files:
         require(Path(entry.name).name == entry.name, f"{entry.name!r} must be the name of a file without a folder")
         path = directory / entry.name
-        _compare(str(path), entry.sha256, _content(path))
+        _compare(str(path), entry.sha256, content_of(path))
     return len(about.files)
 
 
@@ -98,52 +96,7 @@ def check_measurements(about: AboutEntry, path: Path) -> None:
         If it cannot be read, or was changed.
     """
     assert about.measurements is not None
-    _compare(str(path), about.measurements.sha256, _content(path))
-
-
-_NO_MANIFEST = (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError)
-"""What is raised where a manifest has anything else."""
-
-
-class FixedArchitecture(NamedTuple):
-    """Architecture of a core that can be read, None for others; its number of channels, and samples of a beat."""
-
-    name: str | None
-    channels: int
-    lanes: int
-
-
-def fixed_architecture(path: Path) -> FixedArchitecture:
-    """Return what hardware there is from the manifest at `path`, which is known to be unchanged.
-
-    The architecture is None for a core whose constants can be loaded, or whose memories and states are protected.
-
-    Raises
-    ------
-    RejectedError
-        If it is no manifest, or the architecture is none that there is.
-    """
-    try:
-        manifest = json.loads(_content(path))
-        plain = manifest["reload"] is None and manifest["protect"] == "none"
-        channels, lanes = int(manifest["channels"]), int(manifest["streams"]["m_axis"].get("samples", 1))
-        if min(channels, lanes) < 1:
-            raise ValueError
-        architecture = str(manifest["architecture"])
-    except _NO_MANIFEST:
-        raise RejectedError(f"{path} must be the manifest of a core, not another file") from None
-    _check_known(architecture, (*_AHEAD, "online"), path)
-    return FixedArchitecture(architecture if plain else None, channels, lanes)
-
-
-_AHEAD = ("parallel", "folded", "serial")
-
-
-def _check_known(architecture: str, known: Sequence[str], path: Path) -> None:
-    named = ", ".join(known[:-1])
-    require(
-        architecture in known, f"the architecture in {path} must be {named} or {known[-1]}, not {architecture[:40]!r}"
-    )
+    _compare(str(path), about.measurements.sha256, content_of(path))
 
 
 def core_text(path: Path) -> str:
@@ -155,27 +108,9 @@ def core_text(path: Path) -> str:
         If there is none.
     """
     try:
-        return _content(path).decode("ascii")
+        return content_of(path).decode("ascii")
     except UnicodeDecodeError:
         raise RejectedError(f"{path} must be ASCII") from None
-
-
-def architecture_ahead(path: Path) -> str | None:
-    """Return the architecture of the calibration before a decimator from the manifest at `path`; None without one.
-
-    Raises
-    ------
-    RejectedError
-        If it is no manifest, or the architecture is none that there is.
-    """
-    try:
-        found = (json.loads(_content(path))["decimation"] or {}).get("calibration")
-        architecture = None if found is None else str(found["architecture"])
-    except _NO_MANIFEST:
-        raise RejectedError(f"{path} must be the manifest of a core, not another file") from None
-    if architecture is not None:
-        _check_known(architecture, _AHEAD, path)
-    return architecture
 
 
 def check_texts(about: AboutEntry, texts: Mapping[str, str]) -> int:
@@ -196,7 +131,14 @@ def check_texts(about: AboutEntry, texts: Mapping[str, str]) -> int:
     return len(names)
 
 
-def _content(path: Path) -> bytes:
+def content_of(path: Path) -> bytes:
+    """Return the bytes of a file.
+
+    Raises
+    ------
+    RejectedError
+        If it cannot be read.
+    """
     try:
         return path.read_bytes()
     except OSError as error:

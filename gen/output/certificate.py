@@ -13,6 +13,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from sosmith.gen.core import CoreDesign
+from sosmith.gen.output.core_facts import StreamFacts, core_facts
 from sosmith.gen.proof.cascade_proof import (
     StageModel,
     TransferFunction,
@@ -42,9 +43,11 @@ from sosmith.verify.certificate_file import (
     Certificate,
     ClaimsEntry,
     DecimationEntry,
+    FieldEntry,
     FileEntry,
     GainEntry,
     IdealEntry,
+    ItemEntry,
     NodeEntry,
     OnlineEntry,
     OnlineSectionEntry,
@@ -52,6 +55,7 @@ from sosmith.verify.certificate_file import (
     PortEntry,
     SectionEntry,
     StageEntry,
+    StreamEntry,
     on_grid,
     sealed,
 )
@@ -152,9 +156,48 @@ def about(design: CoreDesign, texts: Mapping[str, str]) -> AboutEntry:
         sha256=_sha256(spec.text.encode()),
         options=design.options,
         measurements=None if data is None else FileEntry(name=data.name, sha256=_sha256(_bytes_of(data))),
+        item=_item(design),
         files=tuple(FileEntry(name=name, sha256=_sha256(text.encode())) for name, text in texts.items()),
         versions={"sosmith": __version__} | {tool: version(tool) for tool in _TOOLS},
         certificate="0" * 64,
+    )
+
+
+def _item(design: CoreDesign) -> ItemEntry:
+    """Say what a core is, as its proof and its user need it."""
+    found, interface = design.architecture, core_facts(design).interface
+    return ItemEntry(
+        core=design.core,
+        architecture=found.name,
+        ahead=None if found.ahead is None else found.ahead.name,
+        channels=found.channels,
+        samples=found.samples_per_clock,
+        start="steady" if design.quantized.steady else "zero",
+        hold=found.hold,
+        protect=found.protect,
+        reload=found.reload,
+        flags=dict(interface.outputs.flags),
+        taken=_stream(interface.inputs),
+        given=_stream(interface.outputs),
+    )
+
+
+def _stream(stream: StreamFacts) -> StreamEntry:
+    return StreamEntry(
+        width=stream.width,
+        dest_width=stream.dest_width,
+        user_width=stream.user_width,
+        fields=tuple(
+            FieldEntry(
+                name=each.port.name,
+                offset=each.offset,
+                width=each.port.bits,
+                signed=each.port.signed,
+                lsb=each.port.lsb,
+                zero=each.port.zero,
+            )
+            for each in stream.fields
+        ),
     )
 
 

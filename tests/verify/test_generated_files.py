@@ -17,13 +17,12 @@ from sosmith.gen.specification.specification import load
 from sosmith.model.errors import SpecificationError
 from sosmith.verify.certificate_file import AboutEntry, read_certificate
 from sosmith.verify.generated_files import (
-    architecture_ahead,
     check_files,
     check_seal,
     check_texts,
     core_text,
-    fixed_architecture,
 )
+from sosmith.verify.item import check_manifest
 from sosmith.verify.verification import RejectedError
 
 NAME = "audio_lowpass"
@@ -99,40 +98,39 @@ def test_sentences(folder: Path) -> None:
 
 
 @pytest.mark.parametrize(("key", "value"), [("channels", 0), ("channels", 1e400), ("samples", 0), ("samples", [])])
-def test_a_manifest_with_other_numbers_is_none(folder: Path, key: str, value: object) -> None:
-    path = folder / f"{NAME}.json"
-    assert fixed_architecture(path).channels > 0
-    manifest = json.loads(path.read_text(encoding="utf-8"))
+def test_a_manifest_with_other_numbers_is_refused(folder: Path, key: str, value: object) -> None:
+    manifest = json.loads((folder / f"{NAME}.json").read_text(encoding="utf-8"))
+    refused_manifest(folder, json.dumps(manifest), "")
     (manifest if key == "channels" else manifest["streams"]["m_axis"])[key] = value
-    path.write_text(json.dumps(manifest), encoding="utf-8")
-    with pytest.raises(RejectedError, match=r"\.json must be the manifest of a core, not another file$"):
-        fixed_architecture(path)
+    refused_manifest(folder, json.dumps(manifest), r"^(channels|streams\.m_axis) in the manifest must be ")
 
 
 @pytest.mark.parametrize("architecture", ["systolic", "", None, ["parallel"]])
 def test_an_architecture_that_does_not_exist_is_refused(folder: Path, architecture: object) -> None:
-    path = folder / f"{NAME}.json"
-    manifest = json.loads(path.read_text(encoding="utf-8"))
-    path.write_text(json.dumps(manifest | {"architecture": architecture}), encoding="utf-8")
-    known, found = "parallel, folded, serial or online", re.escape(repr(str(architecture)))
-    with pytest.raises(
-        RejectedError, match=rf"^the architecture in {re.escape(str(path))} must be {known}, not {found}$"
-    ):
-        fixed_architecture(path)
+    manifest = json.loads((folder / f"{NAME}.json").read_text(encoding="utf-8"))
+    sentence = "^architecture in the manifest must be folded, as in the certificate, not "
+    refused_manifest(folder, json.dumps(manifest | {"architecture": architecture}), sentence)
     ahead = {"calibration": {"architecture": architecture}}
-    path.write_text(json.dumps(manifest | {"decimation": ahead}), encoding="utf-8")
-    with pytest.raises(
-        RejectedError,
-        match=rf"^the architecture in {re.escape(str(path))} must be parallel, folded or serial, not {found}$",
-    ):
-        architecture_ahead(path)
+    if architecture is not None:
+        sentence = "^calibration before the decimator in the manifest must be None, as in the certificate, not "
+        refused_manifest(folder, json.dumps(manifest | {"decimation": ahead}), sentence)
 
 
 def test_a_manifest_nested_too_deep_is_none(folder: Path) -> None:
-    path = folder / f"{NAME}.json"
-    path.write_text("[" * 100_000, encoding="utf-8")
-    with pytest.raises(RejectedError, match=r"\.json must be the manifest of a core, not another file$"):
-        fixed_architecture(path)
+    refused_manifest(folder, "[" * 100_000, "^the manifest must be that of a core, not another file$")
+
+
+def refused_manifest(folder: Path, text: str, sentence: str) -> None:
+    """Check that a manifest is refused by a sentence; accepted without one."""
+    certificate = read_certificate(folder / f"{NAME}.certificate.json")
+    assert certificate.about is not None
+    item = certificate.about.item
+    assert item is not None
+    if not sentence:
+        check_manifest(text.encode(), certificate, item)
+        return
+    with pytest.raises(RejectedError, match=sentence):
+        check_manifest(text.encode(), certificate, item)
 
 
 def test_what_is_no_text_is_not_read(folder: Path) -> None:

@@ -27,7 +27,6 @@ made by the core behind: here they are passed on (`sosmith.verify.around.passed_
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
@@ -57,6 +56,7 @@ from sosmith.verify.parallel.forms import shifted
 from sosmith.verify.parallel.netlist import Netlist
 from sosmith.verify.program.normal_form import Form, constant, plus
 from sosmith.verify.reader.syntax import Bits, Module
+from sosmith.verify.specified.words import table_of, words_of
 
 _DATA_REGISTERS = frozenset({"sum", "comb", "difference", "o_data"})
 _NAME = re.compile(r"(\w*?)(\d*)(?:_control(\d))?")
@@ -137,7 +137,7 @@ def around(text: str, certificate: Certificate, channels: int) -> Around:
     modules = read_core(text, certificate.name)
     netlist, held = read_around(modules, certificate.name), f"{certificate.name}_holder" in modules
     if certificate.about is not None:
-        stated = tomllib.loads(certificate.about.specification).get("filter", {}).get("hold", False)
+        stated = table_of(words_of(certificate.about.specification), "filter").get("hold", False)
         require(held == stated, f"results must {'' if stated else 'not '}be held, as specified")
     names = names_of(netlist) if channels > 1 else None
     told = "o_rail" if entry.calibration is None and names is None else "o_flags"

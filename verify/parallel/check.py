@@ -25,7 +25,6 @@ by the name of its DELAY node. Under a wrong name a proof is not found.
 from __future__ import annotations
 
 import sys
-import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -44,6 +43,7 @@ from sosmith.verify.parallel.split import split
 from sosmith.verify.program.normal_form import Form, constant, plus
 from sosmith.verify.reader.source import read_modules
 from sosmith.verify.reader.syntax import Module
+from sosmith.verify.specified.words import words_of
 
 CLOCK = "aclk"
 OUTPUT, FLAGS, OUTPUT_DEST = "m_axis_tdata", "m_axis_tuser", "m_axis_tdest"
@@ -209,7 +209,7 @@ def _unused(certificate: Certificate) -> list[int]:
     found = [*_NONE]
     if certificate.ideal.polynomial is None:
         found.append(_OUTSIDE)
-    if certificate.about is not None and "wear" not in tomllib.loads(certificate.about.specification):
+    if certificate.about is not None and "wear" not in words_of(certificate.about.specification):
         found += _WEAR
     return sorted(found)
 

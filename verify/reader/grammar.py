@@ -130,7 +130,8 @@ class Reader:
             module.clocked.append((clock, self._statements(2)))
         elif tokens.take("initial"):
             tokens.expect("begin")
-            if tokens.take(":"):
+            labelled = tokens.take(":")
+            if labelled:
                 self._named(tokens.name(), "block")
                 self._line(2)
                 tokens.expect("integer", "i", ";")
@@ -138,7 +139,7 @@ class Reader:
             else:
                 self._line(2)
             while tokens.peek() != "end":
-                if tokens.take("for"):
+                if labelled and tokens.take("for"):
                     self._words()
                 else:
                     self._word()

@@ -18,7 +18,7 @@ _OBEYED = re.compile(
     r"\b(?:synopsys|synthesis|rtl_synthesis|ambit|cadence|exemplar|altera|xilinx|xlnx_\w*|quartus|vivado|pragma|protect"
     r"|verilator|verilint|verilog_lint|lint_\w*|spyglass|leda|translate_\w*|synth_\w*|synthesis_\w*|full_case"
     r"|parallel_case|one_hot|one_cold|infer_\w*|black_box|attribute|celldefine|surelint|svlint|slang|iverilog|yosys"
-    r"|coverage|formal|vcs|ncsim|metacomment)\b",
+    r"|coverage|formal|vcs|ncsim|metacomment|vhdl_\w*)\b|/\*|\*/",
     re.IGNORECASE,
 )
 """Words in comments that tools obey, or may: the first word of a comment, or any after it."""

@@ -8,7 +8,6 @@ claim holds against it as well.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
@@ -23,6 +22,7 @@ from sosmith.verify.l1_response import UndecidedError
 from sosmith.verify.specified.filter_distance import distance
 from sosmith.verify.specified.ideal_filter import stated_filter
 from sosmith.verify.specified.sections_file import sections_in
+from sosmith.verify.specified.words import words_of
 
 _CALIBRATED = {"voltage": "V", "temperature": "degC"}
 """Inputs of a calibration, in the order of the ports, and their units."""
@@ -69,10 +69,7 @@ def check_specification(certificate: Certificate, text: str, margin: Fraction, f
     RejectedError
         For the first disagreement.
     """
-    try:
-        tree = tomllib.loads(text.removeprefix("\ufeff"), parse_float=Decimal)
-    except (ValueError, ArithmeticError, RecursionError):
-        raise RejectedError("the specification must be TOML") from None
+    tree = words_of(text)
     try:
         return _checked(certificate, tree, margin, folder)
     except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:

@@ -12,6 +12,9 @@ from sosmith.terminal import JSON_OPTION, print_json, show_progress
 if TYPE_CHECKING:
     from sosmith.interface.certificate import Proof
 
+_NOT_ALL = 4
+"""Exit status if nothing is wrong, but a part of what was asked for is not proven."""
+
 
 @click.command()
 @click.argument("certificate", type=click.Path(path_type=Path))
@@ -28,13 +31,28 @@ if TYPE_CHECKING:
     help="Hold the generated files in this folder against the certificate, byte for byte, and prove the SystemVerilog.",
 )
 @click.option("--rebuild", is_flag=True, help="Generate all files again and compare them with the certificate.")
+@click.option(
+    "--core",
+    type=click.Choice(["instrument", "filter", "calibration"]),
+    help="With --spec, the core that must be proven; all that the specification describes by default.",
+)
+@click.option("--partial", is_flag=True, help="Exit with 0 where nothing is wrong, though a part is not proven.")
 @JSON_OPTION
-def verify(certificate: Path, spec: Path | None, files: Path | None, rebuild: bool, as_json: bool) -> None:
+def verify(
+    certificate: Path,
+    spec: Path | None,
+    files: Path | None,
+    rebuild: bool,
+    core: str | None,
+    partial: bool,
+    as_json: bool,
+) -> None:
     """Prove CERTIFICATE by an independent method: the error bound, and no internal overflow.
 
     CERTIFICATE is the <name>.certificate.json that `sosmith generate` writes. Without options no other file is read.
     The method is different from the one that made the certificate. Exits with 1 and the reason if any claim does not
-    follow exactly, or anything that it is held against disagrees.
+    follow exactly, or anything that it is held against disagrees, and with 4 if nothing is wrong but a part of what was
+    asked for is not proven: the table says which, and why.
 
     \b
         sosmith verify my_core/my.certificate.json
@@ -46,14 +64,18 @@ def verify(certificate: Path, spec: Path | None, files: Path | None, rebuild: bo
     read = Certificate.load(certificate)
     with show_progress() as step:
         try:
-            proof = read.verify(step, spec=spec, files=files, rebuild=rebuild)
+            proof = read.verify(step, spec=spec, files=files, rebuild=rebuild, core=core)
         except ShortfallError as error:
             raise ShortfallError(f"{certificate}: {error}") from None
     if as_json:
         print_json(
             {
                 "name": read.name,
-                "proven": True,
+                "proven": not proof.missing,
+                "scope": {
+                    name: {"state": part.state.value, "asked": part.asked, "why": part.why}
+                    for name, part in proof.scope.items()
+                },
                 "error_bound": proof.bound,
                 "error_parts": proof.budget,
                 "error_unit": proof.bound.unit,
@@ -79,6 +101,8 @@ def verify(certificate: Path, spec: Path | None, files: Path | None, rebuild: bo
         from sosmith.commands.tables.certificate import print_proof
 
         print_proof(read.entries, proof)
+    if proof.missing and not partial:
+        click.get_current_context().exit(_NOT_ALL)
 
 
 def _calibration(proof: Proof) -> dict[str, int]:

@@ -2,38 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from os import PathLike, fspath
 from pathlib import Path
 
-from sosmith.gen.specification.specification import from_text, load
+from sosmith.gen.specification.specification import Specification, from_text, load
 from sosmith.interface.quantity import Quantity
 from sosmith.model.text_files import write_files
-from sosmith.verify.around.cic import DecimatorVerdict, check_decimator
-from sosmith.verify.around.parallel_core import check_ahead, check_behind
+from sosmith.verify.around.cic import DecimatorVerdict
 from sosmith.verify.certificate_file import Certificate as Entries
 from sosmith.verify.certificate_file import certificate_text, read_certificate
-from sosmith.verify.decimation import at_lower_rate, behind_decimator, calibration_alone, module_in
-from sosmith.verify.generated_files import (
-    about_of,
-    architecture_ahead,
-    check_files,
-    check_measurements,
-    check_seal,
-    check_text,
-    check_texts,
-    core_text,
-    fixed_architecture,
-)
-from sosmith.verify.graph import RejectedError
-from sosmith.verify.parallel.check import HardwareVerdict, check_hardware
-from sosmith.verify.program.check import ProgramVerdict, check_program
-from sosmith.verify.specified.stated_specification import Agreement, check_specification
-from sosmith.verify.verification import verify
+from sosmith.verify.door import Stated, judge
+from sosmith.verify.generated_files import about_of, check_texts
+from sosmith.verify.parallel.check import HardwareVerdict
+from sosmith.verify.program.check import ProgramVerdict
+from sosmith.verify.scope import Part
+from sosmith.verify.specified.stated_specification import Agreement
 
 Progress = Callable[[str, int, int], None]
 """Called with the name of a step, the amount done and the total; both are 0 if they are not known."""
+
+
+def _stated(spec: Specification, core: str | None) -> Stated:
+    return Stated(spec.text, spec.path.parent, None if spec.calibration is None else spec.calibration.data, core)
 
 
 @dataclass(frozen=True)
@@ -71,6 +63,14 @@ class Proof:
     """What the check of a decimator's SystemVerilog found; None without one, or if it was not checked."""
     rebuilt: int = 0
     """Number of files that were generated again."""
+    scope: Mapping[str, Part] = field(default_factory=dict)
+    """How much of each part is proven: arithmetic, filter, calibration, hardware, program, unit, flags, liveness,
+    c_model and rtlil, in this order."""
+
+    @property
+    def missing(self) -> dict[str, Part]:
+        """The parts that were asked for and are not proven as a whole; empty if everything is."""
+        return {name: part for name, part in self.scope.items() if part.is_missing}
 
 
 @dataclass(frozen=True)
@@ -124,6 +124,7 @@ class Certificate:
         spec: str | PathLike[str] | None = None,
         files: str | PathLike[str] | None = None,
         rebuild: bool = False,
+        core: str | None = None,
     ) -> Proof:
         """Prove the certificate by a different method than the one that made it, and hold it against its subject.
 
@@ -142,6 +143,14 @@ class Certificate:
         rebuild : bool
             Whether to generate all files again, from `spec` or the specification's text in the certificate, and compare
             them byte for byte.
+        core : str
+            With `spec`, the core that must be proven: instrument, filter or calibration; all that the specification
+            describes if it is not given.
+
+        Returns
+        -------
+        Proof
+            What is proven. Nothing is wrong then, but parts may not be proven: its `missing` names those asked for.
 
         Raises
         ------
@@ -150,50 +159,15 @@ class Certificate:
         SpecificationError
             If a file cannot be read, or the specification is invalid.
         """
-        verdict = verify(self.entries, progress)
-        agreement, program, hardware, decimator, compared, again = None, None, None, None, 0, 0
-        before: ProgramVerdict | HardwareVerdict | None = None
         checked = None if spec is None else load(Path(fspath(spec)))
-        if checked is not None:
-            progress("specification", 0, 0)
-            agreement = check_specification(self.entries, checked.text, verdict.margin, checked.path.parent)
-            about = about_of(self.entries)
-            check_text(about, checked.text)
-            data = checked.calibration.data if checked.calibration is not None else None
-            if about.measurements is not None and data is not None:
-                check_measurements(about, data)
-        if files is not None:
-            progress("files", 0, 0)
-            content = self.text().encode() if self.path is None else self.path.read_bytes()
-            folder = Path(fspath(files))
-            compared = check_files(check_seal(self.entries, content), folder)
-            architecture, channels, lanes = fixed_architecture(folder / f"{self.name}.json")
-            text = core_text(folder / f"{self.name}.sv")
-            found = self.entries.decimation
-            if found is not None:
-                progress("decimator", 0, 0)
-                decimator = check_decimator(text, self.entries, channels)
-            if architecture in {"folded", "serial"}:
-                progress("program", 0, 0)
-                behind = None if found is None else f"{self.name}_behind"
-                program = check_program(behind_decimator(text, self.entries), at_lower_rate(self.entries), top=behind)
-            elif architecture == "online" and self.entries.claims.online is None:
-                raise RejectedError("the certificate of an online core must claim the residuals of its units")
-            elif architecture == "parallel":
-                progress("hardware", 0, 0)
-                hardware = (
-                    check_hardware(text, self.entries, channels, lanes)
-                    if found is None
-                    else check_behind(text, self.entries, channels)
-                )
-            ahead = calibration_alone(self.entries)
-            if ahead is not None:
-                if architecture_ahead(folder / f"{self.name}.json") == "parallel":
-                    progress("hardware of the calibration", 0, 0)
-                    before = check_ahead(text, self.entries, channels)
-                else:
-                    progress("program of the calibration", 0, 0)
-                    before = check_program(module_in(text, self.name, ahead.name), ahead)
+        found = judge(
+            self.entries,
+            progress,
+            stated=None if checked is None else _stated(checked, core),
+            folder=None if files is None else Path(fspath(files)),
+            content=self.text().encode() if self.path is None else self.path.read_bytes(),
+        )
+        verdict, again = found.verdict, 0
         if rebuild:
             from sosmith.gen.output.rebuild import rebuilt
 
@@ -207,13 +181,14 @@ class Certificate:
             budget={part: Quantity(float(value * lsb), unit) for part, value in verdict.budget.items()},
             nodes=verdict.nodes,
             ranges=verdict.ranges,
-            agreement=agreement,
-            files=compared,
-            program=program,
-            calibration=before,
-            hardware=hardware,
-            decimator=decimator,
+            agreement=found.agreement,
+            files=found.files,
+            program=found.proofs.program,
+            calibration=found.proofs.calibration,
+            hardware=found.proofs.hardware,
+            decimator=found.decimator,
             rebuilt=again,
+            scope=found.scope,
         )
 
     def text(self) -> str:

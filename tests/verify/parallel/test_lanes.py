@@ -1,8 +1,6 @@
 """Several samples a clock: all lanes are proven against the certificate's graph, and each wrong one is rejected."""
 
-import json
 import re
-from pathlib import Path
 
 import pytest
 from tests.gen.block_specifications import designed
@@ -12,7 +10,6 @@ from tests.verify.small_specifications import INSTRUMENT, PLAIN, STEADY, STEADY_
 
 from sosmith.gen.realizations.registry import REALIZATIONS
 from sosmith.hdl.plan.parallel_clocks import block_latency_cycles
-from sosmith.verify.generated_files import fixed_architecture
 
 
 def with_output(bits: int) -> str:
@@ -169,15 +166,6 @@ def test_a_second_sample_moves_whether_another_one_comes_or_not() -> None:
     waits = re.sub(r"if \(n2\) (o_data <= choice\d+;)", r"if (n2) if (i_valid) \1", core.text)
     sentence = r"output_buffer\.o_data\S* must take over the second sample when the first leaves"
     assert re.fullmatch(sentence, rejection(core, waits)), rejection(core, waits)
-
-
-@pytest.mark.parametrize("samples", [1, 2, 16])
-def test_the_number_of_lanes_is_in_the_manifest(samples: int, tmp_path: Path) -> None:
-    path = tmp_path / "core.json"
-    streams = {"m_axis": {} if samples == 1 else {"samples": samples}}
-    manifest = {"reload": None, "protect": "none", "architecture": "parallel", "channels": 1, "streams": streams}
-    path.write_text(json.dumps(manifest), encoding="utf-8")
-    assert fixed_architecture(path) == ("parallel", 1, samples)
 
 
 @pytest.mark.parametrize(("bits", "lanes", "count"), [(8, 2, 40), (12, 2, 20), (10, 2, 20), (12, 16, 2)], ids=str)

@@ -11,16 +11,18 @@ from sosmith.interface.tables.design import budget_table
 from sosmith.verify.certificate_file import Certificate
 from sosmith.verify.parallel.check import HardwareVerdict
 from sosmith.verify.program.check import ProgramVerdict
+from sosmith.verify.scope import State
 from sosmith.verify.specified.stated_specification import Agreement
 
 
 def print_proof(certificate: Certificate, proof: Proof) -> None:
     """Print the proven error budget, and the number of ranges checked."""
     console = TableConsole()
+    unit = plain(proof.bound.unit)
     ranges = f"{proof.nodes} nodes within their ranges, {proof.ranges} by peak gains: nothing inside overflows"
-    allowed = Quantity(float(certificate.max_error), proof.bound.unit)
+    allowed = Quantity(float(certificate.max_error), unit)
     print_all([budget_table(proof.budget, allowed, float(certificate.output.lsb))])
-    console.print(f"[bold green]proven[/]: {escape(certificate.name)}, {ranges}")
+    console.print(f"[bold green]proven[/]: {escape(plain(certificate.name))}, {ranges}")
     if proof.agreement is not None:
         console.print(f"[bold green]as specified[/]: {_agreement(proof.agreement)}")
     if proof.files:
@@ -56,12 +58,21 @@ def print_proof(certificate: Certificate, proof: Proof) -> None:
             f"[bold green]units[/]: {online.units} for each of {len(online.sections)} sections, a sample every "
             f"{online.interval} clocks; no residual leaves its range, whatever the digits are"
         )
-    if proof.files and proof.program is None and proof.hardware is None:
-        plain = "a core with loadable constants or protection"
-        what = plain if online is None else "an online core"
-        console.print(f"not read: the SystemVerilog, as that of {what}")
     if proof.rebuilt:
         console.print(f"[bold green]rebuilt[/]: {proof.rebuilt} files, the same byte for byte")
+    _print_scope(console, proof)
+
+
+def _print_scope(console: TableConsole, proof: Proof) -> None:
+    for name, part in proof.scope.items():
+        if part.asked:
+            colour = "green" if part.state is State.PROVEN else "yellow"
+            console.print(f"[bold {colour}]{part.state.value.replace('_', ' ')}[/]: {name}: {escape(plain(part.why))}")
+
+
+def plain(text: str) -> str:
+    """Return a text from a file without characters that control a terminal."""
+    return "".join(character if character.isprintable() else "?" for character in text)
 
 
 def _print_hardware(console: TableConsole, what: str, found: HardwareVerdict) -> None:
@@ -76,7 +87,7 @@ def _print_hardware(console: TableConsole, what: str, found: HardwareVerdict) ->
 def _agreement(agreement: Agreement) -> str:
     parts = ["ports and allowed error"]
     if agreement.core != "filter":
-        parts.append("measurements by their SHA-256" if agreement.fitted else "calibration")
+        parts.append("the measurements by their SHA-256, without a new fit," if agreement.fitted else "calibration")
     if agreement.distance is not None:
         parts.append(f"filter within a peak gain of {float(agreement.distance):.1e} of its words")
     return f"{', '.join(parts[:-1])} and {parts[-1]}" if len(parts) > 1 else parts[0]

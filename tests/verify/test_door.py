@@ -1,0 +1,216 @@
+"""What the verifier takes as said by whom: wrong items, manifests and files whose digests are all right."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tests.verify.small_specifications import STEADY, STEADY_INSTRUMENT
+
+from sosmith.gen.core import design_core
+from sosmith.gen.output.generate import generate
+from sosmith.gen.specification.specification import load
+from sosmith.interface.certificate import Certificate, Proof
+from sosmith.verify.certificate_file import Certificate as Entries
+from sosmith.verify.certificate_file import certificate_text, sealed
+from sosmith.verify.graph import RejectedError
+from sosmith.verify.scope import State
+
+Tree = dict[str, Any]
+PARALLEL = STEADY + 'hardware.architecture = "parallel"\n'
+FOLDED = STEADY + 'hardware.architecture = "folded"\n'
+
+
+@pytest.fixture(scope="module")
+def cores(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, str | None], Path]:
+    known: dict[tuple[str, str | None], Path] = {}
+
+    def written(text: str, core: str | None = None) -> Path:
+        if (text, core) not in known:
+            folder = known[text, core] = tmp_path_factory.mktemp("core")
+            spec = folder / "spec.toml"
+            spec.write_text(text, encoding="utf-8")
+            generate(design_core(load(spec), core=core), folder)
+        return known[text, core]
+
+    return written
+
+
+@pytest.fixture
+def copy(cores: Callable[[str, str | None], Path], tmp_path: Path) -> Callable[..., Path]:
+    def copied(text: str, core: str | None = None) -> Path:
+        return Path(shutil.copytree(cores(text, core), tmp_path / "copy"))
+
+    return copied
+
+
+def forge(folder: Path, edit: Callable[[Tree], None] = lambda tree: None) -> Path:
+    """Change a certificate, and make all digests right again."""
+    (path,) = folder.glob("*.certificate.json")
+    tree = json.loads(path.read_text(encoding="utf-8"))
+    edit(tree)
+    about = tree["about"]
+    for entry in about["files"]:
+        with_name = folder / entry["name"]
+        if with_name.exists():
+            entry["sha256"] = hashlib.sha256(with_name.read_bytes()).hexdigest()
+    about["sha256"] = hashlib.sha256(about["specification"].encode()).hexdigest()
+    path.write_text(certificate_text(sealed(Entries.model_validate(tree))), encoding="utf-8")
+    return path
+
+
+def changed(folder: Path, name: str, old: str, new: str) -> None:
+    path = folder / name
+    text = path.read_text(encoding="utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new, 1), encoding="utf-8")
+
+
+def proof(path: Path, *, spec: bool = False, core: str | None = None) -> Proof:
+    stated = path.parent / "spec.toml" if spec else None
+    return Certificate.load(path).verify(spec=stated, files=path.parent, core=core)
+
+
+def item(**fields: Any) -> Callable[[Tree], None]:
+    return lambda tree: tree["about"]["item"].update(fields)
+
+
+def test_what_is_right_is_accepted_and_what_is_missing_is_named(copy: Callable[..., Path]) -> None:
+    found = proof(forge(copy(PARALLEL)), spec=True)
+    assert found.hardware is not None
+    assert set(found.missing) == {"flags", "liveness", "c_model", "rtlil"}
+    assert found.scope["hardware"].state is found.scope["filter"].state is State.PROVEN
+
+
+@pytest.mark.parametrize("text", [PARALLEL, FOLDED], ids=["parallel", "folded"])
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ('"reload": null', '"reload": {"x": 1}', "reload in the manifest must be False, .* not True"),
+        ('"protect": "none"', '"protect": "detect"', "protect in the manifest must be none, .*"),
+        ('"channels": 1', '"channels": 2', "channels in the manifest must be 1, .*"),
+        ('"core": "filter"', '"core": "instrument"', "core in the manifest must be filter, .*"),
+        ('"start": "steady"', '"start": "zero"', "start in the manifest must be steady, .*"),
+        ('"lsb": 0.0078125', '"lsb": 0.0078126', "streams.s_axis in the manifest must be .*"),
+        ('"input_at_rail": 0', '"input_at_rail": 6', "streams.m_axis in the manifest must be .*"),
+        ('"offset": 0', '"offset": 1', "streams.s_axis in the manifest must be .*"),
+        ('"width": 8', '"width": 16', "streams.s_axis in the manifest must be .*"),
+        ('"name": "plain"', '"name": "other"', "name in the manifest must be plain, .*"),
+        ('\n  "architecture": "', '\n  "architecture": "x', "architecture in the manifest must be .*"),
+        ('{\n', "[\n", "the manifest must be that of a core, not another file"),
+    ],
+)  # fmt: skip
+def test_the_manifest_decides_nothing(text: str, old: str, new: str, sentence: str, copy: Callable[..., Path]) -> None:
+    folder = copy(text)
+    changed(folder, "plain.json", old, new)
+    with pytest.raises(RejectedError, match=f"^{sentence}$"):
+        proof(forge(folder))
+
+
+@pytest.mark.parametrize("manifest", ["", '"reload": {"x": 1}', '"protect": "detect"'])
+def test_an_empty_module_is_no_core(manifest: str, copy: Callable[..., Path]) -> None:
+    folder = copy(PARALLEL)
+    empty = "module plain(aclk);\n  input aclk;\n  wire aclk;\nendmodule\n"
+    (folder / "plain.sv").write_text(empty, encoding="utf-8")
+    if manifest:
+        key = manifest.partition(":")[0]
+        content = re.sub(rf"{key}: [^,\n]+", manifest, (folder / "plain.json").read_text(encoding="utf-8"), count=1)
+        (folder / "plain.json").write_text(content, encoding="utf-8")
+    with pytest.raises(RejectedError, match=r"^the port aresetn must be there$"):
+        proof(forge(folder))
+    with pytest.raises(RejectedError, match=r"^the port aresetn must be there$"):
+        proof(forge(folder, item(protect="detect")))
+
+
+@pytest.mark.parametrize(
+    ("fields", "sentence"),
+    [
+        ({"channels": 2}, "dest_width of taken of the item must be 8, .*"),
+        ({"samples": 2}, "width of taken of the item must be 16, .*"),
+        ({"core": "instrument"}, "core of the item must be filter, as in the certificate, not instrument"),
+        ({"start": "zero"}, "start of the item must be steady, as in the certificate, not zero"),
+        ({"hold": True}, "hold of the item must not be stated without a decimator"),
+        ({"ahead": "parallel"}, "ahead of the item must not be there, as in the certificate"),
+        ({"architecture": "online"}, "architecture of the item must not be online, as in the certificate"),
+        ({"flags": {"input_at_rail": 3}}, "flags of the item must be .*"),
+        ({"reload": True}, "the files of the certificate must be plain.c, .*plain_registers.h, not .*"),
+    ],
+)
+def test_the_item_agrees_with_what_is_proven(fields: Tree, sentence: str, copy: Callable[..., Path]) -> None:
+    with pytest.raises(RejectedError, match=f"^{sentence}$"):
+        proof(forge(copy(PARALLEL), item(**fields)))
+
+
+@pytest.mark.parametrize(
+    ("key", "sentence"),
+    [
+        ("channels = 3", "channels of the item must be 3, as specified, not 1"),
+        ('hardware.protect = "detect"', "protect of the item must be detect, as specified, not none"),
+        ("hardware.reload = true", "reload of the item must be True, as specified, not False"),
+        ("hardware.samples_per_clock = 2", "samples of the item must be 2, as specified, not 1"),
+        ('hardware.architecture = "serial"', "architecture of the item must be serial, as specified, not folded"),
+    ],
+)
+def test_the_specification_says_what_the_item_is(key: str, sentence: str, copy: Callable[..., Path]) -> None:
+    """The text in the certificate is that of the other specification: nothing but the item disagrees."""
+    folder = copy(STEADY)
+    wanted = f"{key}\n{STEADY}" if key.startswith("channels") else f"{STEADY}{key}\n"
+    (folder / "spec.toml").write_text(wanted, encoding="utf-8")
+    stated = re.sub(r"not folded$", "not (folded|parallel)", sentence)
+    with pytest.raises(RejectedError, match=f"^{stated}$"):
+        proof(forge(folder, lambda tree: tree["about"].update(specification=wanted)), spec=True)
+
+
+def test_a_certificate_without_the_filter_is_not_one_with_it(copy: Callable[..., Path]) -> None:
+    folder = copy(STEADY_INSTRUMENT, "calibration")
+    (path,) = folder.glob("*.certificate.json")
+    found = proof(path, spec=True)
+    assert found.missing["filter"].why == "the certificate is that of a core without the filter"
+    assert "filter" not in proof(path, spec=True, core="calibration").missing
+    with pytest.raises(RejectedError, match=r"^the core must be instrument, as asked for, not calibration$"):
+        proof(path, spec=True, core="instrument")
+
+
+@pytest.mark.parametrize("missing", ["plain.sv", "plain.c", "plain.il", "plain.json", ".."])
+def test_the_set_of_files_is_the_expected_one(missing: str, copy: Callable[..., Path]) -> None:
+    def without(tree: Tree) -> None:
+        files = tree["about"]["files"]
+        tree["about"]["files"] = [entry for entry in files if entry["name"] != missing][
+            : None if missing != ".." else 0
+        ]
+
+    with pytest.raises(RejectedError, match=r"^the files of the certificate must be plain.c, .*plain.sv, not "):
+        proof(forge(copy(PARALLEL), without))
+
+
+@pytest.mark.parametrize("name", ["../plain", "/plain", "plain/../plain", "a b", "\x1b[2K", ""])
+def test_a_name_is_a_plain_identifier(name: str, copy: Callable[..., Path]) -> None:
+    folder = copy(PARALLEL)
+
+    def renamed(tree: Tree) -> None:
+        tree["name"] = name
+        for entry in tree["about"]["files"]:
+            entry["name"] = entry["name"].replace("plain", name)
+
+    with pytest.raises(RejectedError):
+        proof(forge(folder, renamed))
+
+
+def test_an_old_certificate_proves_no_hardware(copy: Callable[..., Path]) -> None:
+    found = proof(forge(copy(PARALLEL), lambda tree: tree["about"].pop("item")), spec=True)
+    assert found.hardware is None
+    assert found.missing["hardware"].why == "the certificate does not state what the item is"
+    assert found.missing["filter"].state is State.PARTIAL
+
+
+@pytest.mark.parametrize("words", ["[", "a = 1\na = 2", "[wear", "x = " + "[" * 5000, "filter = 1\n[wear", "\x00"])
+def test_broken_words_are_a_sentence(words: str, copy: Callable[..., Path]) -> None:
+    path = forge(copy(PARALLEL), lambda tree: tree["about"].update(specification=words))
+    with pytest.raises(RejectedError, match=r"^the specification must be TOML$"):
+        proof(path)

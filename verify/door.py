@@ -1,0 +1,186 @@
+"""The door of the verifier: certificate, specification and files in, one verdict with its scope out.
+
+What is proven of the hardware, and by which proof, follows from the certificate alone: no file beside it decides.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from sosmith.verify.around.cic import DecimatorVerdict, check_decimator
+from sosmith.verify.around.parallel_core import check_ahead, check_behind
+from sosmith.verify.certificate_file import Certificate, ItemEntry
+from sosmith.verify.decimation import at_lower_rate, behind_decimator, calibration_alone, module_in
+from sosmith.verify.generated_files import (
+    about_of,
+    check_files,
+    check_measurements,
+    check_seal,
+    check_text,
+    content_of,
+    core_text,
+)
+from sosmith.verify.graph import RejectedError, require
+from sosmith.verify.item import (
+    check_item,
+    check_manifest,
+    check_ports,
+    check_stated,
+    core_of,
+    file_names,
+    whole_core,
+)
+from sosmith.verify.parallel.check import HardwareVerdict, check_hardware
+from sosmith.verify.program.check import ProgramVerdict, check_program
+from sosmith.verify.reader.source import read_source
+from sosmith.verify.scope import Part, Proofs, scope_of
+from sosmith.verify.specified.stated_specification import Agreement, check_specification
+from sosmith.verify.specified.words import words_of
+from sosmith.verify.verification import Progress, Verdict, verify
+
+_PLAIN = re.compile(r"[A-Za-z_]\w{0,199}", re.ASCII)
+
+
+@dataclass(frozen=True)
+class Stated:
+    """A specification to hold a certificate against: its text, its folder, and the file of its measurements, if any."""
+
+    text: str
+    folder: Path
+    measurements: Path | None = None
+    core: str | None = None
+    """The core that was asked for; None for all that the specification describes."""
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What was found of a certificate, and how much of what was asked for is proven."""
+
+    verdict: Verdict
+    agreement: Agreement | None
+    files: int
+    proofs: Proofs
+    decimator: DecimatorVerdict | None
+    scope: Mapping[str, Part] = field(default_factory=dict)
+
+
+def judge(
+    certificate: Certificate,
+    progress: Progress,
+    *,
+    stated: Stated | None = None,
+    folder: Path | None = None,
+    content: bytes = b"",
+) -> Judgement:
+    """Prove a certificate, and hold it against a specification and a folder of files.
+
+    Parameters
+    ----------
+    certificate : Certificate
+    progress : callable
+        Called with the name of a step, the amount done and the total.
+    stated : Stated or None
+        The specification.
+    folder : Path or None
+        Folder of the files that were written with it.
+    content : bytes
+        Content of the certificate's own file.
+
+    Raises
+    ------
+    RejectedError
+        If anything is wrong: what is only not proven is in the scope.
+    """
+    item = None if certificate.about is None else certificate.about.item
+    verdict = verify(certificate, progress)
+    if item is not None:
+        check_item(certificate, item)
+    agreement, core = None, None
+    if stated is not None:
+        progress("specification", 0, 0)
+        agreement, core = _held_against(certificate, item, stated, verdict)
+    files, proofs, decimator = 0, None, None
+    if folder is not None:
+        progress("files", 0, 0)
+        about = check_seal(certificate, content)
+        names, wanted = sorted(entry.name for entry in about.files), file_names(certificate.name, item)
+        require(names == wanted, f"the files of the certificate must be {', '.join(wanted)}, not {', '.join(names)}")
+        files = check_files(about, folder)
+        proofs, decimator = _files_proven(certificate, item, folder, progress)
+    scope = scope_of(certificate, item, agreement, core, proofs)
+    return Judgement(verdict, agreement, files, proofs or Proofs(), decimator, scope)
+
+
+def _held_against(
+    certificate: Certificate, item: ItemEntry | None, stated: Stated, verdict: Verdict
+) -> tuple[Agreement, str]:
+    agreement = check_specification(certificate, stated.text, verdict.margin, stated.folder)
+    about = about_of(certificate)
+    check_text(about, stated.text)
+    if agreement.fitted:
+        require(
+            about.measurements is not None and stated.measurements is not None,
+            "the certificate must name the measurements that its calibration was fitted to",
+        )
+        assert stated.measurements is not None
+        check_measurements(about, stated.measurements)
+    tree = words_of(stated.text)
+    if item is not None:
+        check_stated(item, tree)
+    found = core_of(certificate)
+    if stated.core is not None:
+        require(found == stated.core, f"the core must be {stated.core}, as asked for, not {found}")
+    return agreement, stated.core or whole_core(tree)
+
+
+def _files_proven(
+    certificate: Certificate, item: ItemEntry | None, folder: Path, progress: Progress
+) -> tuple[Proofs, DecimatorVerdict | None]:
+    text = core_text(folder / f"{certificate.name}.sv")
+    require(_PLAIN.fullmatch(certificate.name) is not None, "the name of a core must be a plain identifier")
+    modules = read_source(text, certificate.name).modules
+    if item is None:
+        return Proofs(), None
+    check_ports(modules[certificate.name], item)
+    check_manifest(content_of(folder / f"{certificate.name}.json"), certificate, item)
+    decimator = None
+    if certificate.decimation is not None:
+        progress("decimator", 0, 0)
+        decimator = check_decimator(text, certificate, item.channels)
+    if item.reload or item.protect != "none":
+        return Proofs(calibration=_ahead(certificate, item, text, progress)), decimator
+    program: ProgramVerdict | None = None
+    hardware: HardwareVerdict | None = None
+    if item.architecture in {"folded", "serial"}:
+        progress("program", 0, 0)
+        behind = None if certificate.decimation is None else f"{certificate.name}_behind"
+        program = check_program(behind_decimator(text, certificate), at_lower_rate(certificate), top=behind)
+    elif item.architecture == "parallel":
+        progress("hardware", 0, 0)
+        hardware = (
+            check_hardware(text, certificate, item.channels, item.samples)
+            if certificate.decimation is None
+            else check_behind(text, certificate, item.channels)
+        )
+    return Proofs(program, hardware, _ahead(certificate, item, text, progress)), decimator
+
+
+def _ahead(
+    certificate: Certificate, item: ItemEntry, text: str, progress: Progress
+) -> ProgramVerdict | HardwareVerdict | None:
+    """Prove the calibration before a decimator, if there is one."""
+    alone = calibration_alone(certificate)
+    if alone is None:
+        return None
+    if item.ahead == "parallel":
+        progress("hardware of the calibration", 0, 0)
+        return check_ahead(text, certificate, item.channels)
+    require(item.ahead in {"folded", "serial"}, "a calibration before a decimator must be parallel, folded or serial")
+    progress("program of the calibration", 0, 0)
+    return check_program(module_in(text, certificate.name, alone.name), alone)
+
+
+__all__ = ["Judgement", "RejectedError", "Stated", "judge"]

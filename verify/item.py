@@ -1,0 +1,221 @@
+"""What the item of a certificate is: held against the certificate, the manifest, the files and the SystemVerilog.
+
+The entry decides which proof the hardware needs. It is held against the parts of the certificate that are proven, and
+the manifest, which programs read, against it, field by field. What stands in neither is named as not proven.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from sosmith.verify.certificate_file import Certificate, FieldEntry, ItemEntry, PortEntry, StreamEntry
+from sosmith.verify.graph import RejectedError, require
+from sosmith.verify.reader.syntax import Module
+from sosmith.verify.specified.words import table_of
+
+_BYTE = 8
+_STATUS = {
+    "input_at_rail": 0,
+    "outside_calibration": 1,
+    "output_saturated": 2,
+    "wear_warning": 3,
+    "wear_critical": 4,
+    "settling": 5,
+    "fault": 6,
+}
+_LINES = {
+    "aclk": ("input", 1),
+    "aresetn": ("input", 1),
+    "s_axis_tvalid": ("input", 1),
+    "s_axis_tready": ("output", 1),
+    "m_axis_tvalid": ("output", 1),
+    "m_axis_tready": ("input", 1),
+}
+_NO_MANIFEST = (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError)
+"""What is raised where a manifest has anything else."""
+
+
+def core_of(certificate: Certificate) -> str:
+    """Return which part of an instrument a certificate is about, from what it proves."""
+    if certificate.ideal.polynomial is None:
+        return "filter"
+    return "instrument" if certificate.ideal.sections else "calibration"
+
+
+def check_item(certificate: Certificate, item: ItemEntry) -> None:
+    """Check that what a certificate says of its item agrees with what it proves.
+
+    Raises
+    ------
+    RejectedError
+        For the first disagreement.
+    """
+    entry = certificate.decimation
+    _same("core", item.core, core_of(certificate))
+    _same("start", item.start, certificate.ideal.start or "zero")
+    _same("architecture", item.architecture == "online", certificate.claims.online is not None, "online")
+    _same("ahead", item.ahead is not None, entry is not None and entry.calibration is not None, "there")
+    require(entry is not None or not item.hold, "hold of the item must not be stated without a decimator")
+    require(item.channels == 1 or item.samples == 1, "several samples a clock must be those of one channel")
+    _same("flags", item.flags, _STATUS)
+    dest = -(-(item.channels - 1).bit_length() // _BYTE) * _BYTE
+    _check_stream("taken", item.taken, certificate.inputs, item.samples, dest, 0)
+    _check_stream("given", item.given, (certificate.output,), item.samples, dest, _BYTE * item.samples)
+
+
+def _check_stream(
+    name: str, stream: StreamEntry, ports: tuple[PortEntry, ...], samples: int, dest: int, user: int
+) -> None:
+    offset, fields = 0, []
+    for port in ports:
+        fields.append(
+            FieldEntry(name=port.name, offset=offset, width=port.bits, signed=port.signed, lsb=port.lsb, zero=port.zero)
+        )
+        offset += -(-port.bits // _BYTE) * _BYTE
+    wanted = StreamEntry(width=offset * samples, dest_width=dest, user_width=user, fields=tuple(fields))
+    for key in StreamEntry.model_fields:
+        _same(f"{key} of {name}", getattr(stream, key), getattr(wanted, key))
+
+
+def _same(what: str, stated: object, proven: object, state: str = "") -> None:
+    if state:
+        require(
+            stated == proven, f"{what} of the item must {'' if proven else 'not '}be {state}, as in the certificate"
+        )
+    require(stated == proven, f"{what} of the item must be {proven}, as in the certificate, not {stated}")
+
+
+def check_stated(item: ItemEntry, tree: Mapping[str, Any]) -> None:
+    """Check an item against the words of a specification, as a tree of TOML.
+
+    Raises
+    ------
+    RejectedError
+        For the first disagreement.
+    """
+    hardware: Mapping[str, Any] = table_of(tree, "hardware")
+    filter_: Mapping[str, Any] = table_of(tree, "filter")
+    stated: dict[str, object] = {
+        "channels": tree.get("channels", 1),
+        "protect": hardware.get("protect", "none"),
+        "reload": hardware.get("reload", False),
+        "samples": hardware.get("samples_per_clock", 1),
+    }
+    if item.core != "calibration":
+        stated |= {"start": hardware.get("start", "steady"), "hold": filter_.get("hold", False)}
+    architecture = hardware.get("architecture", "auto")
+    if architecture != "auto":
+        stated["architecture"] = architecture
+    for key, value in stated.items():
+        found = getattr(item, key)
+        require(found == value, f"{key} of the item must be {value}, as specified, not {found}")
+
+
+def whole_core(tree: Mapping[str, Any]) -> str:
+    """Return what a specification describes as a whole."""
+    if "calibration" not in tree:
+        return "filter"
+    return "instrument" if "filter" in tree else "calibration"
+
+
+def file_names(name: str, item: ItemEntry | None) -> list[str]:
+    """Return the names of the files that are written with a certificate."""
+    ends = ["c", "h", "il", "json", "sv", *(("rdl",) if item is not None and item.reload else ())]
+    registers = [f"{name}_registers.h"] if item is not None and item.reload else []
+    return sorted([*(f"{name}.{end}" for end in ends), *registers])
+
+
+def check_manifest(content: bytes, certificate: Certificate, item: ItemEntry) -> None:
+    """Check the fields of a manifest that the certificate states: name, streams, flags, and what decides the hardware.
+
+    Raises
+    ------
+    RejectedError
+        If it is no manifest, or the first field that differs.
+    """
+    try:
+        manifest = json.loads(content)
+        found = _in_manifest(manifest)
+    except _NO_MANIFEST:
+        raise RejectedError("the manifest must be that of a core, not another file") from None
+    wanted: dict[str, Any] = {
+        "name": certificate.name,
+        "core": item.core,
+        "channels": item.channels,
+        "architecture": item.architecture,
+        "calibration before the decimator": item.ahead,
+        "protect": item.protect,
+        "reload": item.reload,
+        "start": item.start,
+        "streams.s_axis": _stream_of(item.taken, certificate.inputs, item, flags=False),
+        "streams.m_axis": _stream_of(item.given, (certificate.output,), item, flags=True),
+    }
+    for key, value in wanted.items():
+        if key == "start" and item.core == "calibration":
+            continue
+        require(
+            found[key] == value, f"{key} in the manifest must be {value}, as in the certificate, not {_cut(found[key])}"
+        )
+
+
+def _in_manifest(manifest: Mapping[str, Any]) -> dict[str, Any]:
+    found = {key: manifest[key] for key in ("name", "core", "channels", "architecture", "protect", "start")}
+    found["reload"] = manifest["reload"] is not None
+    ahead = (manifest["decimation"] or {}).get("calibration")
+    found["calibration before the decimator"] = None if ahead is None else ahead["architecture"]
+    found |= {f"streams.{key}": manifest["streams"][key] for key in ("s_axis", "m_axis")}
+    return found
+
+
+def _stream_of(stream: StreamEntry, ports: tuple[PortEntry, ...], item: ItemEntry, *, flags: bool) -> dict[str, Any]:
+    made: dict[str, Any] = {} if not stream.dest_width else {"tdest": {"width": stream.dest_width}}
+    made["width"] = stream.width
+    if item.samples > 1:
+        made |= {"samples": item.samples, "sample_width": stream.width // item.samples}
+    made["fields"] = [
+        {
+            "name": field.name,
+            "offset": field.offset,
+            "width": field.width,
+            "signed": field.signed,
+            "lsb": float(field.lsb),
+            "zero": float(field.zero),
+            "unit": port.unit,
+        }
+        for field, port in zip(stream.fields, ports, strict=True)
+    ]
+    if flags:
+        made["tuser"] = {"width": stream.user_width, "flags": dict(item.flags)}
+    return made
+
+
+def _cut(value: object) -> str:
+    text = ascii(value)
+    return text if len(text) <= 200 else f"{text[:200]}.."
+
+
+def check_ports(top: Module, item: ItemEntry) -> None:
+    """Check the ports of a core: every one, its direction and its width.
+
+    Raises
+    ------
+    RejectedError
+        If one is missing, superfluous, or of another width.
+    """
+    wanted = dict(_LINES)
+    wanted["s_axis_tdata"] = ("input", item.taken.width)
+    wanted["m_axis_tdata"] = ("output", item.given.width)
+    wanted["m_axis_tuser"] = ("output", item.given.user_width)
+    if item.taken.dest_width:
+        wanted["s_axis_tdest"] = ("input", item.taken.dest_width)
+        wanted["m_axis_tdest"] = ("output", item.given.dest_width)
+    ports = {name: (direction, top.widths[name]) for name, direction in top.ports.items()}
+    if item.reload:  # the port that loads constants is not read further
+        ports = {name: port for name, port in ports.items() if not name.startswith("s_axil_")}
+    for name in sorted({*wanted, *ports}):
+        require(name in wanted, f"the port {name} must not be there")
+        require(name in ports, f"the port {name} must be there")
+        said, found = (f"{direction} of {width} bits" for direction, width in (wanted[name], ports[name]))
+        require(said == found, f"the port {name} must be an {said}, not an {found}")

@@ -1,0 +1,145 @@
+"""What a verdict is about: which parts were asked for, and which of them are proven, in part, or not read at all."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+
+from sosmith.verify.certificate_file import Certificate, ItemEntry
+from sosmith.verify.parallel.check import HardwareVerdict
+from sosmith.verify.program.check import ProgramVerdict
+from sosmith.verify.specified.stated_specification import Agreement
+
+
+class State(Enum):
+    """How much of a part is proven."""
+
+    PROVEN = "proven"
+    PARTIAL = "partial"
+    NOT_READ = "not_read"
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of a verdict: how much of it is proven, why not all, and whether it was asked for."""
+
+    state: State
+    why: str
+    asked: bool = True
+
+    @property
+    def is_missing(self) -> bool:
+        """Whether it was asked for, and is not proven as a whole."""
+        return self.asked and self.state is not State.PROVEN
+
+
+@dataclass(frozen=True)
+class Proofs:
+    """What was found of the hardware; each is None if it was not tried or is not there."""
+
+    program: ProgramVerdict | None = None
+    hardware: HardwareVerdict | None = None
+    calibration: ProgramVerdict | HardwareVerdict | None = None
+
+
+def scope_of(
+    certificate: Certificate,
+    item: ItemEntry | None,
+    agreement: Agreement | None,
+    core: str | None,
+    proofs: Proofs | None,
+) -> Mapping[str, Part]:
+    """Return the parts of a verdict in their order.
+
+    Parameters
+    ----------
+    certificate : Certificate
+        A certificate that was accepted.
+    item : ItemEntry or None
+        What it is about; None if it does not say.
+    agreement : Agreement or None
+        What was found of the specification; None if none was given.
+    core : str or None
+        The core that was asked for with the specification; None without one.
+    proofs : Proofs or None
+        What was found of the files; None if none were given.
+    """
+    parts = {"arithmetic": Part(State.PROVEN, "the error bound and all ranges follow from the certificate's graphs")}
+    parts |= _specified(certificate, item, agreement, core)
+    parts |= _hardware(item, proofs)
+    return parts
+
+
+def _specified(
+    certificate: Certificate, item: ItemEntry | None, agreement: Agreement | None, core: str | None
+) -> dict[str, Part]:
+    if agreement is None:
+        unasked = Part(State.NOT_READ, "no specification was given", asked=False)
+        return {"filter": unasked, "calibration": unasked}
+    unstated = "" if item is not None else "; the certificate does not state what the item is"
+    state = State.PARTIAL if unstated else State.PROVEN
+    if agreement.distance is None:
+        asked = core in {"instrument", "filter"}
+        filter_ = Part(State.NOT_READ, "the certificate is that of a core without the filter", asked=asked)
+    else:
+        filter_ = Part(state, f"it is the one of the specification's words{unstated}")
+    if certificate.ideal.polynomial is None:
+        asked = core in {"instrument", "calibration"}
+        calibration = Part(State.NOT_READ, "the certificate is that of a core without a calibration", asked=asked)
+    elif agreement.fitted:
+        why = "its coefficients are not fitted again to the measurements, which are held by their SHA-256 alone"
+        calibration = Part(State.PARTIAL, why)
+    else:
+        calibration = Part(state, f"its coefficients are those of the specification{unstated}")
+    return {"filter": filter_, "calibration": calibration}
+
+
+_OF_FILES = ("hardware", "program", "unit", "flags", "liveness", "c_model", "rtlil")
+
+
+def _hardware(item: ItemEntry | None, proofs: Proofs | None) -> dict[str, Part]:
+    if proofs is None:
+        return dict.fromkeys(_OF_FILES, Part(State.NOT_READ, "no files were given", asked=False))
+    parts = {
+        "c_model": Part(State.NOT_READ, "its text is held by its SHA-256 alone"),
+        "rtlil": Part(State.NOT_READ, "its text is held by its SHA-256 alone"),
+        "liveness": Part(
+            State.NOT_READ, "that a sample is ever taken and its result ever leaves, and when, is not proven"
+        ),
+    }
+    kinds = [proofs.program, proofs.hardware, proofs.calibration]
+    programs = [found for found in kinds if isinstance(found, ProgramVerdict)]
+    pipelines = [found for found in kinds if isinstance(found, HardwareVerdict)]
+    if not programs and not pipelines:
+        why = _why_not(item)
+        parts |= {name: Part(State.NOT_READ, why) for name in ("hardware", "program", "unit", "flags")}
+        return {name: parts[name] for name in _OF_FILES}
+    none = Part(State.PROVEN, "there is none in this architecture", asked=False)
+    parts["program"] = Part(State.PROVEN, "its instructions compute the graph") if programs else none
+    parts["unit"] = (
+        Part(State.NOT_READ, "the unit that runs the program is not proven: counter, memories, adder")
+        if programs
+        else none
+    )
+    parts["hardware"] = (
+        Part(State.PROVEN, "its registers hold the graph's nodes for all inputs, stalls and resets")
+        if not programs
+        else Part(State.PARTIAL, "only its program is proven, not the unit that runs it")
+    )
+    parts["flags"] = (
+        Part(State.NOT_READ, "what the unit makes of its flags is not proven")
+        if programs
+        else Part(State.PARTIAL, "all but outside_calibration, wear_warning and wear_critical")
+    )
+    return {name: parts[name] for name in _OF_FILES}
+
+
+def _why_not(item: ItemEntry | None) -> str:
+    if item is None:
+        return "the certificate does not state what the item is"
+    if item.reload:
+        return "constants that can be loaded are not proven"
+    if item.protect != "none":
+        return "hardware with protection against upsets is not proven"
+    return f"the hardware of the architecture {item.architecture} is not proven"
