@@ -22,7 +22,6 @@ PAST_THE_INTERFACE = {
     "monitor.py": 13,
     "stream.py": 5,
     "tables/calibration.py": 6,
-    "tables/certificate.py": 4,
     "tables/spectrum.py": 5,
     "tables/vehicle.py": 3,
     "verify.py": 1,

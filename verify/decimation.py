@@ -23,6 +23,7 @@ from fractions import Fraction
 
 from flint import arb, ctx, fmpq, fmpz_poly
 
+from sosmith.verify.bounds.l1_response import UndecidedError
 from sosmith.verify.certificate_file import (
     Certificate,
     DecimationEntry,
@@ -33,7 +34,6 @@ from sosmith.verify.certificate_file import (
     on_grid,
 )
 from sosmith.verify.graph import require
-from sosmith.verify.l1_response import UndecidedError
 from sosmith.verify.reader.source import read_source
 
 _PRECISION = 256

@@ -15,9 +15,9 @@ from itertools import product
 
 from flint import fmpq_poly
 
+from sosmith.verify.bounds.l1_response import fraction
 from sosmith.verify.certificate_file import Certificate, OnlineSectionEntry, Operation, StageEntry
 from sosmith.verify.graph import Transfer, require
-from sosmith.verify.l1_response import fraction
 
 _CLOCKS = 3
 """Clocks that the hardware takes from a digit to the step that uses it, beyond the delay."""

@@ -21,9 +21,9 @@ from math import lcm, prod
 
 from flint import fmpq_poly
 
+from sosmith.verify.bounds.l1_response import BITS, inverse, response
 from sosmith.verify.certificate_file import NodeEntry, Operation, StageEntry
 from sosmith.verify.graph import Transfer, inputs_of, label, require
-from sosmith.verify.l1_response import BITS, inverse, response
 
 SETTLED = Fraction(1, 2)
 """What may be left of any other past, in output LSBs."""

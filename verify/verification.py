@@ -6,8 +6,8 @@
    section may have several inputs and outputs; the cascade has one of each. A stage that starts a filter from its
    first sample is followed symbolically (`sosmith.verify.start`).
 4. Sums over impulse responses are enclosed by their exact residuals: sums of magnitudes by responses in pieces
-   (`sosmith.verify.piecewise`), short ones and running sums by approximate inverses
-   (`sosmith.verify.l1_response`). Every range that a BOUND states must contain the proven range, and every
+   (`sosmith.verify.bounds.piecewise`), short ones and running sums by approximate inverses
+   (`sosmith.verify.bounds.l1_response`). Every range that a BOUND states must contain the proven range, and every
    claimed figure must equal the proven one, to the last unit of the certificate's grid.
 
 5. Where sections work in on-line arithmetic, the sets of their residuals are followed (`sosmith.verify.online`).
@@ -15,7 +15,7 @@
    past could change is followed until it has faded (`sosmith.verify.settling`).
 
 7. A decimator before the stages is exact but for one rounding (`sosmith.verify.decimation`), and what comes
-   through it from above half the lower rate is bounded (`sosmith.verify.largest_gain`). All else is proven of
+   through it from above half the lower rate is bounded (`sosmith.verify.bounds.largest_gain`). All else is proven of
    what is behind it, and, with a calibration before it, of that.
 
 The ranges hold by induction. Unbounded integers obey the linear model exactly, with the quantizers' errors as further
@@ -31,12 +31,12 @@ from math import prod
 
 from flint import fmpq_poly
 
+from sosmith.verify.bounds.driven_responses import Denominator, Driven, deviation, extremes, magnitude, rational
+from sosmith.verify.bounds.l1_response import UndecidedError, fraction, is_stable
+from sosmith.verify.bounds.largest_gain import check_bands
 from sosmith.verify.certificate_file import Certificate, Operation, StageEntry, on_grid
 from sosmith.verify.decimation import at_lower_rate, calibration_alone, rounding
-from sosmith.verify.driven_responses import Denominator, Driven, deviation, extremes, magnitude, rational
 from sosmith.verify.graph import RejectedError, Transfer, check_graph, inputs_of, label, require
-from sosmith.verify.l1_response import UndecidedError, fraction, is_stable
-from sosmith.verify.largest_gain import check_bands
 from sosmith.verify.online import check_online
 from sosmith.verify.polynomial import output_error, polynomial_error
 from sosmith.verify.settling import check_fading, without_counter

@@ -84,7 +84,7 @@ ROOMS = {
             "tests/verify/specified",
             "tests/verify/test_certificate.py",
             "tests/verify/test_generated_files.py",
-            "tests/verify/test_piecewise.py",
+            "tests/verify/bounds/test_piecewise.py",
         ),
         without=(
             f"{_CERTIFICATE}test_examples_in_every_realization[audio",

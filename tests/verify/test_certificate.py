@@ -29,8 +29,8 @@ from sosmith.model.errors import SpecificationError
 from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
 from sosmith.verify import certificate_file, verification
+from sosmith.verify.bounds.l1_response import Inverse, UndecidedError, inverse, is_stable, response
 from sosmith.verify.certificate_file import Certificate, Operation, certificate_text, on_grid, read_certificate
-from sosmith.verify.l1_response import Inverse, UndecidedError, inverse, is_stable, response
 from sosmith.verify.verification import verify
 
 BENCH, LOCOMOTIVE = "flange_wear_bench.toml", "flange_wear_locomotive.toml"

@@ -9,8 +9,8 @@ from tests.gen.word_lengths.decimated import read, tree_of
 from tests.verify.parallel.cores import specified
 
 from sosmith.gen.core import design_core
+from sosmith.verify.bounds.driven_responses import Denominator, extremes
 from sosmith.verify.certificate_file import Certificate, Operation
-from sosmith.verify.driven_responses import Denominator, extremes
 from sosmith.verify.graph import RejectedError
 from sosmith.verify.verification import verify
 

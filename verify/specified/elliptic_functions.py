@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from flint import arb, ctx
 
-from sosmith.verify.l1_response import UndecidedError
+from sosmith.verify.bounds.l1_response import UndecidedError
 
 
 class Modulus(NamedTuple):

@@ -22,8 +22,8 @@ from math import prod
 
 from flint import arb, arb_poly, ctx
 
+from sosmith.verify.bounds.l1_response import UndecidedError
 from sosmith.verify.certificate_file import SectionEntry
-from sosmith.verify.l1_response import UndecidedError
 from sosmith.verify.specified.balls import ball, upper_limit
 from sosmith.verify.specified.ideal_filter import StatedFilter, TransferFunction
 

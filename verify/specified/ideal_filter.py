@@ -18,7 +18,7 @@ from typing import NamedTuple
 from flint import acb, acb_poly, arb, arb_poly, ctx
 
 from sosmith.model.errors import SpecificationError
-from sosmith.verify.l1_response import UndecidedError
+from sosmith.verify.bounds.l1_response import UndecidedError
 from sosmith.verify.specified.analog_prototypes import AnalogPrototype, analog_prototype
 from sosmith.verify.specified.balls import ball
 from sosmith.verify.specified.filter_table import FilterTable, read_filter_table

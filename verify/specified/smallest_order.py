@@ -6,7 +6,7 @@ from fractions import Fraction
 
 from flint import arb
 
-from sosmith.verify.l1_response import UndecidedError
+from sosmith.verify.bounds.l1_response import UndecidedError
 from sosmith.verify.specified.analog_prototypes import discrimination, ripple_squared, selectivity
 
 

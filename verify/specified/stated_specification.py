@@ -16,9 +16,9 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
+from sosmith.verify.bounds.l1_response import UndecidedError
 from sosmith.verify.certificate_file import Certificate, PortEntry
 from sosmith.verify.graph import RejectedError, require
-from sosmith.verify.l1_response import UndecidedError
 from sosmith.verify.specified.filter_distance import distance
 from sosmith.verify.specified.ideal_filter import stated_filter
 from sosmith.verify.specified.sections_file import sections_in

@@ -17,8 +17,20 @@ from sosmith.verify.door import Stated, judge
 from sosmith.verify.generated_files import about_of, check_texts
 from sosmith.verify.parallel.check import HardwareVerdict
 from sosmith.verify.program.check import ProgramVerdict
-from sosmith.verify.scope import Part
+from sosmith.verify.scope import Part, State
 from sosmith.verify.specified.stated_specification import Agreement
+
+__all__ = [
+    "Agreement",
+    "Certificate",
+    "DecimatorVerdict",
+    "Entries",
+    "HardwareVerdict",
+    "Part",
+    "ProgramVerdict",
+    "Proof",
+    "State",
+]
 
 Progress = Callable[[str, int, int], None]
 """Called with the name of a step, the amount done and the total; both are 0 if they are not known."""

@@ -17,7 +17,7 @@ from sosmith.gen.proof.peak_gain import Drive, Extent, extent, peak_gain
 from sosmith.gen.proof.poles import Coefficients, pole_radii
 from sosmith.gen.proof.response import IMPULSE
 from sosmith.model.errors import ShortfallError
-from sosmith.verify.l1_response import inverse, is_stable, response
+from sosmith.verify.bounds.l1_response import inverse, is_stable, response
 
 Section = tuple[Coefficients, Coefficients]
 

@@ -6,7 +6,7 @@ import pytest
 from flint import arb, ctx
 from scipy import special
 
-from sosmith.verify.l1_response import UndecidedError
+from sosmith.verify.bounds.l1_response import UndecidedError
 from sosmith.verify.specified.elliptic_functions import Modulus, inverse_sn, sn
 
 FRACTIONS = [0.0625 * k for k in range(17)]

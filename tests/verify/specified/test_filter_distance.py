@@ -15,8 +15,8 @@ from scipy import signal
 
 from sosmith.gen.filter.design import design
 from sosmith.gen.specification.specification import FilterSpec
+from sosmith.verify.bounds.l1_response import UndecidedError
 from sosmith.verify.certificate_file import SectionEntry
-from sosmith.verify.l1_response import UndecidedError
 from sosmith.verify.specified import filter_distance
 from sosmith.verify.specified.filter_distance import distance
 from sosmith.verify.specified.ideal_filter import StatedFilter, stated_filter

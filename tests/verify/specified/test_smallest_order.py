@@ -8,7 +8,7 @@ import pytest
 from flint import acb, arb, ctx
 from scipy import signal
 
-from sosmith.verify.l1_response import UndecidedError
+from sosmith.verify.bounds.l1_response import UndecidedError
 from sosmith.verify.specified.analog_prototypes import AnalogPrototype, analog_prototype, discrimination
 from sosmith.verify.specified.smallest_order import edge_from_passband, smallest_order
 

@@ -5,17 +5,12 @@ from __future__ import annotations
 from rich.markup import escape
 
 from sosmith.commands.tables.console import TableConsole, print_all
-from sosmith.interface.certificate import Proof
+from sosmith.interface.certificate import Agreement, Entries, HardwareVerdict, ProgramVerdict, Proof, State
 from sosmith.interface.quantity import Quantity
 from sosmith.interface.tables.design import budget_table
-from sosmith.verify.certificate_file import Certificate
-from sosmith.verify.parallel.check import HardwareVerdict
-from sosmith.verify.program.check import ProgramVerdict
-from sosmith.verify.scope import State
-from sosmith.verify.specified.stated_specification import Agreement
 
 
-def print_proof(certificate: Certificate, proof: Proof) -> None:
+def print_proof(certificate: Entries, proof: Proof) -> None:
     """Print the proven error budget, and the number of ranges checked."""
     console = TableConsole()
     unit = plain(proof.bound.unit)

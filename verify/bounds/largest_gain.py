@@ -22,9 +22,9 @@ from operator import mul
 
 from flint import arb, arb_poly, ctx, fmpq, fmpq_poly
 
+from sosmith.verify.bounds.l1_response import UndecidedError, fraction
 from sosmith.verify.certificate_file import DecimationEntry, SectionEntry
 from sosmith.verify.graph import require
-from sosmith.verify.l1_response import UndecidedError, fraction
 
 _PRECISION = 256
 """Bits to which sines are computed."""

@@ -9,9 +9,9 @@ from tests.formal.prover import broken
 from tests.gen.filter.gains import CASES, made
 
 from sosmith.gen.filter import largest_gain
+from sosmith.verify.bounds.largest_gain import check_bands
 from sosmith.verify.certificate_file import BandEntry, DecimationEntry, SectionEntry, on_grid
 from sosmith.verify.graph import RejectedError
-from sosmith.verify.largest_gain import check_bands
 
 Case = tuple[str, int, int, int, str]
 

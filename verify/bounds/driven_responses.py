@@ -13,8 +13,8 @@ from math import gcd, lcm
 
 from flint import fmpq, fmpq_poly
 
-from sosmith.verify.l1_response import BITS, Inverse, UndecidedError, fraction, inverse, response
-from sosmith.verify.piecewise import Pieces
+from sosmith.verify.bounds.l1_response import BITS, Inverse, UndecidedError, fraction, inverse, response
+from sosmith.verify.bounds.piecewise import Pieces
 
 _SHORT = 1 << 10
 """Samples of an inverse that is faster than pieces."""

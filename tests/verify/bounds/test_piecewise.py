@@ -8,8 +8,8 @@ import pytest
 from flint import fmpq, fmpq_poly
 
 from sosmith.verify import driven_responses, piecewise, summed_forms
-from sosmith.verify.l1_response import BITS, UndecidedError, inverse, response
-from sosmith.verify.piecewise import Pieces
+from sosmith.verify.bounds.l1_response import BITS, UndecidedError, inverse, response
+from sosmith.verify.bounds.piecewise import Pieces
 
 SLOW = fmpq_poly([1, fmpq(-63, 32), fmpq(497, 512)])
 DENOMINATORS = {

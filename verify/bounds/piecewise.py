@@ -1,7 +1,7 @@
 """The sum of a response's magnitudes from a response in pieces, whose exact residual proves it.
 
 Sequences whose absolute values have a finite sum form an algebra under convolution with that sum, ``|.|``, as its norm
-(`sosmith.verify.l1_response`). For the response of N/D, let h be any sequence and ``E = N - D h``. Then
+(`sosmith.verify.bounds.l1_response`). For the response of N/D, let h be any sequence and ``E = N - D h``. Then
 
     |N/D - h| <= |1/D| |E|,    |1/D| <= |u| / (1 - |1 - D u|) for any u with |1 - D u| < 1.
 
@@ -16,7 +16,7 @@ So ``|E|`` is at most the size of these forms, which integers give, times the su
 residual of the first samples. No poles are located, no error of a recursion is estimated, and the bound exists only if
 the response decays.
 
-How the magnitudes are added up is in `sosmith.verify.summed_forms`. The difference of two responses that are
+How the magnitudes are added up is in `sosmith.verify.bounds.summed_forms`. The difference of two responses that are
 nearly the same is one of pieces of the same length, side by side: over a common denominator, it would have twice as
 many poles, close to each other.
 """
@@ -32,8 +32,8 @@ from typing import cast
 import numpy as np
 from flint import acb, arb, arb_mat, ctx, fmpq, fmpq_poly, fmpz, fmpz_mat, fmpz_poly
 
-from sosmith.verify.l1_response import UndecidedError, fraction
-from sosmith.verify.summed_forms import Floats, Integers, SummedForms
+from sosmith.verify.bounds.l1_response import UndecidedError, fraction
+from sosmith.verify.bounds.summed_forms import Floats, Integers, SummedForms
 
 _ACCURACY = 112  # bits behind the binary point to which a sum is found
 _MARGIN = 48  # bits for the sizes of forms and sums

@@ -1,0 +1,1 @@
+"""Bounds on responses: sums of magnitudes, largest gains, and inputs that are driven from elsewhere."""
