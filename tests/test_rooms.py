@@ -13,7 +13,14 @@ from tests.house import ROOMS, ROOT, WITH_SUB_ROOMS, arrows, floors, imported, m
 ABOVE = ("cli", "commands", "studio", "interface", "host", "terminal")
 """What stands above the rooms, in src/sosmith."""
 MAX_PARTS = 20
-INTERFACE = ("sosmith.interface", "sosmith.studio", "sosmith.commands", "sosmith.terminal", "sosmith.model.errors")
+INTERFACE = (
+    "sosmith.interface",
+    "sosmith.studio",
+    "sosmith.commands",
+    "sosmith.terminal",
+    "sosmith.output_paths",
+    "sosmith.model.errors",
+)
 """What commands import."""
 PAST_THE_INTERFACE = {
     "instrument/calibrate.py": 11,

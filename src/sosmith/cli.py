@@ -19,10 +19,10 @@ from typing import Any, NamedTuple
 import click
 
 import sosmith
-from sosmith.commands.output_paths import check_outputs
 from sosmith.commands.standard_streams import StandardStreams
 from sosmith.model.errors import SosmithError, ToolError
 from sosmith.model.suggestion import did_you_mean
+from sosmith.output_paths import check_outputs
 from sosmith.terminal import be_quiet, note, reader_may_leave, silence_stdout
 
 # Matrices are small here: threads of the linear algebra would mostly wait, at more than twice the processor time.

@@ -11,8 +11,8 @@ import pytest
 from click.testing import CliRunner
 
 from sosmith.cli import cli
-from sosmith.commands.output_paths import OutputFile, OutputFolder
 from sosmith.model.errors import SpecificationError
+from sosmith.output_paths import OutputFile, OutputFolder
 
 INPUT = "in.toml"
 

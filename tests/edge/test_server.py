@@ -70,7 +70,7 @@ def test_there_are_only_so_many_websockets(address: str) -> None:
     live = address.replace("http", "ws") + "live"
     with ExitStack() as pages:
         for _ in range(MAX_SOCKETS):
-            pages.enter_context(connect(live))
+            pages.enter_context(connect(live)).recv(20)  # it is served now
         with connect(live) as one_more:
             with pytest.raises(ConnectionClosed):
                 one_more.recv(20)

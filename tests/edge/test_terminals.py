@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import pytest
 from rich.console import Console
-from sosmith.commands.tables.design import print_design
 
-from sosmith.commands.tables.console import TableConsole, new_table
+from sosmith.commands.tables.console import TableConsole, new_table, print_all
 from sosmith.terminal import NARROWEST, width
 from tests.interface.small import filter_design
 
@@ -31,5 +30,5 @@ def test_a_design_on_a_terminal_of_few_columns(
     columns: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("COLUMNS", str(columns))
-    print_design(filter_design(), details=True)
+    print_all(filter_design().tables(details=True))
     assert "Butter" in "".join(capsys.readouterr().out.split())

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import click
 
-from sosmith.commands.output_paths import output_option
 from sosmith.interface.files import write_file
 from sosmith.model.errors import ShortfallError, SpecificationError
+from sosmith.output_paths import output_option
 from sosmith.terminal import JSON_OPTION, note, print_json, reader_may_leave
 
 

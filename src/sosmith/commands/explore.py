@@ -8,9 +8,9 @@ from typing import Any
 import click
 
 from sosmith.commands.options import CORE, SEED, SPEC, OneOf, completed_by, print_tables
-from sosmith.commands.output_paths import folder_option
 from sosmith.interface.choices import SIMULATORS, SYNTHESIZED, board_named
 from sosmith.model.errors import SpecificationError
+from sosmith.output_paths import folder_option
 from sosmith.terminal import JSON_OPTION, note, print_json, reader_may_leave, show_progress
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from sosmith.commands.options import OneOf
-from sosmith.commands.output_paths import output_option
+from sosmith.output_paths import output_option
 from sosmith.terminal import note
 
 

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sosmith.commands.options import BAUD, default_folder
-from sosmith.commands.output_paths import output_option
 from sosmith.model.errors import SpecificationError
+from sosmith.output_paths import output_option
 from sosmith.terminal import live, note, width
 
 if TYPE_CHECKING:

@@ -24,7 +24,6 @@ from sosmith.commands.options import (
     default_folder,
     print_tables,
 )
-from sosmith.commands.output_paths import folder_option, output_option
 from sosmith.interface.choices import (
     MODELLED,
     SCENARIOS,
@@ -39,6 +38,7 @@ from sosmith.interface.choices import (
 )
 from sosmith.interface.files import write_file, write_files
 from sosmith.model.errors import SpecificationError
+from sosmith.output_paths import folder_option, output_option
 from sosmith.terminal import JSON_OPTION, Step, note, print_json, reader_may_leave, show_progress
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from sosmith.commands.options import BAUD
-from sosmith.commands.output_paths import output_option
+from sosmith.output_paths import output_option
 from sosmith.terminal import note, show_progress
 
 

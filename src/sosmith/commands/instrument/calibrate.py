@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sosmith.commands.output_paths import output_option, plot_option
 from sosmith.gen.calibration.acceptance import REQUIRED_R
 from sosmith.instrument.calibration.acceptance import DEFAULT_RANGES, METHODS, Method, Range
 from sosmith.interface.choices import picture_format
 from sosmith.interface.files import write_file
 from sosmith.model.errors import ShortfallError, SpecificationError
+from sosmith.output_paths import output_option, plot_option
 from sosmith.terminal import JSON_OPTION, note, print_json, show_progress
 
 if TYPE_CHECKING:

@@ -9,7 +9,6 @@ from pathlib import Path
 import click
 
 from sosmith.commands.options import OneOf
-from sosmith.commands.output_paths import output_option, plot_option
 from sosmith.instrument.spectrum.settings import (
     COVERAGE,
     DETRENDS,
@@ -22,6 +21,7 @@ from sosmith.instrument.spectrum.settings import (
 from sosmith.interface.choices import picture_format
 from sosmith.interface.files import write_file
 from sosmith.model.errors import SpecificationError
+from sosmith.output_paths import output_option, plot_option
 from sosmith.terminal import JSON_OPTION, note, print_json, show_progress
 
 _HELP = """Show the spectra of traces, and propose a low-pass filter based on them.

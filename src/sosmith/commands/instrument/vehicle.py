@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import click
 
 from sosmith.commands.options import OneOf
-from sosmith.commands.output_paths import OutputFile, output_option, plot_option
 from sosmith.interface.choices import LEVELS, MODELS, TRACK_NAMES, picture_format
 from sosmith.interface.files import write_file
+from sosmith.output_paths import OutputFile, output_option, plot_option
 from sosmith.terminal import JSON_OPTION, note, print_json, show_progress
 
 if TYPE_CHECKING:

@@ -7,10 +7,10 @@ from pathlib import Path
 import click
 
 from sosmith.commands.options import print_tables
-from sosmith.commands.output_paths import plot_option
 from sosmith.interface.choices import CLEARANCES, TIMES, picture_format
 from sosmith.interface.files import write_file
 from sosmith.model.errors import SpecificationError
+from sosmith.output_paths import plot_option
 from sosmith.terminal import JSON_OPTION, note, print_json, show_progress
 
 _HELP = f"""Estimate the wear, wear rate and remaining life of a wheel flange from TRACE.csv.
