@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import pytest
 from tests.verify.parallel.cores import small as parallel
-from tests.verify.program.test_check import small as folded
+from tests.verify.program.programs import small as folded
 from tests.verify.small_specifications import PLAIN
 
 from sosmith.verify.graph import RejectedError

@@ -11,7 +11,6 @@ from sosmith.interface.tables.design import budget_table
 from sosmith.verify.certificate_file import Certificate
 from sosmith.verify.parallel.check import HardwareVerdict
 from sosmith.verify.program.check import ProgramVerdict
-from sosmith.verify.scope import State
 from sosmith.verify.specified.stated_specification import Agreement
 
 
@@ -66,7 +65,7 @@ def print_proof(certificate: Certificate, proof: Proof) -> None:
 def _print_scope(console: TableConsole, proof: Proof) -> None:
     for name, part in proof.scope.items():
         if part.asked:
-            colour = "green" if part.state is State.PROVEN else "yellow"
+            colour = "green" if part.state.value == "proven" else "yellow"
             console.print(f"[bold {colour}]{part.state.value.replace('_', ' ')}[/]: {name}: {escape(plain(part.why))}")
 
 
