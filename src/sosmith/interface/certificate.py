@@ -13,12 +13,12 @@ from sosmith.model.text_files import write_files
 from sosmith.verify.around.cic import DecimatorVerdict
 from sosmith.verify.certificate_file import Certificate as Entries
 from sosmith.verify.certificate_file import certificate_text, read_certificate
-from sosmith.verify.door import Stated, judge
-from sosmith.verify.generated_files import about_of, check_texts
 from sosmith.verify.parallel.check import HardwareVerdict
 from sosmith.verify.program.check import ProgramVerdict
-from sosmith.verify.scope import Part, State
 from sosmith.verify.specified.stated_specification import Agreement
+from sosmith.verify.verdict.door import Stated, judge
+from sosmith.verify.verdict.generated_files import about_of, check_texts
+from sosmith.verify.verdict.scope import Part, State
 
 __all__ = [
     "Agreement",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from rich.markup import escape
 
 from sosmith.commands.tables.console import TableConsole, print_all
-from sosmith.interface.certificate import Agreement, Entries, HardwareVerdict, ProgramVerdict, Proof, State
+from sosmith.interface.certificate import Agreement, Entries, HardwareVerdict, ProgramVerdict, Proof
 from sosmith.interface.quantity import Quantity
 from sosmith.interface.tables.design import budget_table
 
@@ -61,7 +61,7 @@ def print_proof(certificate: Entries, proof: Proof) -> None:
 def _print_scope(console: TableConsole, proof: Proof) -> None:
     for name, part in proof.scope.items():
         if part.asked:
-            colour = "green" if part.state is State.PROVEN else "yellow"
+            colour = "green" if part.state.value == "proven" else "yellow"
             console.print(f"[bold {colour}]{part.state.value.replace('_', ' ')}[/]: {name}: {escape(plain(part.why))}")
 
 

@@ -20,7 +20,7 @@ from sosmith.interface.certificate import Certificate, Proof
 from sosmith.verify.certificate_file import Certificate as Entries
 from sosmith.verify.certificate_file import certificate_text, sealed
 from sosmith.verify.graph import RejectedError
-from sosmith.verify.scope import State
+from sosmith.verify.verdict.scope import State
 
 Tree = dict[str, Any]
 PARALLEL = STEADY + 'hardware.architecture = "parallel"\n'

@@ -16,13 +16,13 @@ from sosmith.gen.output.rebuild import rebuilt
 from sosmith.gen.specification.specification import load
 from sosmith.model.errors import SpecificationError
 from sosmith.verify.certificate_file import AboutEntry, read_certificate
-from sosmith.verify.generated_files import (
+from sosmith.verify.verdict.generated_files import (
     check_files,
     check_seal,
     check_texts,
     core_text,
 )
-from sosmith.verify.item import check_manifest
+from sosmith.verify.verdict.item import check_manifest
 from sosmith.verify.verification import RejectedError
 
 NAME = "audio_lowpass"

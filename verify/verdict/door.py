@@ -14,7 +14,13 @@ from sosmith.verify.around.cic import DecimatorVerdict, check_decimator
 from sosmith.verify.around.parallel_core import check_ahead, check_behind
 from sosmith.verify.certificate_file import Certificate, ItemEntry
 from sosmith.verify.decimation import at_lower_rate, behind_decimator, calibration_alone, module_in
-from sosmith.verify.generated_files import (
+from sosmith.verify.graph import RejectedError, require
+from sosmith.verify.parallel.check import HardwareVerdict, check_hardware
+from sosmith.verify.program.check import ProgramVerdict, check_program
+from sosmith.verify.reader.source import read_source
+from sosmith.verify.specified.stated_specification import Agreement, check_specification
+from sosmith.verify.specified.words import words_of
+from sosmith.verify.verdict.generated_files import (
     about_of,
     check_files,
     check_measurements,
@@ -23,8 +29,7 @@ from sosmith.verify.generated_files import (
     content_of,
     core_text,
 )
-from sosmith.verify.graph import RejectedError, require
-from sosmith.verify.item import (
+from sosmith.verify.verdict.item import (
     check_item,
     check_manifest,
     check_ports,
@@ -33,12 +38,7 @@ from sosmith.verify.item import (
     file_names,
     whole_core,
 )
-from sosmith.verify.parallel.check import HardwareVerdict, check_hardware
-from sosmith.verify.program.check import ProgramVerdict, check_program
-from sosmith.verify.reader.source import read_source
-from sosmith.verify.scope import Part, Proofs, scope_of
-from sosmith.verify.specified.stated_specification import Agreement, check_specification
-from sosmith.verify.specified.words import words_of
+from sosmith.verify.verdict.scope import Part, Proofs, scope_of
 from sosmith.verify.verification import Progress, Verdict, verify
 
 _PLAIN = re.compile(r"[A-Za-z_]\w{0,199}", re.ASCII)
