@@ -55,9 +55,9 @@ def test_what_is_computed_or_kept_stays_whole() -> None:
         ("held[7:0] <= chosen[7:0];", "every bit of held must be loaded in one process"),
         ("if (e) held[7:0] <= chosen[7:0]; else held[8] <= 1'h0;", r"a process must load one register, not .*"),
         ("held[3:0] <= a;\n  always_ff @(posedge clk)\n    held[8:4] <= chosen[8:4];", ""),
-        ("held[4:0] <= a;\n  always_ff @(posedge clk)\n    held[8:4] <= chosen[8:4];", "every bit of held must .*"),
-        ("held[8:0] <= a;\n  always_ff @(posedge clk)\n    held <= a;", r"a process must load a register, not held"),
-        ("chosen[8:0] <= a;\n  always_ff @(posedge clk)\n    held <= a;", r"what is loaded must be a register, .*"),
+        ("held[4:0] <= a;\n  always_ff @(posedge clk)\n    held[8:4] <= chosen[8:4];", "each bit of held .*"),
+        ("held[8:0] <= a;\n  always_ff @(posedge clk)\n    held <= a;", r"each bit of held .* at one place"),
+        ("chosen[8:0] <= a;\n  always_ff @(posedge clk)\n    held <= a;", r"chosen of top must be .*"),
     ],
 )  # fmt: skip
 def test_registers_loaded_in_parts(load: str, sentence: str) -> None:
