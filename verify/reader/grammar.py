@@ -71,6 +71,7 @@ class Reader:
         self._unknowns = unknowns
         self._module = Module()
         self._kinds: dict[str, list[str]] = {}
+        self._scalars: set[str] = set()
         self._start = tokens.place
         self.lines: list[str] = []
 
@@ -153,10 +154,17 @@ class Reader:
         tokens, module = self._tokens, self._module
         kind = tokens.next()
         top = 0
-        if tokens.take("["):
+        ranged = tokens.take("[")
+        if ranged:
             top = tokens.integer()
             tokens.expect(":", "0", "]")
         name = tokens.name()
+        known = name in module.widths
+        require(
+            not known or (name in self._scalars) != ranged, f"{name} must have a range in both declarations or none"
+        )
+        if not ranged:
+            self._scalars.add(name)
         width = top + 1
         require(width <= _MAX_WIDTH, f"{name} must have at most {_MAX_WIDTH} bits, not {width}")
         require(
@@ -344,6 +352,7 @@ class Reader:
             return Word(name, address)
         if not tokens.take("["):
             return Bits(name)
+        require(name not in self._scalars, f"{name} must be used as a whole, as it has no range")
         high = low = tokens.integer()
         if tokens.take(":"):
             low = tokens.integer()

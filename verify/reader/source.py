@@ -25,6 +25,7 @@ from sosmith.verify.reader.syntax import (
 from sosmith.verify.reader.tokens import Tokens
 
 _MAX_CHARACTERS = 1 << 28
+_MAX_MODULES = 400
 
 
 class Source(NamedTuple):
@@ -60,6 +61,7 @@ def read_source(text: str, top: str | None = None, *, unknowns: bool = True) -> 
         tokens.expect("module")
         name = tokens.name()
         require(name not in modules, f"module {name} must be written once, not twice")
+        require(len(modules) < _MAX_MODULES, f"the SystemVerilog must have at most {_MAX_MODULES} modules")
         reader = Reader(tokens, name, unknowns=unknowns)
         try:
             modules[name] = reader.module()
@@ -75,6 +77,7 @@ def read_source(text: str, top: str | None = None, *, unknowns: bool = True) -> 
     _check_tree(modules, top)
     for name, module in modules.items():
         _check_nets(name, module, modules)
+    _check_clocks(modules, top)
     rest = {name: module for name, module in modules.items() if name != top}
     return Source("".join(f"{line}\n" for line in printed), {top: modules[top], **rest})
 
@@ -105,6 +108,37 @@ def _check_tree(modules: Mapping[str, Module], top: str) -> None:
             waiting.append((inside, (*above, inside)))
     unused = sorted(modules.keys() - placed)
     require(not unused, f"every module must be part of {top}, not {', '.join(unused)}")
+
+
+def _check_clocks(modules: Mapping[str, Module], top: str) -> None:
+    """Check that the clock of every module is one input of the top module, handed down as it is."""
+    clocks = {name: {clock for clock, _ in module.clocked} for name, module in modules.items()}
+    for name in _from_below(modules, top):
+        module = modules[name]
+        for inside, instance, ports in module.instances:
+            for clock in clocks[inside]:
+                given = ports[clock]
+                whole = isinstance(given, Bits) and given.width is None
+                require(whole, f"the clock {clock} of {instance} must be a net, not computed or cut from one")
+                assert isinstance(given, Bits)
+                clocks[name].add(given.name)
+        for clock in clocks[name]:
+            require(module.ports.get(clock) == "input", f"the clock {clock} of {name} must be an input of it")
+    require(len(clocks[top]) <= 1, f"{top} must have one clock, not {', '.join(sorted(clocks[top]))}")
+
+
+def _from_below(modules: Mapping[str, Module], top: str) -> list[str]:
+    """Return all modules, each behind all that are in it."""
+    order: list[str] = []
+
+    def place(name: str) -> None:
+        if name not in order:
+            for inside, _, _ in modules[name].instances:
+                place(inside)
+            order.append(name)
+
+    place(top)
+    return order
 
 
 def _check_nets(name: str, module: Module, modules: Mapping[str, Module]) -> None:

@@ -100,6 +100,22 @@ def forged(edit: str) -> tuple[str, str]:
             text.replace(LAST, f"  thing part (\n    .a(aclk)\n  );\n{LAST}", 1),
             r"part must be of a module in the text, not of thing",
         ),
+        "another clock": (
+            text.replace(".clk(aclk)", ".clk(s_axis_tvalid)", 1),
+            r"audio_lowpass must have one clock, not aclk, s_axis_tvalid",
+        ),
+        "a bit of a clock": (
+            text.replace(".clk(aclk)", ".clk(s_axis_tdata[0])", 1),
+            r"the clock clk of \w+ must be a net, not computed or cut from one",
+        ),
+        "an index of a scalar": (
+            text.replace(".clk(aclk)", ".clk(aclk[0])", 1),
+            r"aclk must be used as a whole, as it has no range",
+        ),
+        "a range in one declaration": (
+            text.replace("  wire aclk;", "  wire [0:0] aclk;", 1),
+            r"aclk must have a range in both declarations or none",
+        ),
         "a number with a sign": (text.replace("1'h0", "1'sh0", 1), r".* must have blanks between words, not .*"),
         "a loop": (
             text.replace(LAST, f"  {NAME}_output_stage again (\n    .clk(aclk)\n  );\n{LAST}", 1),
@@ -139,6 +155,10 @@ EDITS = [
     "an initial block",
     "a parameter",
     "a module that is not there",
+    "another clock",
+    "a bit of a clock",
+    "an index of a scalar",
+    "a range in one declaration",
     "a number with a sign",
     "a loop",
 ]
