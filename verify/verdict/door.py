@@ -38,6 +38,7 @@ from sosmith.verify.verdict.item import (
     file_names,
     whole_core,
 )
+from sosmith.verify.verdict.limits import SECONDS, limited
 from sosmith.verify.verdict.scope import Part, Proofs, scope_of
 from sosmith.verify.verification import Progress, Verdict, verify
 
@@ -74,6 +75,7 @@ def judge(
     stated: Stated | None = None,
     folder: Path | None = None,
     content: bytes = b"",
+    seconds: float = SECONDS,
 ) -> Judgement:
     """Prove a certificate, and hold it against a specification and a folder of files.
 
@@ -88,12 +90,21 @@ def judge(
         Folder of the files that were written with it.
     content : bytes
         Content of the certificate's own file.
+    seconds : float
+        Time that it may take, in s; 0 for any.
 
     Raises
     ------
     RejectedError
         If anything is wrong: what is only not proven is in the scope.
     """
+    with limited(seconds):
+        return _judged(certificate, progress, stated, folder, content)
+
+
+def _judged(
+    certificate: Certificate, progress: Progress, stated: Stated | None, folder: Path | None, content: bytes
+) -> Judgement:
     item = None if certificate.about is None else certificate.about.item
     verdict = verify(certificate, progress)
     if item is not None:

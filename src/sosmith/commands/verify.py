@@ -37,6 +37,14 @@ _NOT_ALL = 4
     help="With --spec, the core that must be proven; all that the specification describes by default.",
 )
 @click.option("--partial", is_flag=True, help="Exit with 0 where nothing is wrong, though a part is not proven.")
+@click.option(
+    "--time-limit",
+    type=click.FloatRange(0),
+    default=600.0,
+    show_default=True,
+    metavar="SECONDS",
+    help="End with a refusal if the proof takes longer; 0 for no limit.",
+)
 @JSON_OPTION
 def verify(
     certificate: Path,
@@ -45,6 +53,7 @@ def verify(
     rebuild: bool,
     core: str | None,
     partial: bool,
+    time_limit: float,
     as_json: bool,
 ) -> None:
     """Prove CERTIFICATE by an independent method: the error bound, and no internal overflow.
@@ -64,7 +73,7 @@ def verify(
     read = Certificate.load(certificate)
     with show_progress() as step:
         try:
-            proof = read.verify(step, spec=spec, files=files, rebuild=rebuild, core=core)
+            proof = read.verify(step, spec=spec, files=files, rebuild=rebuild, core=core, seconds=time_limit)
         except ShortfallError as error:
             raise ShortfallError(f"{certificate}: {error}") from None
     if as_json:

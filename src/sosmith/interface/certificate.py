@@ -137,6 +137,7 @@ class Certificate:
         files: str | PathLike[str] | None = None,
         rebuild: bool = False,
         core: str | None = None,
+        seconds: float = 600.0,
     ) -> Proof:
         """Prove the certificate by a different method than the one that made it, and hold it against its subject.
 
@@ -158,6 +159,8 @@ class Certificate:
         core : str
             With `spec`, the core that must be proven: instrument, filter or calibration; all that the specification
             describes if it is not given.
+        seconds : float
+            Time that the proof may take, in s, where it runs in the main thread; 0 for any.
 
         Returns
         -------
@@ -178,6 +181,7 @@ class Certificate:
             stated=None if checked is None else _stated(checked, core),
             folder=None if files is None else Path(fspath(files)),
             content=self.text().encode() if self.path is None else self.path.read_bytes(),
+            seconds=seconds,
         )
         verdict, again = found.verdict, 0
         if rebuild:
