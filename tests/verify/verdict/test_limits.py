@@ -11,12 +11,8 @@ from sosmith.verify.verdict.limits import limited
 
 def test_what_takes_too_long_is_refused_and_the_alarm_is_as_it_was() -> None:
     before = signal.getsignal(signal.SIGALRM)
-    with (
-        pytest.raises(RejectedError, match=r"^the proof must end within 0\.05 s, which .* does not allow$"),
-        limited(0.05),
-    ):
-        while True:
-            time.sleep(0.01)
+    with pytest.raises(RejectedError, match=r"^the proof must end within 0\.05 s, which .*$"), limited(0.05):
+        time.sleep(60)
     assert signal.getsignal(signal.SIGALRM) is before
     assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
 
