@@ -83,7 +83,7 @@ ROOMS = {
             "tests/verify/parallel",
             "tests/verify/specified",
             "tests/verify/test_certificate.py",
-            "tests/verify/test_generated_files.py",
+            "tests/verify/verdict/test_generated_files.py",
             "tests/verify/bounds/test_piecewise.py",
         ),
         without=(
@@ -114,7 +114,7 @@ ROOMS = {
     "hdl": Room(
         files=(
             "hdl/[!fi]*.py",
-            "hdl/fault_guard.py",
+            "hdl/shell/fault_guard.py",
             "hdl/bus/serial_crc.py",
             "hdl/stages/interleaved.py",
             "hdl/plan/[!fi]*.py",

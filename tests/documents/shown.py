@@ -23,7 +23,9 @@ def run(line: str, folder: Path) -> str:
     command, *arguments = shlex.split(line)
     assert command == "./run"
     result = CliRunner(env={"COLUMNS": "100"}).invoke(cli, arguments)
-    assert result.exit_code == 0, f"{line}: {result.output}{result.exception!r}"
+    # `verify --files` proves a part and says so by its status
+    good = {0, 4} if arguments[0] == "verify" else {0}
+    assert result.exit_code in good, f"{line}: {result.output}{result.exception!r}"
     return result.stdout
 
 
