@@ -211,8 +211,10 @@ def _check_time(table: CsvTable, time: Values, sample_rate: Fraction) -> None:
     before = "the previous row of this channel" if CHANNEL in table else "the previous row"
     check_rows(table, step <= 0, lambda k: f"time_s must be above {time[k - 1]}, the value in {before}, not {time[k]}")
     digit = _last_digit(time)
+    few = digit > period / 2  # stamps of other instants would pass as rounded ones
     # Instants that were rounded or cut to a digit are whole numbers of it apart, next below or next above a period.
-    rounded = (step > (np.floor(period / digit) - 0.5) * digit) & (step < (np.ceil(period / digit) + 0.5) * digit)
+    ratio = period / digit
+    rounded = (step > (np.floor(ratio) - 0.5) * digit) & (step < (np.ceil(ratio) + 0.5) * digit) & (not few)
     check_rows(
         table,
         (np.abs(step - period) > TIME_TOLERANCE * period) & ~rounded,
@@ -221,7 +223,7 @@ def _check_time(table: CsvTable, time: Values, sample_rate: Fraction) -> None:
     passed, due = time - time[0], np.arange(len(time)) * period
     check_rows(
         table,
-        np.abs(passed - due) > TIME_TOLERANCE * due + digit,
+        np.abs(passed - due) > TIME_TOLERANCE * due + (0.0 if few else digit),
         lambda k: f"time_s must be {due[k]:.6g} s after the first row at {1 / period:g} Hz, not {passed[k]:.6g} s",
     )
 

@@ -82,8 +82,8 @@ def wait_for(condition: Callable[[], Any], seconds: float = 60) -> None:
 
 
 def refused(outcome: Outcome, message: str, status: int = 2) -> None:
-    """Check for one sentence on stderr and nothing else: no data, no traceback, no output folder."""
-    assert outcome.messages == [f"sosmith: error: {message}"]
+    """Check for one sentence for each fault on stderr and nothing else: no data, no traceback, no output folder."""
+    assert outcome.messages == f"sosmith: error: {message}".split("\n")
     assert (outcome.status, outcome.stdout) == (status, "")
     assert not Path("out").exists()
     assert not Path("build").exists()

@@ -12,7 +12,8 @@ from amaranth.hdl import Assert, Module, Signal
 from tests.formal.prover import Proof, broken, prove
 from tests.formal.small import limiter
 
-from sosmith.hdl import folded, reload
+from sosmith.hdl import reload
+from sosmith.hdl.cores import folded
 from sosmith.model.dataflow.folding import program
 
 

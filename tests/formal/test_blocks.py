@@ -9,7 +9,7 @@ from tests.formal.prover import broken, prove
 from tests.formal.small import distant, leaky, limiter, reference_of_beats
 from tests.formal.stream_rules import StreamRules
 
-from sosmith.hdl import block_core
+from sosmith.hdl.cores import block as block_core
 from sosmith.hdl.plan import look_ahead as plan
 from sosmith.hdl.plan import parallel_clocks
 from sosmith.hdl.stages import look_ahead

@@ -9,7 +9,7 @@ from amaranth.lib.wiring import Component, In, Out
 from tests.formal.prover import INDUCTION, Proof, broken, prove
 
 from sosmith.gen.architectures.architecture import DIGIT_BITS
-from sosmith.hdl import folded
+from sosmith.hdl.cores import folded
 
 SHORT_DIGIT_BITS = 3
 

@@ -10,7 +10,7 @@ from tests.formal.prover import broken, prove
 from tests.formal.small import leaky
 from tests.formal.stream_rules import StreamRules
 
-from sosmith.hdl import core
+from sosmith.hdl.cores import parallel as core
 from sosmith.hdl.plan import parallel_clocks
 from sosmith.hdl.stages import pipelined as stage
 

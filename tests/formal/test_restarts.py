@@ -13,7 +13,9 @@ from tests.formal.prover import broken, prove
 from tests.formal.small import leaky, limiter
 from tests.formal.stream_rules import DIGIT_BITS, StreamRules
 
-from sosmith.hdl import core, folded, reload
+from sosmith.hdl import reload
+from sosmith.hdl.cores import folded
+from sosmith.hdl.cores import parallel as core
 from sosmith.hdl.plan import parallel_clocks
 from sosmith.model.dataflow.folding import program
 

@@ -10,7 +10,9 @@ from tests.formal.prover import broken, combinational_outputs, prove
 from tests.formal.small import leaky, limiter, resonator
 from tests.formal.stream_rules import DIGIT_BITS, StreamRules
 
-from sosmith.hdl import axi_stream, core, folded
+from sosmith.hdl import axi_stream
+from sosmith.hdl.cores import folded
+from sosmith.hdl.cores import parallel as core
 from sosmith.hdl.plan import folded_clocks, parallel_clocks
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.folding import program

@@ -29,7 +29,7 @@ from sosmith.gen.word_lengths import quantize
 from sosmith.instrument.scenarios.traces import traces_for
 from sosmith.model.errors import ShortfallError, SpecificationError
 from sosmith.model.reference.golden import calibrated, filtered
-from sosmith.verify import driven_responses
+from sosmith.verify.bounds import driven_responses
 from sosmith.verify.certificate_file import Certificate, certificate_text
 from sosmith.verify.parallel.check import check_hardware
 from sosmith.verify.verification import verify

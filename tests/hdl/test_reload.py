@@ -15,8 +15,9 @@ from tests.hdl.bus.reload_benches import DEPTH, Bench, Scenario, benched, crc_of
 from tests.verify.parallel.cores import small_design
 from tests.verify.small_specifications import PLAIN
 
-from sosmith.hdl import core, reload
+from sosmith.hdl import reload
 from sosmith.hdl.constant_banks import ConstantBanks
+from sosmith.hdl.cores import parallel as core
 from sosmith.hdl.reload import ReloadPort
 from sosmith.model.dataflow.status import Flag
 from sosmith.model.reload.registers import (

@@ -19,6 +19,13 @@ SETTINGS = {
 """Environments by the instructions that they leave; a name that numpy does not know is ignored by it."""
 
 
+def runnable() -> list[str]:
+    """Name the settings that this processor can run: one without AVX-512 cannot be made to compute with it."""
+    flags = Path("/proc/cpuinfo").read_text(encoding="utf-8").split() if Path("/proc/cpuinfo").exists() else []
+    needed = {"AVX2": {"avx2", "fma"}, "AVX-512": {"avx512f", "avx512bw", "avx512vl", "avx512dq", "avx512cd"}}
+    return [name for name in SETTINGS if needed.get(name, set()) <= set(flags)]
+
+
 def made(folder: Path, setting: str, *subjects: str) -> dict[str, bytes]:
     """Make `subjects` in a process of its own; return the content of every file by its path."""
     environment = {name: value for name, value in os.environ.items() if not name.startswith(("OPENBLAS_", "NPY_"))}
@@ -34,7 +41,10 @@ def made(folder: Path, setting: str, *subjects: str) -> dict[str, bytes]:
 
 def differences(folder: Path, *subjects: str) -> list[str]:
     """Make `subjects` under all settings; return the paths of the files that are not the same."""
-    first, *others = (made(folder / setting, setting, *subjects) for setting in SETTINGS)
+    settings = runnable()
+    if len(settings) < 2:
+        pytest.skip("this processor can run one set of instructions only")
+    first, *others = (made(folder / setting, setting, *subjects) for setting in settings)
     assert len(first) > len(subjects)
     return [path for other in others for path in sorted({*first, *other}) if first.get(path) != other.get(path)]
 

@@ -84,7 +84,7 @@ def test_every_flag_is_seen_and_right(architecture: str, tmp_path: Path) -> None
     flags = made.datapath.compute_status(codes)
     for flag in (Flag.INPUT_AT_RAIL, Flag.OUTSIDE_CALIBRATION, Flag.OUTPUT_SATURATED):
         assert {int(value) >> flag & 1 for value in flags} == {0, 1}
-    assert simulate(made, [trace], tmp_path, simulator="icarus").mismatches == 0
+    assert simulate(made, [trace], tmp_path, simulator="icarus").run.mismatches == 0
 
 
 def test_a_wrong_flag_is_noticed(tmp_path: Path) -> None:
@@ -97,7 +97,7 @@ def test_a_wrong_flag_is_noticed(tmp_path: Path) -> None:
     codes = np.full((32, 2), 1 << 14)
     codes[:, 0] = high + np.arange(32) - 16
     trace = replace(trace, codes=codes, truth=None, reading=None)
-    assert simulate(broken, [trace], tmp_path, simulator="icarus").mismatches == 15
+    assert simulate(broken, [trace], tmp_path, simulator="icarus").run.mismatches == 15
 
 
 def worn(architecture: str, channels: int, initial: tuple[str, ...], *, signed: bool = False) -> CoreDesign:
@@ -126,7 +126,7 @@ def test_wear(architecture: str, channels: int, initial: tuple[str, ...], tmp_pa
     flags = made.datapath.compute_status(np.stack([trace.codes for trace in traces], axis=1))
     for column in flags.T:
         assert {int(value) >> Flag.WEAR_WARNING for value in column} == {0, 1, 3}
-    assert simulate(made, traces, tmp_path, simulator="icarus").mismatches == 0
+    assert simulate(made, traces, tmp_path, simulator="icarus").run.mismatches == 0
 
 
 def test_limits_of_another_channel_are_noticed(tmp_path: Path) -> None:
@@ -139,7 +139,7 @@ def test_limits_of_another_channel_are_noticed(tmp_path: Path) -> None:
     traces = traces_for(made, "wear_ramp", seed=1)
     keep = np.linspace(0, len(traces[0]) - 1, 200).astype(int)
     traces = [replace(trace, codes=trace.codes[keep], truth=None, reading=None) for trace in traces]
-    assert simulate(broken, traces, tmp_path, simulator="icarus").mismatches > 0
+    assert simulate(broken, traces, tmp_path, simulator="icarus").run.mismatches > 0
 
 
 @pytest.mark.sweep(2)

@@ -25,7 +25,7 @@ _OBEYED = re.compile(
 _ATTRIBUTE = re.compile(r" *\(\* (\w+ = (?:32'd1|\"block\")) \*\)")
 _ATTRIBUTES = {
     "keep = 32'd1": re.compile(r" *wire .*"),
-    "no_rw_check = 32'd1": re.compile(r" *reg (?:\[\d+:0\] )?(?:instructions|words\d+) \[\d+:0\];"),
+    "no_rw_check = 32'd1": re.compile(r" *reg (?:\[\d+:0\] )?(?:instructions|words\d+|\w+_memory) \[\d+:0\];"),
     'ram_style = "block"': re.compile(r" *reg (?:\[\d+:0\] )?\w+ \[\d+:0\];"),
 }
 """Attributes, and what they may stand before. A memory whose words are read and written at the same clock must not be

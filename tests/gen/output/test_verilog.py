@@ -1,7 +1,6 @@
 """The SystemVerilog text: names as in our source, equal words of a memory as a loop, read back as the same words."""
 
 import re
-from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ from tests.gen.designs import EXAMPLES, parallel_design
 from tests.gen.output.converter_board import SPEC
 
 import sosmith
+from sosmith.gen.architectures.registry import ARCHITECTURES
 from sosmith.gen.output.board_top import board_top
 from sosmith.gen.output.verilog import _MODULE, _with_plain_names, converted, to_rtlil, to_verilog
 from sosmith.verify.graph import RejectedError
@@ -57,7 +57,8 @@ def stay_apart(escaped: str, plain: str) -> bool:
 @pytest.mark.parametrize("options", [{}, {"channels": 3, "protect": "correct", "reload": True}], ids=["plain", "all"])
 @pytest.mark.parametrize("architecture", ["parallel", "folded", "serial"])
 def test_names_need_no_escape_and_stay_apart(architecture: str, options: dict[str, Any]) -> None:
-    design = replace(parallel_design("audio_lowpass.toml").architecture, name=architecture, **options)
+    made = parallel_design("audio_lowpass.toml").architecture
+    design = ARCHITECTURES[architecture](made.datapath, **options)
     text = to_rtlil(design.component(), "top")
     assert not _NAMELESS.findall(text)
     escaped = converted(text)

@@ -158,7 +158,7 @@ def changed(old: str, new: str, text: str = PLAIN) -> str:
         ),
         (
             "description = 'a",
-            'line 1 must be valid TOML, not a syntax error: expected "\'"',
+            "line 1 must end its text with the quote that begins it",
         ),
     ],
 )

@@ -62,7 +62,7 @@ BROKEN = [
     ("a reset the wrong way round", 'ResetSignal("front").eq(~self.aresetn)', 'ResetSignal("front").eq(self.aresetn)'),
     ("a flag that gets lost", "or several else decimator.o_rail)", "or several else 0)"),
     ("a sink that is not asked", "core.m_axis_tready.eq(ready)", "core.m_axis_tready.eq(1)"),
-    ("results the wrong way round", "self.m_axis_tdata.eq(result[:data])", "self.m_axis_tdata.eq(result[:data][::-1])"),
+    ("results the wrong way round", "self.m_axis_tdata.eq(handed.data)", "self.m_axis_tdata.eq(handed.data[::-1])"),
 ]
 
 

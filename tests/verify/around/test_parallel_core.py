@@ -10,7 +10,7 @@ from tests.verify.parallel.edits import random_edits, swept
 from tests.verify.parallel.simulated import outputs
 
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
-from sosmith.hdl import core as hardware
+from sosmith.hdl.cores import parallel as hardware
 from sosmith.hdl.decimation import decimator
 from sosmith.hdl.shell import pipeline, shell
 from sosmith.verify.around.cic import check_decimator

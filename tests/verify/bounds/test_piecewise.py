@@ -7,7 +7,7 @@ from math import prod
 import pytest
 from flint import fmpq, fmpq_poly
 
-from sosmith.verify import driven_responses, piecewise, summed_forms
+from sosmith.verify.bounds import driven_responses, piecewise, summed_forms
 from sosmith.verify.bounds.l1_response import BITS, UndecidedError, inverse, response
 from sosmith.verify.bounds.piecewise import Pieces
 

@@ -194,9 +194,9 @@ def test_words_that_are_hidden_do_not_count(begin: str, end: str) -> None:
     right, wrong = rf"instructions[2] = {words['2']};", rf"instructions[2]  =  {words['3']};"
     assert right in core.text
     hidden = core.text.replace(right, f"{wrong}\n{begin}\n{right}\n{end}\n")
-    with pytest.raises(RejectedError, match=r"^the text must have no comments over lines and no directives"):
+    with pytest.raises(RejectedError, match=r"^the SystemVerilog must be made of its plain subset, not have "):
         core.check(hidden)
-    assert core.check(f"// `sosmith verify` repeats it.\n// /*\n{core.text}") == core.check()
+    assert core.check(f"// `sosmith verify` repeats it.\n{core.text}") == core.check()
 
 
 def test_other_limits_of_the_calibration() -> None:
@@ -220,7 +220,7 @@ def test_the_limits_of_the_calibration_are_read() -> None:
 def test_cores_without_a_fixed_program_are_refused() -> None:
     core = small(PLAIN)
     with pytest.raises(RejectedError, match=r"^the core must be folded or serial to have a program, not parallel$"):
-        core.check("module plain();\nendmodule\n")
+        core.check("module plain(aclk);\n  input aclk;\nendmodule\n")
     loadable = ARCHITECTURES["folded"](core.design.datapath, reload=True)
     text = to_verilog(to_rtlil(loadable.component(), "plain"))
     with pytest.raises(RejectedError, match=r"^the program must be fixed to be checked, not loadable at run time$"):
