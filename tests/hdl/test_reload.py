@@ -1,7 +1,6 @@
 # amaranth: UnusedElaboratable=no
 """The reload port: what arrives whole and right becomes active between two samples, and nothing else ever does."""
 
-import sys
 import types
 from dataclasses import replace
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import Any
 import pytest
 from amaranth.hdl import ClockDomain, ClockSignal, Module
 from amaranth.sim import Simulator
+from tests.hdl.bus import reload_benches
 from tests.hdl.bus.axi_lite_bench import OKAY, SLVERR
 from tests.hdl.bus.reload_benches import DEPTH, Bench, Scenario, benched, crc_of
 from tests.verify.parallel.cores import small_design
@@ -348,7 +348,7 @@ def test_a_broken_port_is_noticed(mutant: tuple[Scenario, str, str, str], monkey
     assert source.count(old) == 1
     broken = types.ModuleType(f"sosmith.hdl.{name}")
     exec(compile(source.replace(old, new), path, "exec"), vars(broken))
-    user, component = USED_BY.get(name, (sys.modules[__name__], "ReloadPort"))
+    user, component = USED_BY.get(name, (reload_benches, "ReloadPort"))
     monkeypatch.setattr(user, component, getattr(broken, component))
 
     with pytest.raises(AssertionError):

@@ -133,7 +133,7 @@ def _lines(text: str) -> list[str]:
         attribute = _ATTRIBUTE.fullmatch(line)
         if attribute is not None:
             before = _ATTRIBUTES.get(attribute[1])
-            following = lines[number + 1] if number + 1 < len(lines) else ""
+            following = next((other for other in lines[number + 1 :] if not _ATTRIBUTE.fullmatch(other)), "")
             require(
                 before is not None and before.fullmatch(following) is not None,
                 f"line {number + 1} must be an attribute that changes no value, not {line.strip()[:60]!r}",

@@ -155,7 +155,7 @@ BREAKS = {
     "a clock": (
         r"always_ff @\(posedge clk\)\n(    if \(take1\))",
         r"always_ff @(posedge rst)\n\1",
-        r"registers must be clocked by aclk, not section\d\.rst",
+        r"the clock rst of plain must be an input of it",
     ),
     "a driver": (
         r"assign take2 = advance & valid2;",
