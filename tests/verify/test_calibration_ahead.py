@@ -22,7 +22,6 @@ from sosmith.verify.program.check import check_program
 from sosmith.verify.specified.stated_specification import check_specification
 from sosmith.verify.verification import verify
 
-LOCOMOTIVE = tree_of(locomotive(core="instrument"))
 TREE = tree_of(small())
 PART = TREE["decimation"]["calibration"]
 
@@ -33,7 +32,7 @@ def rejected(sentence: str) -> pytest.RaisesExc[RejectedError]:
 
 def test_the_locomotive_is_proven_again() -> None:
     made = locomotive(core="instrument")
-    certificate = read(LOCOMOTIVE)
+    certificate = read(tree_of(locomotive(core="instrument")))
     verdict = verify(certificate)
     assert verdict.budget.keys() == made.quantized.budget.keys()
     for part, value in made.quantized.budget.items():
@@ -222,4 +221,4 @@ def test_what_is_wrong_is_rejected(change: Callable[[Any], None], sentence: str)
 def test_a_polynomial_other_than_specified_is_rejected() -> None:
     text = locomotive_text().replace("0.3672", "0.3673")
     with rejected("coefficient [1][0] of the calibration must be 3673/10000 as specified, not 459/1250"):
-        check_specification(read(LOCOMOTIVE), text, Fraction(1, 2**40))
+        check_specification(read(tree_of(locomotive(core="instrument"))), text, Fraction(1, 2**40))

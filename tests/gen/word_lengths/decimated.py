@@ -53,10 +53,15 @@ def small(extra: str = "", core: str = "instrument") -> CoreDesign:
     return design_core(from_text(INSTRUMENT.format(extra=extra), Path("slight.toml")), core=core)
 
 
+_TEXTS: dict[int, tuple[CoreDesign, str]] = {}
+
+
 def tree_of(made: CoreDesign) -> Any:
-    """Return the certificate of a design as it is in its file."""
-    entries = certificate(made.quantized, made.spec.max_error, about(made, {}))
-    return json.loads(certificate_text(entries))
+    """Return the certificate of a design as it is in its file, for the caller to change."""
+    if id(made) not in _TEXTS:  # kept with its design, so that no other one gets its number
+        entries = certificate(made.quantized, made.spec.max_error, about(made, {}))
+        _TEXTS[id(made)] = made, certificate_text(entries)
+    return json.loads(_TEXTS[id(made)][1])
 
 
 def read(tree: Any) -> Certificate:
