@@ -32,6 +32,9 @@ range = [-1.0, 1.0]
 max_error = "faithful"
 """
 
+QUICK = f'{FILTER}\n[hardware]\nrealization = "df1"\narchitecture = "parallel"\n'
+"""The same without a search: for tests of what stands around a design."""
+
 INSTRUMENT = BASE.replace("order = 7", "order = 1").replace(
     "[[1.16, -0.0036], [0.3672]]", "[[1.16, -0.0036], [0.3672, 0.0006618], [0.05812]]"
 )

@@ -43,6 +43,7 @@ def test_the_same_for_programs(path: str) -> None:
     assert found["rate_costs"]["decimated"]["clocks_per_sample"] < found["rate_costs"]["direct"]["clocks_per_sample"]
 
 
+@pytest.mark.slow
 def test_factors_are_explored(path: str, tmp_path: Path) -> None:
     explored = Invocation("explore").good(path, "-p", "filter.decimate=2,4", "-o", str(tmp_path / "out"), "--json")
     found = json.loads(explored.stdout)

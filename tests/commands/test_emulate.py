@@ -167,6 +167,7 @@ def test_a_specification_for_tread_braking_shows_all_of_its_temperatures() -> No
     assert range_notes(scenario, load(examples.parent / "flange_wear_locomotive.toml").inputs) != ()
 
 
+@pytest.mark.slow
 def test_the_vehicles_motion_reaches_the_trace(folder: Path) -> None:
     rest = SHORT.replace("seconds = 20", "seconds = 8")
     (folder / "rest.toml").write_text(rest, encoding="utf-8")

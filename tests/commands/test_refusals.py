@@ -142,6 +142,7 @@ UNFIT = {
 }
 
 
+@pytest.mark.sweep(11)
 @pytest.mark.parametrize(("arguments", "message"), UNFIT.values(), ids=UNFIT)
 def test_what_does_not_fit_is_refused(arguments: tuple[str, ...], message: str, sosmith: Command) -> None:
     before = {path.name: path.read_bytes() for path in Path().iterdir()}
@@ -220,6 +221,7 @@ BAD_TRACES: dict[str, tuple[str, str | bytes, str]] = {
 }
 
 
+@pytest.mark.sweep(10)
 @pytest.mark.parametrize(("spec", "content", "message"), BAD_TRACES.values(), ids=BAD_TRACES)
 def test_a_bad_trace_ends_with_one_sentence(spec: str, content: str | bytes, message: str, sosmith: Command) -> None:
     Path("trace.csv").write_bytes(content.encode() if isinstance(content, str) else content)

@@ -19,6 +19,7 @@ from tests.commands.command_line import (
     FILTER,
     HANGS,
     PROGRESS,
+    QUICK,
     Command,
     Start,
     processes_with,
@@ -80,7 +81,7 @@ OnTerminal = Callable[..., tuple[Terminal, "subprocess.Popen[str]"]]
 @pytest.fixture
 def on_terminal(process: Start, tmp_path: Path) -> Iterator[OnTerminal]:
     """Start commands whose messages go to a terminal, beside plain.toml."""
-    (tmp_path / "plain.toml").write_text(FILTER, encoding="utf-8")
+    (tmp_path / "plain.toml").write_text(QUICK, encoding="utf-8")
     with contextlib.ExitStack() as opened, pytest.MonkeyPatch.context() as patch:
         patch.setenv("TERM", "xterm")
 
@@ -116,7 +117,7 @@ IN_THE_MIDDLE = {
 }
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("command", IN_THE_MIDDLE)
 def test_a_terminal_is_left_whole(command: str, on_terminal: OnTerminal, tmp_path: Path) -> None:
     arguments, step = IN_THE_MIDDLE[command]
@@ -241,8 +242,8 @@ def test_a_message_escapes_what_a_terminal_would_obey(sosmith: Command) -> None:
 
 
 def test_the_reader_of_the_output_may_leave(process: Start, tmp_path: Path) -> None:
-    (tmp_path / "plain.toml").write_text(FILTER, encoding="utf-8")
-    for arguments in (["design", "plain.toml"], ["design", "plain.toml", "--json"], ["emulate", "plain.toml", "noise"]):
+    (tmp_path / "plain.toml").write_text(QUICK, encoding="utf-8")
+    for arguments in (["design", "plain.toml"], ["emulate", "plain.toml", "noise"]):
         reader, writer = os.pipe()
         os.close(reader)
         running = process(*arguments, stdout=writer)
@@ -253,7 +254,7 @@ def test_the_reader_of_the_output_may_leave(process: Start, tmp_path: Path) -> N
 
 
 def test_a_full_disk_is_one_sentence(process: Start, tmp_path: Path) -> None:
-    (tmp_path / "plain.toml").write_text(FILTER, encoding="utf-8")
+    (tmp_path / "plain.toml").write_text(QUICK, encoding="utf-8")
     with Path("/dev/full").open("w") as full:
         running = process("design", "plain.toml", "--json", stdout=full)
         _, errors = running.communicate(timeout=HANGS)
@@ -331,7 +332,7 @@ def test_the_cache_can_be_emptied(sosmith: Command, tmp_path: Path, monkeypatch:
     assert (outcome.status, outcome.messages) == (0, ["sosmith: there is no cache folder that can be written"])
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("number", "status", "messages"),
     [
@@ -344,7 +345,7 @@ def test_the_cache_can_be_emptied(sosmith: Command, tmp_path: Path, monkeypatch:
 def test_a_signal_in_the_middle_of_the_simulation(
     number: signal.Signals, status: int, messages: list[str], process: Start, tmp_path: Path
 ) -> None:
-    (tmp_path / "plain.toml").write_text(FILTER, encoding="utf-8")
+    (tmp_path / "plain.toml").write_text(QUICK, encoding="utf-8")
     arguments = ["simulate", "plain.toml", "--trace", "noise", "--seconds", "500", "--simulator", "icarus", "-o", "out"]
     running = process(*arguments)
     simulation = tmp_path / "out" / "simulation" / "icarus"
@@ -362,8 +363,7 @@ def test_a_signal_in_the_middle_of_the_simulation(
 
 def test_two_runs_in_one_folder_at_once(process: Start, tmp_path: Path) -> None:
     """The second is refused at once, and the first, held up meanwhile, is none the worse for it."""
-    parallel = f'{FILTER}\n[hardware]\narchitecture = "parallel"\n'  # many clocks a second
-    (tmp_path / "plain.toml").write_text(parallel, encoding="utf-8")
+    (tmp_path / "plain.toml").write_text(QUICK, encoding="utf-8")
     arguments = ["simulate", "plain.toml", "--trace", "noise", "--seconds", "0.2", "--simulator", "icarus", "-o", "out"]
     first = process(*arguments)
     wait_for((tmp_path / "out" / "simulation").exists)
@@ -383,7 +383,7 @@ def test_two_runs_in_one_folder_at_once(process: Start, tmp_path: Path) -> None:
 def test_from_another_folder_through_the_installed_command(tmp_path: Path) -> None:
     spec = tmp_path / "a [b] folder é" / "my spec.toml"
     spec.parent.mkdir()
-    spec.write_text(FILTER, encoding="utf-8")
+    spec.write_text(QUICK, encoding="utf-8")
     (tmp_path / "elsewhere").mkdir()
     command = Path(sys.executable).with_name("sosmith")
     result = subprocess.run(

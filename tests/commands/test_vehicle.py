@@ -45,6 +45,7 @@ def test_it_answers_in_half_a_screen() -> None:
     assert "exceeds the limits" not in result.stderr
 
 
+@pytest.mark.slow
 def test_details_show_modes_motions_and_the_paper() -> None:
     shown = re.sub(r" {2,}", "  ", good("short.toml", "--details").stdout)
     for row in (
@@ -73,6 +74,7 @@ def test_the_linear_model_tells_what_it_exceeds() -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_wheel_that_would_climb_is_told() -> None:
     """With so much friction that the slope of the cones is steep enough to climb on."""
     text = Path("short.toml").read_text()

@@ -40,6 +40,7 @@ def test_the_document_shows_its_pictures(files: dict[str, str]) -> None:
     assert [name for name in files if name != "paper.md" and f"]({name})" not in files["paper.md"]] == []
 
 
+@pytest.mark.slow
 def test_o_writes_document_and_pictures(tmp_path: Path, files: dict[str, str]) -> None:
     result = run("-o", str(tmp_path / "ours.md"))
     assert (result.exit_code, result.stdout) == (0, "")

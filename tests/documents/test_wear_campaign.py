@@ -183,6 +183,7 @@ def test_the_whole_campaign_gives_the_same_again(tmp_path: Path) -> None:
         assert (tmp_path / "images" / picture).read_bytes() == (ROOT / "docs" / "images" / picture).read_bytes()
 
 
+@pytest.mark.slow
 def test_a_week_s_reloads_are_those_recorded(tmp_path: Path) -> None:
     """One week: what is refused leaves the active set, and the next swap starts from that."""
     settings = outcome()["settings"] | {"seeds": 1}

@@ -89,7 +89,7 @@ COMMANDS = {
 """The last word of each is the folder or the file that it writes; such a file is there before."""
 
 
-@pytest.mark.sweep(8)
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize("line", COMMANDS.values(), ids=list(COMMANDS))
 def test_a_command_on_a_full_disk(
     line: str, disk: Disk, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

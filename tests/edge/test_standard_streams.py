@@ -30,6 +30,7 @@ def shell(line: str, folder: Path, **environment: str) -> subprocess.CompletedPr
     )
 
 
+@pytest.mark.sweep(4)
 @pytest.mark.parametrize("closed", ["", "<&-", ">&-", "2>&-", "<&- >&-", "<&- 2>&-", ">&- 2>&-", "<&- >&- 2>&-"])
 def test_closed_streams(closed: str, tmp_path: Path) -> None:
     made = shell(f"sosmith init a.toml {closed}", tmp_path)
@@ -73,6 +74,7 @@ def test_a_reader_that_leaves(tmp_path: Path) -> None:
     assert (made.returncode, made.stderr, len(made.stdout.splitlines())) == (0, "", 1)
 
 
+@pytest.mark.sweep(4)
 @pytest.mark.parametrize("locale", ["C", "POSIX", "xx_YY.none", "en_US.ISO-8859-1"])
 @pytest.mark.parametrize("encoding", ["", "ascii", "ascii:strict"])
 def test_locales(locale: str, encoding: str, tmp_path: Path) -> None:

@@ -90,6 +90,7 @@ def test_the_reload_port_writes_free_banks_only(tmp_path: Path) -> None:
     assert prove(WritesFreeBanks(reload.ReloadPort(1, bits=1)), tmp_path) == "PASS"
 
 
+@pytest.mark.slow
 def test_a_reload_port_that_does_not_wait_is_found_out(tmp_path: Path) -> None:
     module = broken(reload, "& ~self.pending & self.shadow_free", "& ~self.pending")
     assert prove(WritesFreeBanks(module.ReloadPort(1, bits=1)), tmp_path) == "FAIL"

@@ -38,7 +38,7 @@ def rules(
     return BlockRules(design, latency + 1, patience=latency, datapath=datapath if order else None)
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("datapath", "lanes", "ahead"),
     [
@@ -73,7 +73,7 @@ def test_a_broken_core_is_found_out(right: str, wrong: str, tmp_path: Path) -> N
     assert prove(rules(leaky(), 2, ahead=False, module=wrong_core), tmp_path, timeout=600) == "FAIL"
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [
@@ -94,6 +94,7 @@ def test_a_broken_turn_is_found_out(right: str, wrong: str, tmp_path: Path, monk
     assert prove(rules(distant(3), 1, ahead=True), tmp_path, timeout=600) == "FAIL"
 
 
+@pytest.mark.slow
 def test_a_loop_that_is_too_long_for_its_turns_is_found_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     wrong = broken(
         plan, "for time in tried if _spread(turned, turns, loops, time).distance <= turns", "for time in tried"

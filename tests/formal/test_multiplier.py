@@ -121,7 +121,7 @@ def test_a_short_serial_multiplier_multiplies(tmp_path: Path) -> None:
     assert prove(multiplication(digit_bits=SHORT_DIGIT_BITS, whole=True), tmp_path, INDUCTION) == "PASS"
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [

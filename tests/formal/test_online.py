@@ -102,6 +102,7 @@ def test_a_fault_is_found(fault: tuple[str, str], tmp_path: Path) -> None:
     assert prove(Invariant(ResidualAlone(broken(residual, *fault))), tmp_path, INDUCTION) != "PASS"
 
 
+@pytest.mark.slow
 def test_a_delay_that_is_one_too_small_is_found(tmp_path: Path) -> None:
     assert prove(Invariant(ResidualAlone(residual), most=2), tmp_path, INDUCTION) != "PASS"
 

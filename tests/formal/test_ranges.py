@@ -86,6 +86,7 @@ def test_a_range_that_is_one_too_narrow_is_found_out(tmp_path: Path) -> None:
     assert prove(StatedRanges(resonator(-6, 5).stages[0]), tmp_path) == "FAIL"
 
 
+@pytest.mark.slow
 def test_a_section_that_overflows_is_found_out(tmp_path: Path) -> None:
     stage = proven_section(bits=2, y_frac=0)
     narrow = replace(stage, v_range=(stage.v_range[0] // 2, stage.v_range[1] // 2))

@@ -98,12 +98,13 @@ def channel_rules(module: ModuleType, serial: bool | None = None) -> StreamRules
     return StreamRules(design, 1, source_waits=True)
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(("module", "serial"), [(core, None), (folded, False), (folded, True)])
 def test_channels_stay_with_their_samples(module: ModuleType, serial: bool | None, tmp_path: Path) -> None:
     assert prove(channel_rules(module, serial), tmp_path) == "PASS"
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(1)
 @pytest.mark.parametrize(("module", "serial"), [(core, None), (folded, False)])
 def test_a_channel_too_many_is_found_out(module: ModuleType, serial: bool | None, tmp_path: Path) -> None:
@@ -111,11 +112,13 @@ def test_a_channel_too_many_is_found_out(module: ModuleType, serial: bool | None
     assert prove(channel_rules(wrong, serial), tmp_path) == "FAIL"
 
 
+@pytest.mark.slow
 def test_a_channel_that_is_lost_is_found_out(tmp_path: Path) -> None:
     wrong = broken(folded, "channel.eq(self.s_axis_tdest)", "channel.eq(0)")
     assert prove(channel_rules(wrong, serial=False), tmp_path) == "FAIL"
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(1)
 @pytest.mark.parametrize("serial", [False, True])
 def test_the_folded_core_computes_a_limited_sum(serial: bool, tmp_path: Path) -> None:
@@ -156,7 +159,7 @@ def test_a_broken_core_is_found_out(right: str, wrong: str, tmp_path: Path) -> N
     assert prove(core_rules(broken(core, right, wrong)), tmp_path) == "FAIL"
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("serial", [False, True])
 @pytest.mark.parametrize(
     ("right", "wrong"),

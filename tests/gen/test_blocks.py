@@ -80,7 +80,7 @@ def test_an_unstable_section_is_refused() -> None:
         build([0.0, 0.0, 0.0, 1.0, -0.5, 0.0], SectionFormat(coefficient_bits=12), "section0")
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(("clock", "order", "distance"), [("48.0e6", 5, 4), ("150.0e6", 5, 8), ("400.0e6", 2, 8)])
 def test_the_shortest_look_ahead_that_reaches_the_clock_is_chosen(clock: str, order: int, distance: int) -> None:
     made = designed(clock=clock, order=order)
@@ -97,6 +97,7 @@ def test_the_shortest_look_ahead_that_reaches_the_clock_is_chosen(clock: str, or
     assert made.architecture.cost.multiplications == ()
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("clock", "rate", "chosen"), [("100e6", "90e6", True), ("100e6", "40e6", False), ("50e6", "50e6", False)]
 )
@@ -181,7 +182,7 @@ def codes_of(made: CoreDesign, count: int) -> np.ndarray:
     return codes
 
 
-@pytest.mark.sweep(3)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     "pace",
     [

@@ -3,6 +3,7 @@
 
 from typing import Any
 
+import pytest
 from amaranth.hdl import Shape
 from tests.formal.small import leaky
 from tests.hdl.bus.axi_lite_bench import OKAY, SLVERR
@@ -94,6 +95,7 @@ def test_a_write_acknowledges() -> None:
     benched(a_write_acknowledges_for_one_clock, protected=True)
 
 
+@pytest.mark.slow
 def test_counts_do_not_wrap() -> None:
     benched(counts_stay_at_their_highest, protected=True)
 

@@ -215,6 +215,7 @@ SCENARIOS: tuple[Scenario, ...] = (
 )
 
 
+@pytest.mark.sweep(5)
 @pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda scenario: scenario.__name__)
 def test_the_port(scenario: Scenario) -> None:
     assert len(REGISTERS) < 1 << (ADDRESS_BITS - 2)  # there is an address behind the last register
@@ -340,6 +341,7 @@ USED_BY = {"bus/serial_crc": (reload, "SerialCrc"), "bus/axi_lite": (reload, "Se
 """Where the components of a module are looked up; the port itself here."""
 
 
+@pytest.mark.sweep(8)
 @pytest.mark.parametrize("mutant", MUTANTS.values(), ids=list(MUTANTS))
 def test_a_broken_port_is_noticed(mutant: tuple[Scenario, str, str, str], monkeypatch: pytest.MonkeyPatch) -> None:
     scenario, name, old, new = mutant
@@ -368,6 +370,7 @@ def test_constants_tell_what_the_core_is() -> None:
     benched(scenario, design=0x89ABCDEF)
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("seed", range(2))
 def test_loads_of_all_kinds_at_any_pace(seed: int) -> None:
     async def scenario(bench: Bench) -> None:

@@ -52,6 +52,7 @@ def test_the_software_at_the_ends_of_every_range(calibrated: tuple[Ends, Ends]) 
     assert outside == [bool(status(datapath, 0, sample) >> Flag.OUTSIDE_CALIBRATION & 1) for sample in codes]
 
 
+@pytest.mark.sweep(4)
 @pytest.mark.parametrize("architecture", ["parallel", "folded", "serial"])
 @pytest.mark.parametrize("calibrated", RANGES[:3])
 def test_the_hardware_at_the_ends_of_every_range(calibrated: tuple[Ends, Ends], architecture: str) -> None:
@@ -62,6 +63,7 @@ def test_the_hardware_at_the_ends_of_every_range(calibrated: tuple[Ends, Ends], 
     assert [result.status for result in found] == [status(datapath, 0, sample) for sample in codes]
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize("architecture", ["parallel", "folded", "serial"])
 @pytest.mark.parametrize("limits", [((-3, 5),), ((-3, 5), (0, 9), (-7, 15))])
 def test_the_hardware_at_the_limits_of_wear(limits: tuple[Ends, ...], architecture: str) -> None:

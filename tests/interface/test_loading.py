@@ -79,6 +79,7 @@ def test_what_loads_none_of_them(arguments: tuple[str, ...]) -> None:
     assert run(*arguments) == []
 
 
+@pytest.mark.sweep(6)
 @pytest.mark.parametrize("name", cli.list_commands(Context(cli)))
 def test_help_of_a_command_loads_none_of_them(name: str) -> None:
     assert run(name, "--help") == []

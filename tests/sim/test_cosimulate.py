@@ -33,6 +33,7 @@ def run(
     return cosimulate(bench, INTERFACE, codes, seed=seed, progress=progress)
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("simulator", SIMULATORS)
 def test_a_sound_core_passes(simulator: str, tmp_path: Path) -> None:
     folder = tmp_path / "a folder with spaces"
@@ -62,6 +63,7 @@ def test_any_pace(idle_and_stall: tuple[float, float], tmp_path: Path) -> None:
         assert result.cycles <= 303
 
 
+@pytest.mark.sweep(4)
 @pytest.mark.parametrize("what", BROKEN)
 def test_a_broken_core_is_found(what: str, tmp_path: Path) -> None:
     break_it, message = BROKEN[what]

@@ -62,7 +62,7 @@ def cases() -> list[tuple[str, str, int, tuple[str, ...]]]:
     return found
 
 
-@pytest.mark.sweep(3)
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("family", FAMILIES)
 def test_poles_are_scipys(family: str) -> None:
     """Symmetric functions of all poles, which do not depend on how they are paired."""
@@ -85,7 +85,7 @@ def gain(made: Filter, frequency: Fraction) -> arb:
     return abs(value)
 
 
-@pytest.mark.sweep(3)
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("family", FAMILIES)
 def test_edges_are_where_the_family_has_them(family: str) -> None:
     """The loss at the cutoff is the family's by definition, up to what a rounding of the coefficients moves it."""

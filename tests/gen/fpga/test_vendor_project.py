@@ -118,6 +118,7 @@ def test_the_verilog_is_clean(tmp_path: Path) -> None:
     assert lint(whole, wrapper.name, tmp_path / "lint", waived=(*WAIVED, *WAIVED_HERE)) == []
 
 
+@pytest.mark.slow
 def test_what_is_written_says_that_nothing_was_built(tmp_path: Path) -> None:
     told = filter_design().project("CMOD-S7", folder=tmp_path)
     assert json.loads((tmp_path / "build.json").read_text()) == told

@@ -71,6 +71,7 @@ def test_manifest_says_what_the_contract_asks(tmp_path: Path) -> None:
             assert coefficient["value"] == coefficient["integer"] / 2 ** coefficient["frac"]
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("compiler", ["cc", "c++"])
 def test_c_model_compiles_without_a_warning_and_computes(compiler: str, tmp_path: Path) -> None:
     """One sample at a time, as firmware would call it; the header also from C++."""

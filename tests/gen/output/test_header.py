@@ -30,6 +30,7 @@ def header_of(design: CoreDesign) -> str:
     return "".join(line.removeprefix("//").removeprefix(" ") for line in comment.splitlines(keepends=True))
 
 
+@pytest.mark.sweep(1)
 def test_the_header_tells_where_the_core_comes_from(design: CoreDesign) -> None:
     header, facts = header_of(design), core_facts(design)
     name = design.spec.name
@@ -42,6 +43,7 @@ def test_the_header_tells_where_the_core_comes_from(design: CoreDesign) -> None:
     assert every in header
 
 
+@pytest.mark.sweep(1)
 def test_the_ports_are_those_of_the_module(design: CoreDesign) -> None:
     text = generated(design)[f"{design.spec.name}.sv"]
     (ports,) = re.findall(rf"^module {design.spec.name}\((.*)\);", text, re.MULTILINE)

@@ -53,7 +53,7 @@ def stay_apart(escaped: str, plain: str) -> bool:
     return [*map(len, declared[0])] == [*map(len, declared[1])]
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("options", [{}, {"channels": 3, "protect": "correct", "reload": True}], ids=["plain", "all"])
 @pytest.mark.parametrize("architecture", ["parallel", "folded", "serial"])
 def test_names_need_no_escape_and_stay_apart(architecture: str, options: dict[str, Any]) -> None:
@@ -68,6 +68,7 @@ def test_names_need_no_escape_and_stay_apart(architecture: str, options: dict[st
     assert stay_apart(escaped, plain)
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("spec", [EXAMPLES / "audio_lowpass.toml", SPEC], ids=["link", "converters"])
 def test_nor_do_those_of_a_board(spec: Path | dict[str, Any]) -> None:
     text = to_rtlil(board_top(sosmith.design(spec).core, clock=Fraction(12_000_000), core="none"), "top")

@@ -94,6 +94,7 @@ def test_error_feedback_comes_to_rest_within_an_lsb(realization: str) -> None:
         assert set(output[-1000:]) <= {-1, 0, 1}
 
 
+@pytest.mark.sweep(6)
 @pytest.mark.parametrize("bits", [3, 5])
 @pytest.mark.parametrize("realization", CASCADES)
 def test_exhaustive_search_stays_within_the_bound(realization: str, bits: int) -> None:

@@ -109,7 +109,7 @@ def full_scale(samples: int) -> np.ndarray:
     return codes
 
 
-@pytest.mark.sweep(4)
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("design", DESIGNS)
 def test_delta_with_exact_states_is_second_order_error_feedback(design: Design) -> None:
     """THEORY 3.5, bit for bit in the compiled model; and in the interpreter, which checks all ranges."""
@@ -214,6 +214,7 @@ def test_output_without_the_newest_input(row: Row, realization: str) -> None:
     quantized.datapath.compute_exact(codes[6000:9000])
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize("realization", ["df2t", "delta"])
 @pytest.mark.parametrize(
     "row",

@@ -48,6 +48,7 @@ def hardware_in(architecture: str, example: str = "audio_lowpass.toml", *, clock
     return design_core(replace(spec, hardware=hardware))
 
 
+@pytest.mark.sweep(5)
 @pytest.mark.parametrize("realization", EXACT)
 @pytest.mark.parametrize("example", ["audio_lowpass.toml", "flange_wear_bench.toml"])
 def test_the_same_constants_make_the_same_design(example: str, realization: str) -> None:
@@ -190,6 +191,7 @@ def test_fingerprints_tell_hardware_apart_and_not_constants() -> None:
 # Swaps.
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("ratio", ["0.8", "1.2"])
 @pytest.mark.parametrize("example", ["audio_lowpass.toml", "flange_wear_bench.toml"])
 def test_a_cutoff_a_fifth_away_may_be_swapped_to(example: str, ratio: str) -> None:

@@ -37,6 +37,7 @@ def swapped(active: Quantized, other: Quantized, during: Datapath) -> None:
         compute_swapping(active.datapath, [(swap, during)], way)
 
 
+@pytest.mark.sweep(5)
 @pytest.mark.parametrize("ratio", RATIOS)
 @pytest.mark.parametrize("realization", REALIZATIONS)
 def test_nothing_leaves_the_ranges_that_are_proven_for_a_swap(realization: str, ratio: str) -> None:

@@ -223,7 +223,7 @@ def test_reports_of_earlier_versions_need_not_tell_their_architecture() -> None:
     assert "<svg" in comparison_page([untold, folded(100, 0.0002)], [])
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("extreme", [5e-324, 1e-300, 1e300])
 def test_extreme_errors_are_drawn(extreme: float) -> None:
     """Nothing warns that the labels of an axis have no room; warnings are errors here."""
@@ -408,6 +408,7 @@ def test_page_escapes_names() -> None:
     assert "<script>&amp;" in page.words
 
 
+@pytest.mark.slow
 def test_page_of_different_units_has_no_picture_of_errors() -> None:
     assert "Error over time" in comparison_page([report(), report()])
     content = comparison_page([report(), report(**{"error.unit": "V"})])
@@ -415,6 +416,7 @@ def test_page_of_different_units_has_no_picture_of_errors() -> None:
     assert "Errors in mm and V cannot be compared." in content
 
 
+@pytest.mark.slow
 def test_page_beside_a_baseline() -> None:
     pair = [report(), report(**WORSE)]
     content = comparison_page(pair, judge(pair[0], pair[1:], read_tolerances("error=5%")))

@@ -8,6 +8,7 @@ from tests.gen.designs import example_design
 from sosmith.gen.report.design_plot import design_plot
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(
     ("core", "titles"),
     [

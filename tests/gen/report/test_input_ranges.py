@@ -23,6 +23,7 @@ def _report(design: sosmith.Design, trace: object, folder: Path) -> sosmith.Repo
     return design.simulate(trace, folder=folder, simulator="icarus", idle=0, stall=0)  # type: ignore[arg-type]
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("form", ["arrays", "file"])
 def test_a_trace_that_was_clipped_does_not_pass(design: sosmith.Design, tmp_path: Path, form: str) -> None:
     values, file = 5 * TONE, tmp_path / "loud.csv"
@@ -40,6 +41,7 @@ def test_a_trace_that_was_clipped_does_not_pass(design: sosmith.Design, tmp_path
     assert reason in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_a_tone_of_full_scale_passes_without_a_word(design: sosmith.Design, tmp_path: Path) -> None:
     report = _report(design, {"x": 0.999 * TONE}, tmp_path)
     assert (report.passed, report.summary["notes"], report.summary["inputs"][0]["at_end"]) == (True, [], 0)

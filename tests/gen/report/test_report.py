@@ -80,6 +80,7 @@ def build(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
 # the summary
 
 
+@pytest.mark.sweep(2)
 def test_summary_has_the_keys_of_the_contract(built: tuple[str, Path, dict[str, Any]]) -> None:
     """CONTRACT.md, section "The report"."""
     _, directory, _ = built
@@ -463,6 +464,7 @@ def test_measures_are_taken_everywhere_and_at_every_edge() -> None:
 # the page
 
 
+@pytest.mark.sweep(1)
 def test_same_evidence_gives_the_same_bytes(built: tuple[str, Path, dict[str, Any]], tmp_path: Path) -> None:
     case, directory, _ = built
     write_report(CASES[case](), tmp_path)
@@ -594,6 +596,7 @@ def test_a_delay_beyond_all_bounds_is_not_framed(off: float) -> None:
     assert drawn == same
 
 
+@pytest.mark.slow
 def test_this_design_is_not_its_own_alternative() -> None:
     known = evidence().alternatives
     itself = Alternative(name="df1_ef2", max_abs=0.1, rms=0.1)
@@ -610,6 +613,7 @@ def test_many_formats_are_folded_up(length: int, unfolded: bool) -> None:
     assert (("open", "") in page.attributes) == unfolded
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("length", [1, 2, 7])
 def test_a_handful_of_samples_makes_a_page(length: int) -> None:
     run = plain(time=np.arange(float(length)), golden=np.zeros(length), hardware=np.zeros(length))

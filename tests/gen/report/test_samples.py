@@ -66,6 +66,7 @@ def test_a_long_run_keeps_the_largest_error_of_each_stretch() -> None:
     assert unpacked(data["error"]) == pytest.approx(error[index], abs=2 * LSB / 65535)
 
 
+@pytest.mark.slow
 def test_the_page_of_the_largest_run_is_below_a_megabyte() -> None:
     """Order 12, 12 channels, 60,000 samples of each; noise everywhere, which no packing makes small."""
     samples, channels = 60_000, 12

@@ -50,6 +50,7 @@ def test_every_option_and_every_architecture_is_there() -> None:
     assert {pair for pair in beside if pair not in pairs} == {("multipliers 0", "multipliers 1 or more")}
 
 
+@pytest.mark.sweep(25)
 @pytest.mark.parametrize("pair", combinations(), ids=lambda pair: f"{pair.row}-{pair.option}")
 def test_what_the_table_says_is_what_happens(pair: Combination) -> None:
     if pair.verdict == "ok":

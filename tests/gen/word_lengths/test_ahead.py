@@ -36,6 +36,7 @@ def whole(decimate: str = '"auto"', architecture: str = "auto") -> CoreDesign:
     return locomotive(decimate, architecture, "instrument")
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("scenario", ["worst_case", "worst_case_errors"])
 def test_no_input_exceeds_the_bound(scenario: str) -> None:
     made = whole()
@@ -210,6 +211,7 @@ def test_registers_too_wide_for_the_models() -> None:
         decimator_module._rounded(x, found, coarsest=Fraction(1), allowed=Fraction(1))
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("hold", [False, True])
 def test_wear_is_judged_behind_the_filter(hold: bool) -> None:
     wear = "\n[wear]\ninitial = 4.0\nwarning = 1.4\nlimit = 1.8\n"

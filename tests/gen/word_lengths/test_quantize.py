@@ -46,6 +46,7 @@ def case(name: str, realization: str) -> Any:
     return pytest.param(name, realization, marks=[pytest.mark.slow] if long else [])
 
 
+@pytest.mark.sweep(8)
 @pytest.mark.parametrize(("name", "realization"), [case(*each) for each in product(ALL, REALIZATIONS)])
 def test_examples_stay_within_their_bound(name: str, realization: str) -> None:
     design = example_design(name, realization=realization)

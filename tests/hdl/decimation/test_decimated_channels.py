@@ -59,6 +59,7 @@ def expected(made: Architecture, samples: list[tuple[int, list[int]]]) -> list[t
     return results
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize(
     ("name", "before", "core"),
     [
@@ -80,6 +81,7 @@ def test_results_equal_the_model(name: str, before: str, core: str, hold: bool) 
     assert run_core(made, samples, Pace(idle=0.1, stall=0.9), results=len(wanted)) == wanted
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(
     ("name", "before", "core"),
     [
@@ -113,6 +115,7 @@ BROKEN = [
 ]
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(("right", "wrong"), [pytest.param(*case, id=subject) for subject, *case in BROKEN])
 def test_what_is_broken_is_found(right: str, wrong: str, monkeypatch: pytest.MonkeyPatch) -> None:
     made = made_in("folded", "parallel")

@@ -57,7 +57,7 @@ def check(architecture: Architecture, count: int, pace: Pace) -> None:
     assert [beat.status for beat in found] == datapath.compute_status(codes).tolist()
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("pace", PACES.values(), ids=PACES)
 @pytest.mark.parametrize("realization", ["df1", "df1_ef1", "df1_ef2"])
 def test_results_are_those_of_the_graph(realization: str, pace: Pace) -> None:
@@ -68,6 +68,7 @@ def test_a_filter_that_starts_from_zero() -> None:
     check(audio("df1_ef1", "zero"), 60, Pace())
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(("kind", "order"), [("lowpass", 1), ("lowpass", 2), ("highpass", 3), ("highpass", 5)])
 def test_other_filters(kind: str, order: int) -> None:
     check(made(kind, order), 100, Pace())
@@ -131,6 +132,7 @@ def after_reset(dut: Any, codes: list[list[int]], clock: int) -> list[int]:
     return results
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("clock", [50, 53, 61, 75])
 def test_a_reset_of_one_clock_leaves_nothing_behind(clock: int) -> None:
     datapath = audio("df1_ef1", "zero").datapath
@@ -191,7 +193,7 @@ FAULTS = {
 }
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("fault", FAULTS.values(), ids=FAULTS)
 def test_a_fault_is_found(fault: tuple[str, str], monkeypatch: pytest.MonkeyPatch) -> None:
     wrong: ModuleType = broken(cascade, *fault)

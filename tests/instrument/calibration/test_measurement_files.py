@@ -243,6 +243,7 @@ def test_damaged_workbooks(tmp_path: Path) -> None:
         read_measurement_file(path, DAY)
 
 
+@pytest.mark.slow
 def test_files_of_more_than_anyone_measures(tmp_path: Path) -> None:
     path = tmp_path / "m.csv"
     header = ",".join(HEADER) + "\n"

@@ -408,6 +408,7 @@ def test_a_writer_that_waits_in_vain_says_so(
         add(other, "left", batch(tmp_path, "a.csv"), DAY)
 
 
+@pytest.mark.slow
 def test_concurrent_writers_lose_nothing(tmp_path: Path) -> None:
     path, each = tmp_path / "c.db", 10
     for k in range(3 * each):
@@ -459,12 +460,15 @@ def whole_batches(path: Path, size: int) -> int:
         return len(versions)
 
 
-def test_killed_at_any_statement_of_an_addition(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "statements", [(16, 28, 10_000), pytest.param((1, 8, 12, 16, 20, 24, 28, 10_000), marks=pytest.mark.slow)]
+)
+def test_killed_at_any_statement_of_an_addition(statements: tuple[int, ...], tmp_path: Path) -> None:
     size = 12
     for k in range(2):
         batch(tmp_path, f"{k}.csv", size, seed=k)
     outcomes, journals = [], 0
-    for statement in (1, 8, 12, 16, 20, 24, 28, 10_000):
+    for statement in statements:
         path = tmp_path / f"{statement}.db"
         with open_store(path, create=True) as opened:
             add(opened, "left", tmp_path / "0.csv", DAY, required_r=0.9)
@@ -476,7 +480,7 @@ def test_killed_at_any_statement_of_an_addition(tmp_path: Path) -> None:
         assert found >= 1 + committed
         outcomes.append((killed.returncode, found))
     assert set(outcomes) == {(-signal.SIGKILL, 1), (0, 2)}
-    assert journals > 3  # the kill came when part of the addition was in the file already
+    assert journals > len(statements) // 3  # the kill came when part of the addition was in the file already
 
 
 def kill_while_adding(folder: Path, times: int) -> None:

@@ -12,6 +12,7 @@ from sosmith.instrument.vehicle.run import run
 from sosmith.instrument.vehicle.track import curved_track, tangent_track
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(1)
 @pytest.mark.parametrize(("name", "make"), [("paper", curved_track), ("tangent", tangent_track)])
 @pytest.mark.parametrize("model", MODELS)

@@ -55,7 +55,7 @@ def test_a_line_is_no_part_of_the_spectrum() -> None:
     assert spectrum(slope, RATE, SpectrumSettings(detrend="constant")).rms > 0.1
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(("overlap", "window"), [(0.5, "hann"), (0.75, "hann"), (0.5, "boxcar"), (0.0, "hann")])
 def test_degrees_of_freedom_and_interval_are_those_of_the_estimates(overlap: float, window: str) -> None:
     settings = SpectrumSettings(window=window, overlap=overlap, confidence=0.9)

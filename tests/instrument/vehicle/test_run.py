@@ -53,6 +53,7 @@ def test_motion_begins_and_ends_at_rest(motion: Motion) -> None:
         assert np.abs(values).max() > 5e-3
 
 
+@pytest.mark.slow
 def test_motion_is_the_same_in_coordinates_that_go_with_the_track() -> None:
     """Seen from the moving track, inertia and springs feel its course, and the contacts do not: solved that way too."""
     speed, step = 20.0, 2.5e-4
@@ -126,6 +127,7 @@ def steady() -> tuple[Motion, int]:
     return in_a_long_curve(20.0)
 
 
+@pytest.mark.slow
 def test_forces_balance_in_a_long_curve(steady: tuple[Motion, int]) -> None:
     """Kalker's forces written out from the motion alone hold the vehicle in its curve, and turn it at a steady rate."""
     found, k = steady
@@ -209,6 +211,7 @@ def scaled(value: Any, units: dict[str, float]) -> Any:
     return replace(value, **changes)
 
 
+@pytest.mark.slow
 def test_units_fit_together() -> None:
     """In other units of mass, length and time every result is the same: each formula is right in its dimensions.
 
@@ -323,6 +326,7 @@ def test_widening_moves_the_flange() -> None:
     assert limits(GIVEN, wide, still).beyond_flange == pytest.approx([-0.014] * 6)
 
 
+@pytest.mark.slow
 def test_random_irregularities_come_from_the_seed() -> None:
     arguments: dict[str, Any] = {"speed": 20.0, "sample_rate": 100.0, "irregularity": "low"}
     straight = tangent_track(replace(GIVEN.track, irregularity=0.0, curve=50.0))
@@ -407,6 +411,7 @@ def ridden() -> tuple[Track, Motion]:
     return track, run_any(GIVEN, track, speed=20.0, sample_rate=50.0, distance=220.0)
 
 
+@pytest.mark.slow
 def test_flanges_and_friction_hold_the_vehicle_in_its_curve(ridden: tuple[Track, Motion]) -> None:
     track, found = ridden
     assert found.distance[-1] == pytest.approx(220.0)

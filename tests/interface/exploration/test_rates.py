@@ -79,6 +79,7 @@ def test_a_decimator_is_part_of_an_estimated_cost() -> None:
     assert decimator.adder_bits == 6 * decimator.width
 
 
+@pytest.mark.slow
 def test_clocks_a_sample_are_an_average_behind_a_decimator(tmp_path: Path) -> None:
     made = design_of("sparse").core
     (trace,) = traces_for(made, "noise", seed=1, seconds=0.202)

@@ -110,6 +110,7 @@ def test_the_order_of_the_results_is_of_no_account(found: Outcome, tmp_path: Pat
     assert searched(tmp_path, machine=Machine(lambda tasks: reversed(list(tasks)))) == found
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("ends", [24, 53])
 def test_a_search_that_was_killed_goes_on(found: Outcome, tmp_path: Path, ends: int) -> None:
     killed, again = Machine(ends=ends), Machine()

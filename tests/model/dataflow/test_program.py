@@ -52,6 +52,7 @@ def run(made: Program, datapath: Datapath, codes: np.ndarray) -> list[int]:
     return [min(max(code, datapath.output.lowest), datapath.output.highest) for code in given_out]
 
 
+@pytest.mark.sweep(20)
 @pytest.mark.parametrize("digit_bits", [8, 15, 17])
 @pytest.mark.parametrize("realization", FOLDABLE)
 @pytest.mark.parametrize("example", ALL)

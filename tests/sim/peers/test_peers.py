@@ -32,7 +32,7 @@ CASES = [
 ]
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(("architecture", "realization", "channels"), CASES)
 def test_peers_of_another_maker(architecture: str, realization: str, channels: int, tmp_path: Path) -> None:
     made = made_of(architecture, realization, channels)

@@ -28,7 +28,7 @@ def worst(made: CoreDesign, kind: str, samples: int, folder: Path, simulator: st
     assert write_report(evidence, folder)["passed"]
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("lanes", "simulator"),
     [

@@ -78,6 +78,7 @@ def test_hardware_equals_the_integer_model(architecture: str, simulator: str, tm
     assert "That adds 300\xa0ms." in page
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(1)
 @without_pictures
 @pytest.mark.parametrize(("architecture", "simulator"), [("folded", "verilator"), ("parallel", "icarus")])
@@ -94,6 +95,7 @@ def test_held_results_come_as_often_as_samples(architecture: str, simulator: str
     assert "16 samples make one result, which leaves as many times" in (tmp_path / "report.html").read_text("utf-8")
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(1)
 @pytest.mark.parametrize("hold", [False, True])
 def test_vectors_have_a_result_for_every_16th_sample(hold: bool, tmp_path: Path) -> None:

@@ -104,6 +104,7 @@ def test_wear_held_and_judged(tmp_path: Path) -> None:
     assert json.loads((tmp_path / f"{made.spec.name}.json").read_text(encoding="utf-8"))["decimation"]["held"]
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(1)
 @without_pictures
 @pytest.mark.parametrize(

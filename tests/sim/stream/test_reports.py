@@ -97,6 +97,7 @@ realization = "df1"
 """
 
 
+@pytest.mark.slow
 def test_hardware_that_rounds_nothing(tmp_path: Path) -> None:
     """A report of a bound of 0 is written like any other."""
     made = design_core(from_text(PURE_DELAY, tmp_path / "pure_delay.toml"))

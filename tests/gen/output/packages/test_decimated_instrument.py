@@ -13,6 +13,7 @@ from sosmith.interface.design import Design
 from sosmith.model.errors import SpecificationError
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     "made", [small(), pytest.param(locomotive(core="instrument"), marks=pytest.mark.slow)], ids=["small", "locomotive"]

@@ -26,7 +26,7 @@ def run(target: str, name: str, folder: Path, *options: str) -> subprocess.Compl
     return called(FUSESOC, *command, at=empty, simulator="verilator" if target == "lint" else "icarus")
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("name", SPECIFICATIONS)
 def test_lint(name: str, tmp_path: Path) -> None:
     result = run("lint", name, unpacked(name, tmp_path))

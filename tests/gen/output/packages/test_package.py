@@ -36,7 +36,7 @@ def test_two_runs_write_the_same_bytes(tmp_path: Path) -> None:
         assert (tmp_path / "one" / path).read_bytes() == (tmp_path / "two" / path).read_bytes()
 
 
-@pytest.mark.sweep(3)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("name", SPECIFICATIONS)
 def test_the_core_is_the_one_that_generate_writes(name: str) -> None:
     core = {path.removeprefix("core/"): text for path, text in package_of(name).items() if path.startswith("core/")}

@@ -100,7 +100,7 @@ def wrapped(maker: str, name: str, folder: Path) -> str:
     return result.stdout
 
 
-@pytest.mark.sweep(3)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("name", ["plain", "gauge", "wide", "held"])
 @pytest.mark.parametrize("maker", EVERY_MAKER)
 def test_the_bench_passes_with_the_wrapper_around_the_core(maker: str, name: str, tmp_path: Path) -> None:
