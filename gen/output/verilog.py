@@ -7,6 +7,7 @@ import os
 import re
 import subprocess
 import sys
+from functools import lru_cache
 
 from amaranth.back import rtlil
 from amaranth.lib.wiring import Component
@@ -67,6 +68,7 @@ def to_verilog(rtlil_text: str) -> str:
     return _MODULE.sub(_with_plain_names, converted(rtlil_text))
 
 
+@lru_cache(maxsize=64)  # files, boards, packages and proofs of one core ask for the same text
 def converted(rtlil_text: str) -> str:
     """SystemVerilog text as the Yosys that comes with Amaranth names its signals.
 

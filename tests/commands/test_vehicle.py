@@ -110,7 +110,8 @@ def test_json_holds_figures_limits_and_sources() -> None:
 
 
 def test_motion_goes_to_a_csv_file() -> None:
-    good("short.toml", "-o", "out/motion.csv", "--irregularities", "low", "--seed", "3", "--sample-rate", "50")
+    options = "--irregularities low --seed 3 --sample-rate 50 --model linear".split()
+    good("short.toml", "-o", "out/motion.csv", *options)
     with Path("out/motion.csv").open(newline="") as stream:
         header, *rows = csv.reader(stream)
     assert header[:3] == ["time_s", "distance_m", "wheelset1_lateral_mm"]
@@ -121,7 +122,7 @@ def test_motion_goes_to_a_csv_file() -> None:
     assert values[:, 1] == pytest.approx(0.4 * np.arange(326))
     assert "-0.000000" not in Path("out/motion.csv").read_text()
     first = Path("out/motion.csv").read_bytes()
-    good("short.toml", "-o", "out/motion.csv", "--irregularities", "low", "--seed", "3", "--sample-rate", "50")
+    good("short.toml", "-o", "out/motion.csv", *options)
     assert Path("out/motion.csv").read_bytes() == first
 
 

@@ -79,6 +79,7 @@ def test_a_wrong_bit_comes_through_as_it_is(tmp_path: Path) -> None:
     assert (result.codes == stimulus() + 2).all()
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_run(tmp_path: Path) -> None:
     source = write(tmp_path)
     cycles = [run(source, stimulus(), build_dir=tmp_path, simulator="icarus", seed=seed).cycles for seed in (5, 5, 6)]

@@ -37,7 +37,7 @@ def test_else_a_folder_of_this_process(name: str, tmp_path: Path, monkeypatch: p
 
     with monkeypatch.context() as patched:
         patched.setattr(subprocess, "run", runs)
-        converted("")
+        converted(f"another text for {name}")  # what has been converted is not converted again
     assert environments[0]["XDG_CACHE_HOME"] == str(made)
     log, show = tmp_path / "log.txt", "import os; print(os.environ['XDG_CACHE_HOME'])"
     assert Tool("python", Path(sys.executable), "3").run(["-c", show], tmp_path, log) == 0

@@ -146,6 +146,7 @@ INTEGER_ROWS = {
 }
 
 
+@pytest.mark.sweep(8)
 @pytest.mark.parametrize("realization", CASCADES)
 @pytest.mark.parametrize("name", INTEGER_ROWS)
 def test_a_section_of_whole_numbers_rounds_nothing(name: str, realization: str) -> None:
@@ -188,6 +189,7 @@ LOWPASS = ("0.1", "0", "0", "1", "-0.9", "0")
 ONE_LATER, TWO_LATER = ("0", "1", "0", "1", "0", "0"), ("0", "0", "1", "1", "0", "0")
 
 
+@pytest.mark.sweep(10)
 @pytest.mark.parametrize("realization", CASCADES)
 @pytest.mark.parametrize(
     "rows",

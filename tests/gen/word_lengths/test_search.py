@@ -191,6 +191,7 @@ def shorter(planned: Plan) -> Iterator[tuple[str, Choice]]:
         yield "input stage", replace(choice, input_stage=choice.input_stage + 1)
 
 
+@pytest.mark.sweep(12)
 @pytest.mark.parametrize("realization", CASCADES)
 @pytest.mark.parametrize(("kind", "order", "cutoff"), FILTERS)
 def test_no_further_step_both_fits_and_saves(kind: str, order: int, cutoff: float, realization: str) -> None:

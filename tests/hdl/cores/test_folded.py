@@ -74,6 +74,7 @@ def some(datapath: Datapath, count: int, channels: int, seed: int = 1) -> list[S
     ]
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(
     ("serial", "channels", "protect"),
     [
@@ -235,6 +236,7 @@ def taken_over(model: Model, programs: tuple[Program, Program], samples: list[Sa
     raise AssertionError("a program that was loaded must take over")
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("serial", "count", "protect"),
     [(False, 16, "none"), (False, 17, "none"), (True, 15, "correct"), (False, 18, "detect")],
@@ -303,6 +305,7 @@ def test_the_scrubber_mends_all_words_while_the_core_waits(channels: int, count:
     simulate(dut, testbench)
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(
     ("name", "serial", "protect"),
     [

@@ -47,6 +47,7 @@ def expected(made: Architecture, codes: np.ndarray) -> list[tuple[int, int]]:
     return [result for result in once for _ in range(made.copies_per_result)]
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(
     ("name", "before"), [*((name, name) for name in ARCHITECTURES), ("folded", "parallel"), ("parallel", "folded")]
 )
@@ -63,6 +64,7 @@ def test_held_results_equal_the_model(name: str) -> None:
     assert run(made, codes, Pace()).results == expected(made, codes)
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(
     ("name", "restart"), [("parallel", 1), ("parallel", 18), ("folded", 1), ("folded", 18), ("serial", 7)]
 )
