@@ -110,7 +110,7 @@ def test_json_holds_figures_limits_and_sources() -> None:
 
 
 def test_motion_goes_to_a_csv_file() -> None:
-    options = "--irregularities low --seed 3 --sample-rate 50 --model linear".split()
+    options = ["--irregularities", "low", "--seed", "3", "--sample-rate", "50", "--model", "linear"]
     good("short.toml", "-o", "out/motion.csv", *options)
     with Path("out/motion.csv").open(newline="") as stream:
         header, *rows = csv.reader(stream)
