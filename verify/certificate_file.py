@@ -266,6 +266,8 @@ class StreamEntry(_Part):
 
 
 _Architecture = Literal["parallel", "folded", "serial", "online"]
+_Code = Annotated[int, Field(strict=True, ge=-(1 << 31), lt=1 << 32)]
+_Codes = tuple[_Code, _Code]
 _Count = Annotated[int, Field(strict=True, ge=1, le=1 << 12)]
 
 
@@ -274,7 +276,9 @@ class ItemEntry(_Part):
 
     `ahead` is the architecture of the calibration before a decimator, `samples` the number of samples of a beat, `hold`
     whether a result of a decimator leaves as often as samples enter, and `reload` whether constants can be loaded.
-    `flags` are the bits of ``tuser`` by their names.
+    `flags` are the bits of ``tuser`` by their names. `calibrated` is the lowest and the highest code of each input that
+    is not outside the calibration, empty if none is; `wear` the lowest codes of the output at which the wear is a
+    warning and critical, one pair for all channels or one for each, empty if wear is not judged.
     """
 
     core: Literal["instrument", "filter", "calibration"]
@@ -287,6 +291,8 @@ class ItemEntry(_Part):
     protect: Literal["none", "detect", "correct"]
     reload: Annotated[bool, Field(strict=True)]
     flags: dict[Text, Annotated[int, Field(strict=True, ge=0, lt=64)]]
+    calibrated: Annotated[tuple[_Codes, ...], Field(max_length=2)] = ()
+    wear: Annotated[tuple[_Codes, ...], Field(max_length=1 << 12)] = ()
     taken: StreamEntry
     given: StreamEntry
 

@@ -165,7 +165,8 @@ def about(design: CoreDesign, texts: Mapping[str, str]) -> AboutEntry:
 
 def _item(design: CoreDesign) -> ItemEntry:
     """Say what a core is, as its proof and its user need it."""
-    found, interface = design.architecture, core_facts(design).interface
+    found, interface, datapath = design.architecture, core_facts(design).interface, design.datapath
+    everything = tuple((port.lowest, port.highest) for port in datapath.inputs)
     return ItemEntry(
         core=design.core,
         architecture=found.name,
@@ -177,6 +178,8 @@ def _item(design: CoreDesign) -> ItemEntry:
         protect=found.protect,
         reload=found.reload,
         flags=dict(interface.outputs.flags),
+        calibrated=() if datapath.calibrated == everything else datapath.calibrated,
+        wear=datapath.wear,
         taken=_stream(interface.inputs),
         given=_stream(interface.outputs),
     )

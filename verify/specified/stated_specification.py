@@ -44,11 +44,14 @@ class Agreement:
         one, without unit; None without a filter.
     fitted : bool
         Whether the calibration is fitted to measurements: its coefficients are then not in the specification.
+    measurements : int
+        Number of measurements that it was fitted to again; 0 if it was not.
     """
 
     core: str
     distance: Fraction | None
     fitted: bool
+    measurements: int = 0
 
 
 def check_specification(certificate: Certificate, text: str, margin: Fraction, folder: Path = Path()) -> Agreement:

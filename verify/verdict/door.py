@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from sosmith.verify.around.cic import DecimatorVerdict, check_decimator
@@ -18,6 +18,7 @@ from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.parallel.check import HardwareVerdict, check_hardware
 from sosmith.verify.program.check import ProgramVerdict, check_program
 from sosmith.verify.reader.source import read_source
+from sosmith.verify.specified.calibration_fit import Refit, check_fit
 from sosmith.verify.specified.stated_specification import Agreement, check_specification
 from sosmith.verify.specified.words import words_of
 from sosmith.verify.verdict.generated_files import (
@@ -112,7 +113,7 @@ def _judged(
     agreement, core = None, None
     if stated is not None:
         progress("specification", 0, 0)
-        agreement, core = _held_against(certificate, item, stated, verdict)
+        agreement, core = _held_against(certificate, item, stated, verdict, progress)
     files, proofs, decimator = 0, None, None
     if folder is not None:
         progress("files", 0, 0)
@@ -126,10 +127,11 @@ def _judged(
 
 
 def _held_against(
-    certificate: Certificate, item: ItemEntry | None, stated: Stated, verdict: Verdict
+    certificate: Certificate, item: ItemEntry | None, stated: Stated, verdict: Verdict, progress: Progress
 ) -> tuple[Agreement, str]:
     agreement = check_specification(certificate, stated.text, verdict.margin, stated.folder)
     about = about_of(certificate)
+    refit: Refit | None = None
     check_text(about, stated.text)
     if agreement.fitted:
         require(
@@ -137,10 +139,12 @@ def _held_against(
             "the certificate must name the measurements that its calibration was fitted to",
         )
         assert stated.measurements is not None
-        check_measurements(about, stated.measurements)
+        progress("fit", 0, 0)
+        refit = check_fit(check_measurements(about, stated.measurements), certificate.ideal.polynomial or ())
+        agreement = replace(agreement, measurements=refit.rows)
     tree = words_of(stated.text)
     if item is not None:
-        check_stated(item, tree)
+        check_stated(certificate, item, tree, refit)
     found = core_of(certificate)
     if stated.core is not None:
         require(found == stated.core, f"the core must be {stated.core}, as asked for, not {found}")
@@ -168,7 +172,12 @@ def _files_proven(
     if item.architecture in {"folded", "serial"}:
         progress("program", 0, 0)
         behind = None if certificate.decimation is None else f"{certificate.name}_behind"
-        program = check_program(behind_decimator(text, certificate), at_lower_rate(certificate), top=behind)
+        program = check_program(
+            behind_decimator(text, certificate),
+            at_lower_rate(certificate),
+            calibrated=_calibrated(certificate, item) if behind is None else None,
+            top=behind,
+        )
     elif item.architecture == "parallel":
         progress("hardware", 0, 0)
         hardware = (
@@ -191,7 +200,13 @@ def _ahead(
         return check_ahead(text, certificate, item.channels)
     require(item.ahead in {"folded", "serial"}, "a calibration before a decimator must be parallel, folded or serial")
     progress("program of the calibration", 0, 0)
-    return check_program(module_in(text, certificate.name, alone.name), alone)
+    module = module_in(text, certificate.name, alone.name)
+    return check_program(module, alone, calibrated=_calibrated(certificate, item))
+
+
+def _calibrated(certificate: Certificate, item: ItemEntry) -> tuple[tuple[int, int], ...]:
+    """Return the codes of each input that are not outside the calibration."""
+    return item.calibrated or tuple((port.lowest, port.highest) for port in certificate.inputs)
 
 
 __all__ = ["Judgement", "RejectedError", "Stated", "judge"]

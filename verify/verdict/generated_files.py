@@ -87,8 +87,8 @@ def check_text(about: AboutEntry, text: str) -> None:
     )
 
 
-def check_measurements(about: AboutEntry, path: Path) -> None:
-    """Check that the file of measurements is the one that the calibration was fitted to.
+def check_measurements(about: AboutEntry, path: Path) -> bytes:
+    """Check that the file of measurements is the one that the calibration was fitted to, and return its bytes.
 
     Raises
     ------
@@ -96,7 +96,9 @@ def check_measurements(about: AboutEntry, path: Path) -> None:
         If it cannot be read, or was changed.
     """
     assert about.measurements is not None
-    _compare(str(path), about.measurements.sha256, content_of(path))
+    content = content_of(path)
+    _compare(str(path), about.measurements.sha256, content)
+    return content
 
 
 def core_text(path: Path) -> str:

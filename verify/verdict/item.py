@@ -7,12 +7,15 @@ the manifest, which programs read, against it, field by field. What stands in ne
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
+from fractions import Fraction
 from typing import Any
 
 from sosmith.verify.certificate_file import Certificate, FieldEntry, ItemEntry, PortEntry, StreamEntry
 from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.reader.syntax import Module
+from sosmith.verify.specified.calibration_fit import Refit
 from sosmith.verify.specified.words import table_of
 
 _BYTE = 8
@@ -60,9 +63,30 @@ def check_item(certificate: Certificate, item: ItemEntry) -> None:
     require(entry is not None or not item.hold, "hold of the item must not be stated without a decimator")
     require(item.channels == 1 or item.samples == 1, "several samples a clock must be those of one channel")
     _same("flags", item.flags, _STATUS)
+    _check_codes(certificate, item)
     dest = -(-(item.channels - 1).bit_length() // _BYTE) * _BYTE
     _check_stream("taken", item.taken, certificate.inputs, item.samples, dest, 0)
     _check_stream("given", item.given, (certificate.output,), item.samples, dest, _BYTE * item.samples)
+
+
+def _check_codes(certificate: Certificate, item: ItemEntry) -> None:
+    if item.calibrated:
+        require(len(item.calibrated) == len(certificate.inputs), "calibrated of the item must have codes of each input")
+        require(certificate.ideal.polynomial is not None, "calibrated of the item must be empty without a calibration")
+        for port, (low, high) in zip(certificate.inputs, item.calibrated, strict=True):
+            require(
+                port.lowest <= low <= high <= port.highest,
+                f"calibrated of the item must be codes of {port.name}, not {low}..{high}",
+            )
+    require(
+        len(item.wear) in {0, 1, item.channels},
+        f"wear of the item must be that of all channels or of each of {item.channels}, not of {len(item.wear)}",
+    )
+    for warning, critical in item.wear:
+        require(
+            certificate.output.lowest < warning < critical <= certificate.output.highest,
+            f"wear of the item must be codes of the output that rise, not {warning} and {critical}",
+        )
 
 
 def _check_stream(
@@ -87,8 +111,8 @@ def _same(what: str, stated: object, proven: object, state: str = "") -> None:
     require(stated == proven, f"{what} of the item must be {proven}, as in the certificate, not {stated}")
 
 
-def check_stated(item: ItemEntry, tree: Mapping[str, Any]) -> None:
-    """Check an item against the words of a specification, as a tree of TOML.
+def check_stated(certificate: Certificate, item: ItemEntry, tree: Mapping[str, Any], refit: Refit | None) -> None:
+    """Check an item against the words of a specification, as a tree of TOML, and what its measurements determine.
 
     Raises
     ------
@@ -97,11 +121,15 @@ def check_stated(item: ItemEntry, tree: Mapping[str, Any]) -> None:
     """
     hardware: Mapping[str, Any] = table_of(tree, "hardware")
     filter_: Mapping[str, Any] = table_of(tree, "filter")
+    covered = () if refit is None else refit.codes(certificate.inputs)
+    everything = tuple((port.lowest, port.highest) for port in certificate.inputs)
     stated: dict[str, object] = {
         "channels": tree.get("channels", 1),
         "protect": hardware.get("protect", "none"),
         "reload": hardware.get("reload", False),
         "samples": hardware.get("samples_per_clock", 1),
+        "calibrated": () if covered == everything else covered,
+        "wear": _wear_codes(table_of(tree, "wear"), certificate.output),
     }
     if item.core != "calibration":
         stated |= {"start": hardware.get("start", "steady"), "hold": filter_.get("hold", False)}
@@ -111,6 +139,37 @@ def check_stated(item: ItemEntry, tree: Mapping[str, Any]) -> None:
     for key, value in stated.items():
         found = getattr(item, key)
         require(found == value, f"{key} of the item must be {value}, as specified, not {found}")
+
+
+def _wear_codes(table: Mapping[str, Any], output: PortEntry) -> tuple[tuple[int, int], ...]:
+    """Return the lowest codes at which wear is a warning and critical; one pair if all channels have the same."""
+    pairs = [
+        (math.ceil((warning - output.zero) / output.lsb), math.ceil((critical - output.zero) / output.lsb))
+        for warning, critical in wear_limits(table)
+    ]
+    return tuple(pairs[:1] if len(set(pairs)) == 1 else pairs)
+
+
+def wear_limits(table: Mapping[str, Any]) -> list[tuple[Fraction, Fraction]]:
+    """Return the clearances of ``[wear]`` at which wear is a warning and critical: of all channels, or of each.
+
+    Raises
+    ------
+    RejectedError
+        If a word is missing, or no number.
+    """
+    if not table:
+        return []
+    try:
+        words = table["initial"]
+        initial = [Fraction(word) for word in (words if isinstance(words, list) else [words])]
+        warning, limit = Fraction(table["warning"]), Fraction(table["limit"])
+        ends = [limit + each for each in initial]
+        if "sensor_range" in table:
+            ends = [min(end, Fraction(table["sensor_range"])) for end in ends]
+    except (KeyError, TypeError, ValueError, OverflowError):
+        raise RejectedError("wear of the specification must be its limits") from None
+    return [(each + warning, end) for each, end in zip(initial, ends, strict=True)]
 
 
 def whole_core(tree: Mapping[str, Any]) -> str:

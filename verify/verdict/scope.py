@@ -88,8 +88,9 @@ def _specified(
         asked = core in {"instrument", "calibration"}
         calibration = Part(State.NOT_READ, "the certificate is that of a core without a calibration", asked=asked)
     elif agreement.fitted:
-        why = "its coefficients are not fitted again to the measurements, which are held by their SHA-256 alone"
-        calibration = Part(State.PARTIAL, why)
+        rows = agreement.measurements
+        why = f"its coefficients are the least squares of {rows} measurements, solved exactly{unstated}"
+        calibration = Part(state, why)
     else:
         calibration = Part(state, f"its coefficients are those of the specification{unstated}")
     return {"filter": filter_, "calibration": calibration}

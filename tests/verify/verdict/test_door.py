@@ -23,8 +23,23 @@ from sosmith.verify.graph import RejectedError
 from sosmith.verify.verdict.scope import State
 
 Tree = dict[str, Any]
+MEASURED = (
+    STEADY_INSTRUMENT.replace(
+        "calibration.coefficients = [[1.16, -0.0036], [0.3672, 0.0006618], [0.05812]]", 'calibration.data = "m.csv"'
+    )
+    + "wear = { initial = 1.0, warning = 2.5, limit = 3.0 }\n"
+)
+"""A calibration from the measurements in a file beside it, and limits of wear."""
+
 PARALLEL = STEADY + 'hardware.architecture = "parallel"\n'
 FOLDED = STEADY + 'hardware.architecture = "folded"\n'
+
+
+def measured(further: float) -> str:
+    """Measurements of a sensor that is `further` mm away."""
+    points = [(v, t) for v in (1.5, 3.25, 4.5, 6.0, 8.5) for t in (20.0, 41.5, 60.0, 97.0)]
+    rows = [f"{round(1.2 + further + 0.4 * v + 0.001 * v * t, 4)},{v},{t}\n" for v, t in points]
+    return "clearance_mm,voltage_V,temperature_C\n" + "".join(rows)
 
 
 @pytest.fixture(scope="module")
@@ -36,6 +51,7 @@ def cores(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, str | None
             folder = known[text, core] = tmp_path_factory.mktemp("core")
             spec = folder / "spec.toml"
             spec.write_text(text, encoding="utf-8")
+            (folder / "m.csv").write_text(measured(0.0), encoding="utf-8")
             generate(design_core(load(spec), core=core), folder)
         return known[text, core]
 
@@ -214,3 +230,42 @@ def test_broken_words_are_a_sentence(words: str, copy: Callable[..., Path]) -> N
     path = forge(copy(PARALLEL), lambda tree: tree["about"].update(specification=words))
     with pytest.raises(RejectedError, match=r"^the specification must be TOML$"):
         proof(path)
+
+
+def test_a_calibration_is_fitted_again(copy: Callable[..., Path]) -> None:
+    folder = copy(MEASURED, "calibration")
+    (path,) = folder.glob("*.certificate.json")
+    found = proof(path, spec=True, core="calibration")
+    assert found.scope["calibration"].state is State.PROVEN
+    assert found.agreement is not None
+    assert found.agreement.measurements == 20
+
+    def other(tree: Tree) -> None:
+        content = measured(0.4)
+        (folder / "m.csv").write_text(content, encoding="utf-8")
+        tree["about"]["measurements"]["sha256"] = hashlib.sha256(content.encode()).hexdigest()
+
+    with pytest.raises(
+        RejectedError, match=r"^coefficient \[0\]\[0\] .* must be 1\.34\d*, as fitted .*, not 0\.94\d*$"
+    ):
+        proof(forge(folder, other), spec=True)
+
+
+@pytest.mark.parametrize(
+    ("fields", "sentence"),
+    [
+        ({"wear": [[897, 1025]]}, r"wear of the item must be \(\(896, 1024\),\), as specified, not .*"),
+        ({"wear": []}, r"wear of the item must be \(\(896, 1024\),\), as specified, not \(\)"),
+        (
+            {"wear": [[896, 1024], [896, 1024]]},
+            "wear of the item must be that of all .* each of 1, not of 2",
+        ),
+        ({"wear": [[1024, 896]]}, "wear of the item must be codes of the output that rise, not 1024 and 896"),
+        ({"calibrated": []}, r"(calibrated of the item must be .*, as specified|the program must judge .*), not .*"),
+        ({"calibrated": [[0, 5000], [0, 9]]}, r"calibrated of the item must be codes of voltage, not 0\.\.5000"),
+        ({"calibrated": [[0, 5]]}, "calibrated of the item must have codes of each input"),
+    ],
+)
+def test_what_is_flagged_is_what_is_specified(fields: Tree, sentence: str, copy: Callable[..., Path]) -> None:
+    with pytest.raises(RejectedError, match=f"^{sentence}$"):
+        proof(forge(copy(MEASURED, "calibration"), item(**fields)), spec=True)

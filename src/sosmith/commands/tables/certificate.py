@@ -82,7 +82,12 @@ def _print_hardware(console: TableConsole, what: str, found: HardwareVerdict) ->
 def _agreement(agreement: Agreement) -> str:
     parts = ["ports and allowed error"]
     if agreement.core != "filter":
-        parts.append("the measurements by their SHA-256, without a new fit," if agreement.fitted else "calibration")
+        fitted = (
+            f"calibration, fitted again to {agreement.measurements} measurements,"
+            if agreement.fitted
+            else "calibration"
+        )
+        parts.append(fitted)
     if agreement.distance is not None:
         parts.append(f"filter within a peak gain of {float(agreement.distance):.1e} of its words")
     return f"{', '.join(parts[:-1])} and {parts[-1]}" if len(parts) > 1 else parts[0]
