@@ -65,6 +65,7 @@ def test_a_build_prints_cells_and_timing_and_writes_its_files(programs: dict[str
     assert json.loads(told.stdout)["passed"] is True
 
 
+@pytest.mark.slow
 def test_a_core_that_is_too_slow_at_the_clock_of_the_board_is_noted(programs: dict[str, str]) -> None:
     Path("fast.toml").write_text(SPEC.format(rate=1e6), encoding="utf-8")
     result = BUILD.good("fast.toml", "--board", "icestick")
@@ -72,6 +73,7 @@ def test_a_core_that_is_too_slow_at_the_clock_of_the_board_is_noted(programs: di
     assert "samples a second per channel, not 1,000,000\n" in result.stderr
 
 
+@pytest.mark.slow
 def test_timing_that_does_not_close_is_told_with_its_path(
     monkeypatch: pytest.MonkeyPatch, programs: dict[str, str]
 ) -> None:
@@ -119,6 +121,7 @@ def test_a_design_for_a_board_shows_what_it_takes_there_and_builds_it_once(
     assert told["bitstream"]["file"] == "plain_board_icestick.bin"
 
 
+@pytest.mark.slow
 def test_a_project_for_a_vendors_tools_says_that_nothing_was_built(programs: dict[str, str]) -> None:
     result = BUILD.good("plain.toml", "--board", "cmod_s7")
     assert "plain on CMOD S7" in result.stdout

@@ -182,6 +182,7 @@ def test_an_older_version_can_be_exported() -> None:
     refused("the version of sensor sensor must be 1 to 2, not 3", "export", "--version", "3")
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(1)
 @pytest.mark.parametrize(("name", "start"), [("p.svg", b"<?xml"), ("p.png", b"\x89PNG")])
 def test_plots_are_the_same_bytes_twice(name: str, start: bytes) -> None:

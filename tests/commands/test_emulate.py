@@ -80,6 +80,7 @@ def test_the_list_tells_about_files(folder: Path) -> None:
     assert "a scenario file can be given instead of a name: sosmith init --list names examples" in listed.stderr
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

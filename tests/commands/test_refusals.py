@@ -153,6 +153,7 @@ def test_what_does_not_fit_is_refused(arguments: tuple[str, ...], message: str, 
 # Bad specifications and files.
 
 
+@pytest.mark.sweep(70)
 @pytest.mark.parametrize(("old", "new", "sentence"), [pytest.param(*case, id=subject) for subject, *case in BAD])
 def test_a_bad_specification_ends_with_one_sentence(old: str, new: str, sentence: str, sosmith: Command) -> None:
     Path("spec.toml").write_text(with_fault(old, new), encoding="utf-8")

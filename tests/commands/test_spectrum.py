@@ -85,6 +85,7 @@ def test_the_copy_of_a_specification_designs_to_what_was_proposed() -> None:
     assert proposal["filter"] == new["filter"]
 
 
+@pytest.mark.slow
 def test_two_runs_write_the_same_bytes() -> None:
     for name in ("a", "b"):
         good("ramp.csv", "-o", f"{name}/f.toml", "--plot", f"{name}/f.svg")

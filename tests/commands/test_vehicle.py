@@ -26,6 +26,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 def test_it_answers_in_half_a_screen() -> None:
     result = good("short.toml")
     shown = re.sub(r" {2,}", "  ", result.stdout)

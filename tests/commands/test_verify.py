@@ -169,6 +169,7 @@ def test_a_certificate_without_a_subject_cannot_be_held_against_one(folder: Path
         )
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(1)
 @pytest.mark.parametrize("core", ["filter", "instrument"])
 def test_the_decimator_of_several_channels_is_read(core: str, tmp_path: Path) -> None:
@@ -191,6 +192,7 @@ def test_a_decimated_instrument_in_parallel_is_proven_whole(tmp_path: Path) -> N
     assert "proven: hardware: " in table
 
 
+@pytest.mark.slow
 def test_a_decimated_instrument_has_two_programs(tmp_path: Path) -> None:
     generate(small(), tmp_path)
     path = str(tmp_path / "slight.certificate.json")

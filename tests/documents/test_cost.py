@@ -136,6 +136,7 @@ def test_what_goals_are_about_is_recorded_and_what_is_not_is_told() -> None:
     assert "| audio_lowpass folded | ECP5 LFE5U-25F, speed 6 | fmax, MHz | at least 100 | - | not measured |" in text
 
 
+@pytest.mark.slow
 def test_figures_of_an_earlier_version_are_told() -> None:
     record = json.loads(cost_cores.RECORD.read_text(encoding="utf-8"))
     core = cost_cores.CORES[0]

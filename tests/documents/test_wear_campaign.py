@@ -71,6 +71,7 @@ def test_the_figures_of_methods_are_those_of_the_recorded_seeds() -> None:
             assert row["accuracy"][method] == pytest.approx(expected, rel=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [4, pytest.param(8, marks=pytest.mark.slow)])
 def test_methods_give_the_recorded_figures_again(number: int, tmp_path: Path) -> None:
     """The first seeds of a bench, and of a week with the coil."""
@@ -208,6 +209,7 @@ def test_every_reload_is_proven_or_refused_with_its_reason() -> None:
         assert one["bound"] <= float(week.SET_ERROR)
 
 
+@pytest.mark.slow
 def test_a_refused_reload_keeps_the_active_set(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """With the hardware's own limit for its sets, some mornings are refused; each swap starts from the last proven."""
     scenario = load_scenario(campaign.SCENARIOS / "a_week_in_service.toml")

@@ -78,6 +78,7 @@ CASES = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(1)
 @pytest.mark.parametrize(("low", "high", "drop", "limits"), CASES)
 def test_quantizers_are_what_they_are_called(
@@ -109,6 +110,7 @@ def test_a_broken_quantizer_is_found_out(right: str, wrong: str, tmp_path: Path)
     assert prove(Quantizers(on_broken_logic(right, wrong), *CASES[0]), tmp_path) == "FAIL"
 
 
+@pytest.mark.slow
 def test_a_broken_limit_of_whole_bits_is_found_out(tmp_path: Path) -> None:
     module = on_broken_logic("top & ~value[bits:-1].all()", "top & ~value[bits + 1 : -1].all()")
     assert prove(Quantizers(module, *CASES[1]), tmp_path) == "FAIL"

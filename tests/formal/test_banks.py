@@ -70,10 +70,12 @@ class OneBank(Proof):
             m.d.comb += [Assert(bank == before), Assert(~written)]
 
 
+@pytest.mark.slow
 def test_a_sample_in_work_keeps_its_bank(tmp_path: Path) -> None:
     assert prove(OneBank(broken(folded, "kept.eq(port.bank)", "kept.eq(port.bank)")), tmp_path) == "PASS"
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("right", "wrong"),
@@ -86,6 +88,7 @@ def test_a_core_that_mixes_banks_is_found_out(right: str, wrong: str, tmp_path: 
     assert prove(OneBank(broken(folded, right, wrong)), tmp_path) == "FAIL"
 
 
+@pytest.mark.slow
 def test_the_reload_port_writes_free_banks_only(tmp_path: Path) -> None:
     assert prove(WritesFreeBanks(reload.ReloadPort(1, bits=1)), tmp_path) == "PASS"
 

@@ -38,6 +38,7 @@ def rules(
     return BlockRules(design, latency + 1, patience=latency, datapath=datapath if order else None)
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("datapath", "lanes", "ahead"),
@@ -58,6 +59,7 @@ def test_longer_turns_keep_the_rules_and_every_sample(turns: int, lanes: int, tm
     assert prove(rules(distant(turns), lanes, ahead=True), tmp_path, timeout=2400) == "PASS"
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("right", "wrong"),

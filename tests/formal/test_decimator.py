@@ -107,22 +107,26 @@ def small(factor: int = 2, stages: int = 1, dropped: int = 1) -> Decimator:
     return Decimator(input=port, factor=factor, stages=stages, dropped=dropped)
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(1)
 @pytest.mark.parametrize("dropped", [0, 1])
 def test_results_are_moving_sums(dropped: int, tmp_path: Path) -> None:
     assert prove(MovingSums(small(dropped=dropped), hardware, values=True), tmp_path) == "PASS"
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(1)
 @pytest.mark.parametrize(("factor", "stages"), [(2, 3), (4, 2)])
 def test_no_result_is_lost_or_changed_on_its_way(factor: int, stages: int, tmp_path: Path) -> None:
     assert prove(MovingSums(small(factor, stages), hardware, values=False), tmp_path) == "PASS"
 
 
+@pytest.mark.slow
 def test_flags_that_come_with_samples_are_gathered(tmp_path: Path) -> None:
     assert prove(MovingSums(small(), hardware, values=True, flags=2), tmp_path) == "PASS"
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("right", "wrong"),

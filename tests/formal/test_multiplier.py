@@ -113,14 +113,17 @@ def multiplication(module: ModuleType = folded, digit_bits: int = DIGIT_BITS, *,
     return Multiplication(SerialMultiplier(module, digit_bits), whole=whole)
 
 
+@pytest.mark.slow
 def test_the_serial_multiplier_adds_up_its_partial_products(tmp_path: Path) -> None:
     assert prove(multiplication(), tmp_path, INDUCTION) == "PASS"
 
 
+@pytest.mark.slow
 def test_a_short_serial_multiplier_multiplies(tmp_path: Path) -> None:
     assert prove(multiplication(digit_bits=SHORT_DIGIT_BITS, whole=True), tmp_path, INDUCTION) == "PASS"
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("right", "wrong"),

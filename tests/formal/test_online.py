@@ -85,6 +85,7 @@ class Invariant(Proof):
             m.d.comb += Assert(d.value == exact - 4 * quarter * d.digit)
 
 
+@pytest.mark.slow
 def test_the_residual_is_exact_and_stays_in_its_range(tmp_path: Path) -> None:
     assert prove(Invariant(ResidualAlone(residual)), tmp_path, INDUCTION) == "PASS"
 
@@ -96,6 +97,7 @@ FAULTS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(1)
 @pytest.mark.parametrize("fault", FAULTS.values(), ids=FAULTS)
 def test_a_fault_is_found(fault: tuple[str, str], tmp_path: Path) -> None:
@@ -163,6 +165,7 @@ def test_a_core_that_computes_something_else_is_found_out(
     assert prove(core_rules(computes=True), tmp_path, timeout=1200) == "FAIL"
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("right", "wrong"),

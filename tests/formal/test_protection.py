@@ -64,12 +64,14 @@ class OneUpset(StreamRules):
                 m.d.comb += Assert(~self.excused)
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(1)
 @pytest.mark.parametrize("upsets", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_what_has_no_flag_is_right(upsets: bool, tmp_path: Path) -> None:
     assert prove(OneUpset(upsets=upsets), tmp_path) == "PASS"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("in_core", "in_stage"),
     [

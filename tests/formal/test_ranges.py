@@ -82,6 +82,7 @@ def test_a_section_of_three_bits_stays_in_its_ranges(tmp_path: Path) -> None:
     assert prove(StatedRanges(proven_section(bits=3, y_frac=0)), tmp_path, timeout=1800) == "PASS"
 
 
+@pytest.mark.slow
 def test_a_range_that_is_one_too_narrow_is_found_out(tmp_path: Path) -> None:
     assert prove(StatedRanges(resonator(-6, 5).stages[0]), tmp_path) == "FAIL"
 

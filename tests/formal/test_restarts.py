@@ -69,6 +69,7 @@ def test_a_parallel_core_begins_anew(tmp_path: Path) -> None:
     assert prove(RestartRules(broken(core, "swap.may.eq(parts.empty)", "swap.may.eq(parts.empty)")), tmp_path) == "PASS"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [
@@ -83,6 +84,7 @@ def test_a_parallel_core_that_keeps_states_or_lets_samples_in_is_found_out(
     assert prove(RestartRules(broken(core, right, wrong)), tmp_path) == "FAIL"
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(1)
 @pytest.mark.parametrize("serial", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_a_folded_core_begins_anew(serial: bool, tmp_path: Path) -> None:
@@ -90,6 +92,7 @@ def test_a_folded_core_begins_anew(serial: bool, tmp_path: Path) -> None:
     assert prove(RestartRules(module, is_folded=True, serial=serial), tmp_path) == "PASS"
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(2)
 @pytest.mark.parametrize(
     ("right", "wrong"),

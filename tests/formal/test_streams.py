@@ -53,6 +53,7 @@ def test_the_output_buffer_keeps_the_rules_and_every_word(tmp_path: Path) -> Non
     assert prove(buffer_rules(), tmp_path) == "PASS"
 
 
+@pytest.mark.slow
 def test_the_parallel_core_keeps_the_rules_and_computes_its_recursion(tmp_path: Path) -> None:
     assert prove(core_rules(), tmp_path) == "PASS"
 
@@ -62,6 +63,7 @@ def test_a_core_of_three_pipeline_stages_computes_its_recursion(tmp_path: Path) 
     assert prove(core_rules(datapath=resonator()), tmp_path, timeout=1200) == "PASS"
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(1)
 @pytest.mark.parametrize("serial", [False, True])
 def test_the_folded_core_keeps_the_rules(serial: bool, tmp_path: Path) -> None:
@@ -98,6 +100,7 @@ def channel_rules(module: ModuleType, serial: bool | None = None) -> StreamRules
     return StreamRules(design, 1, source_waits=True)
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(1)
 @pytest.mark.parametrize(("module", "serial"), [(core, None), (folded, False), (folded, True)])
 def test_channels_stay_with_their_samples(module: ModuleType, serial: bool | None, tmp_path: Path) -> None:
@@ -182,6 +185,7 @@ def test_a_latency_that_is_too_short_is_found_out(make: Callable[[], StreamRules
     assert prove(rules, tmp_path) == "FAIL"
 
 
+@pytest.mark.slow
 def test_a_limit_without_a_sign_is_found_out(tmp_path: Path) -> None:
     module = broken(folded, "cut.as_signed() if output.signed else cut", "cut")
     assert prove(folded_rules(module, serial=True, datapath=limiter()), tmp_path) == "FAIL"

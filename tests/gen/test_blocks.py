@@ -125,6 +125,7 @@ def test_auto_keeps_plain_loops_where_look_ahead_is_no_faster() -> None:
     assert (made.architecture.samples_per_clock, made.quantized.realization) == (16, "df1_ef2")
 
 
+@pytest.mark.slow
 def test_formats_of_long_responses_are_not_trimmed(monkeypatch: pytest.MonkeyPatch) -> None:
     """They are proven as they are found first, and take a little more."""
     trimmed = designed()
@@ -204,6 +205,7 @@ def test_a_core_gives_the_codes_and_flags_of_the_model(lanes: int, pipeline: str
     assert {beat.status & 1 for beat in found} == {0, 1}
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("lanes", [2, 4])
 def test_an_instrument_takes_several_samples_a_clock(lanes: int) -> None:
     bench = (EXAMPLES / "flange_wear_bench.toml").read_text(encoding="utf-8")
@@ -221,6 +223,7 @@ def proven(made: CoreDesign) -> Certificate:
     return Certificate.model_validate(json.loads(certificate_text(certificate(made.quantized, made.spec.max_error))))
 
 
+@pytest.mark.slow
 def test_the_verifier_proves_look_ahead_by_its_own_method() -> None:
     proof = proven(designed())
     verify(proof)

@@ -55,6 +55,7 @@ def test_a_session_begins_with_a_first_sample() -> None:
             assert board.run_codes(codes[:count]).codes.tolist() == held(codes[:count])[0].tolist()
 
 
+@pytest.mark.slow
 def test_the_accuracy_suite_takes_each_result_once(tmp_path: Path) -> None:
     made = design_of("held")
     traces = traces_for(made.core, "sweep", seed=1, seconds=0.202)

@@ -49,6 +49,7 @@ def differences(folder: Path, *subjects: str) -> list[str]:
     return [path for other in others for path in sorted({*first, *other}) if first.get(path) != other.get(path)]
 
 
+@pytest.mark.slow
 def test_a_filter_is_the_same_everywhere(tmp_path: Path) -> None:
     assert differences(tmp_path, "elliptic_band_pass") == []
 

@@ -164,6 +164,7 @@ def test_the_folder_is_the_users_cache(tmp_path: Path, monkeypatch: pytest.Monke
     assert cache_folder() is None
 
 
+@pytest.mark.slow
 def test_a_core_built_elsewhere_is_not_built_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In the user's own cache, for the sake of the library; the text of the core is new to it."""
     text = f"/* {tmp_path} {os.getpid()} */\n{SOUND}"

@@ -53,7 +53,7 @@ def test_a_sound_core_passes(simulator: str, tmp_path: Path) -> None:
     assert seen[-1] == (300, 300)
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("idle_and_stall", [(0.0, 0.0), (0.9, 0.0), (0.0, 0.9), (0.6, 0.6)])
 def test_any_pace(idle_and_stall: tuple[float, float], tmp_path: Path) -> None:
     idle, stall = idle_and_stall
@@ -110,11 +110,13 @@ def test_an_unchanged_core_is_not_built_again(tmp_path: Path) -> None:
     assert (result.codes == stimulus(20) + 4).all()
 
 
+@pytest.mark.slow
 def test_a_waveform_on_request(tmp_path: Path) -> None:
     run(write(tmp_path), stimulus(20), build_dir=tmp_path, simulator="verilator", waves=True)
     assert list((tmp_path / "verilator").rglob("*.vcd"))
 
 
+@pytest.mark.slow
 def test_two_runs_side_by_side(tmp_path: Path) -> None:
     results: dict[str, np.ndarray] = {}
 

@@ -145,6 +145,7 @@ WRONG = {
 """What stands in the models, what in its place is wrong, and the outputs that must show it."""
 
 
+@pytest.mark.slow
 def test_wrong_models_are_found(netlist: Netlist, tmp_path: Path) -> None:
     models = with_cell_models(netlist, scrambled=False).read_text(encoding="utf-8")
     expected: set[str] = set()

@@ -73,7 +73,7 @@ def test_the_kinds_are_those_of_the_designs(example: str) -> None:
     assert KIND[example] == bench_of(parallel_design(example), errors=False).kind
 
 
-@pytest.mark.sweep(3)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(("example", "scenario"), EVERY)
 def test_hardware_equals_the_integer_model(example: str, scenario: str, run_of: Callable[[str, str], Run]) -> None:
     evidence, report = run_of(example, scenario)
@@ -90,7 +90,7 @@ def test_hardware_equals_the_integer_model(example: str, scenario: str, run_of: 
         assert abs(accuracy["hardware"] - accuracy["golden"]) < 0.01
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("example", ALL)
 def test_worst_cases_stay_within_the_proof(example: str, run_of: Callable[[str, str], Run]) -> None:
     """The inputs that drive the filter, and the way of every rounding error, furthest: hardware and exact graph."""
@@ -131,7 +131,7 @@ MEASURED = [
 ]
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(("example", "scenario"), MEASURED)
 def test_accuracy_is_printed_for_every_run_of_the_instruments(
     example: str, scenario: str, run_of: Callable[[str, str], Run]
@@ -250,7 +250,7 @@ def spoil_emitted_file(spoil: Callable[[str], str], monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(simulation, "generate", spoiled)
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(("example", "spoil"), WRONG.values(), ids=WRONG)
 def test_a_wrong_bit_in_the_hardware_is_found(
     example: str, spoil: Callable[[str], str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -272,6 +272,7 @@ def test_a_wrong_bit_in_the_hardware_is_found(
     assert sentence in report["shortfalls"]
 
 
+@pytest.mark.slow
 def test_a_state_that_moves_in_idle_clocks_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its results hang on the handshakes, which the bench notices before any value is compared."""
     spoil_emitted_file(replaced("else if (take1) v1 <=", "else if (advance) v1 <="), monkeypatch)

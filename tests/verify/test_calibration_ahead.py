@@ -49,6 +49,7 @@ def test_the_locomotive_is_proven_again() -> None:
     assert agreement.distance < 2**-100
 
 
+@pytest.mark.slow
 def test_a_result_that_leaves_as_it_is_given_is_found() -> None:
     case = Instrument(signed=True)
     alone = calibration_alone(designed(case)[1])
@@ -61,6 +62,7 @@ def test_a_result_that_leaves_as_it_is_given_is_found() -> None:
         check_program(narrow, alone)
 
 
+@pytest.mark.slow
 def test_both_programs_are_proven_from_the_text(tmp_path: Path) -> None:
     made = locomotive(architecture="folded", core="instrument")
     generate(made, tmp_path)
@@ -80,6 +82,7 @@ def test_both_programs_are_proven_from_the_text(tmp_path: Path) -> None:
     assert proof.files == proof.rebuilt == 5
 
 
+@pytest.mark.slow
 def test_another_program_of_the_calibration_is_rejected(tmp_path: Path) -> None:
     """Text and certificate are those of two cores, which differ in a coefficient of the calibration alone."""
     made = small("[hardware]\narchitecture = 'folded'\n")

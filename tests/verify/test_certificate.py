@@ -55,6 +55,7 @@ def test_the_file_has_a_name_for_every_operation() -> None:
     assert {operation.value for operation in Operation} == {op.value for op in Op}
 
 
+@pytest.mark.sweep(5)
 @pytest.mark.parametrize("realization", REALIZATIONS)
 @pytest.mark.parametrize(
     "name", [name if name != LOCOMOTIVE else pytest.param(name, marks=pytest.mark.slow) for name in ALL]
@@ -193,7 +194,7 @@ def test_verification_has_nothing_in_common_with_the_proof() -> None:
 # Any number that matters.
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("realization", ["df1_ef2", "delta"])
 def test_one_unit_off_in_any_number_is_rejected(realization: str) -> None:
     tree = tree_of(BENCH, realization)
@@ -204,6 +205,7 @@ def test_one_unit_off_in_any_number_is_rejected(realization: str) -> None:
     assert wrongly_accepted(tree, [chosen[k] for k in picks]) == []
 
 
+@pytest.mark.slow
 def test_one_unit_off_in_a_graph_is_rejected_in_the_larger_examples() -> None:
     for name, count in (("audio_lowpass.toml", 60), (LOCOMOTIVE, 6)):
         tree = tree_of(name)

@@ -167,6 +167,7 @@ def test_a_smaller_part_of_the_budget_is_rejected() -> None:
         verify(read(changed))
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [

@@ -34,6 +34,7 @@ from sosmith.verify.verification import verify
 # What is right is proven.
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("kind", ["lowpass", "highpass", "bandpass", "bandstop"])
 @pytest.mark.parametrize(
     "realization",
@@ -222,6 +223,7 @@ def test_the_start_is_that_of_the_specification() -> None:
 # In the hardware.
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("channels", [1, 3])
 @pytest.mark.parametrize("realization", ["df1_ef1", "df2t"])
 def test_parallel_hardware(realization: str, channels: int) -> None:
@@ -232,6 +234,7 @@ def test_parallel_hardware_of_an_example() -> None:
     parallel(steady_design("audio_lowpass.toml", architecture="parallel")).check()
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("architecture", ["folded", "serial"])
 def test_programs(architecture: str) -> None:
     small_folded(STEADY, architecture).check()

@@ -36,6 +36,7 @@ def edges(*values: float) -> tuple[Fraction, ...]:
     return tuple(Fraction(v) for v in values)
 
 
+@pytest.mark.sweep(60)
 @pytest.mark.parametrize("order", range(1, 11))
 @pytest.mark.parametrize("kind", ["lowpass", "highpass", "bandpass", "bandstop"])
 @pytest.mark.parametrize("family", ["butterworth", "chebyshev1", "chebyshev2", "elliptic", "bessel"])

@@ -91,6 +91,7 @@ def test_a_program_that_fails_is_named_with_its_words(install: Install) -> None:
         build(TOP, "tiny", find_board("icestick"))
 
 
+@pytest.mark.slow
 def test_files_of_a_build_and_what_they_say(install: Install, tmp_path: Path) -> None:
     install()
     design = filter_design()

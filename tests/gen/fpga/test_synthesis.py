@@ -22,6 +22,7 @@ def write(folder: Path, text: str = CORE) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_a_netlist_is_made_once(tmp_path: Path) -> None:
     source = write(tmp_path / "a folder with spaces")
     folder = source.parent / "gates"

@@ -106,6 +106,7 @@ def test_script_and_constraints_are_tcl(made: Project, tmp_path: Path) -> None:
         assert file in made.files[f"{made.name}.tcl"] or file.endswith(".tcl")
 
 
+@pytest.mark.slow
 def test_the_verilog_is_clean(tmp_path: Path) -> None:
     core = filter_design().core
     board, top = BOARDS["cmod_s7"], top_name(core)

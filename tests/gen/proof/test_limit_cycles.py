@@ -75,6 +75,7 @@ def test_plain_direct_form_is_stuck() -> None:
         assert 0 < amplitude <= limit_cycles(graph).largest
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize("realization", ["df1_ef1", "df1_ef2"])
 @pytest.mark.parametrize("level", [1000.3, -7.5, 0.7])
 def test_error_feedback_follows_a_constant(realization: str, level: float) -> None:
@@ -135,6 +136,7 @@ def rotation(kind: str) -> Graph:
     return g.build([x1])
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(
     ("kind", "none"),
     [("truncated", True), ("rounded", False), ("one rounded", False), ("floored product", False), ("offset", False)],

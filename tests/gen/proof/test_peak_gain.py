@@ -144,6 +144,7 @@ def sections(draw: st.DrawFn) -> Section:
     return dyadic(*b), dyadic(1, -2 * radius * math.cos(angle), radius * radius)
 
 
+@pytest.mark.slow
 @given(st.lists(sections(), min_size=1, max_size=3))
 @settings(max_examples=60, deadline=None, derandomize=True)
 def test_brute_force_and_the_second_method_agree(cascade: list[Section]) -> None:

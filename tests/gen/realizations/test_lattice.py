@@ -123,6 +123,7 @@ UNFIT = {
 }
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("name", FITTING)
 def test_given_sections_that_fit(name: str) -> None:
     quantized = plain(FITTING[name], "lattice_wdf")

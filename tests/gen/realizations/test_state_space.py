@@ -161,6 +161,7 @@ def test_energy_is_that_of_the_impulse_response(name: str) -> None:
     assert companion(row).energy == pytest.approx(np.sum(response**2), rel=1e-6)
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("structure", JENSSEN)
 def test_published_noise_of_a_cascade(structure: str) -> None:
     """The published figures again: gain and estimate to the last printed digit, simulation within a tenth.

@@ -137,6 +137,7 @@ def test_the_transient_is_what_the_hardware_flags_at_the_beginning() -> None:
 # the page
 
 
+@pytest.mark.slow
 def test_the_measurement_comes_first_and_the_speed_last(words: str) -> None:
     titles = ("Passed", "The measurement", "The arithmetic", "The simulation", "Evidence date", "The measured signal")
     places = [words.index(title) for title in titles]
@@ -167,6 +168,7 @@ def test_errors_have_one_unit(words: str) -> None:
     assert "df1 400,000 1,638 100,000" in words
 
 
+@pytest.mark.slow
 def test_settling_is_shaded(words: str) -> None:
     assert "settled after" in words
     shaded = words_of(evidence(settling=SettlingFacts(samples=1250, seconds=12.5, limit=LSB / 2)))

@@ -215,6 +215,7 @@ def test_of_several_architectures_the_cheapest_of_the_smallest_is_taken() -> Non
     assert choose([accurate, failing], NAMES).reason == "a is the only one of 2 that passes."
 
 
+@pytest.mark.slow
 def test_reports_of_earlier_versions_need_not_tell_their_architecture() -> None:
     untold = {key: value for key, value in report(**{"error.bound": 0.0001}).items() if key != "architecture"}
     choice = choose([untold, folded(100, 0.0002)], NAMES)
@@ -223,6 +224,7 @@ def test_reports_of_earlier_versions_need_not_tell_their_architecture() -> None:
     assert "<svg" in comparison_page([untold, folded(100, 0.0002)], [])
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(1)
 @pytest.mark.parametrize("extreme", [5e-324, 1e-300, 1e300])
 def test_extreme_errors_are_drawn(extreme: float) -> None:
@@ -402,6 +404,7 @@ def test_page() -> None:
     assert not re.search(r"https?:|url\((?!#)|@import|<script", content)
 
 
+@pytest.mark.slow
 def test_page_escapes_names() -> None:
     page = Words(comparison_page([report(name="<script>&amp;"), report(simulator="<script>")]))
     assert "script" not in page.tags

@@ -82,6 +82,7 @@ def agrees(name: str, graph: Graph) -> bool:
     return True
 
 
+@pytest.mark.sweep(4)
 @pytest.mark.parametrize("realization", [name for name in REALIZATIONS if name != "auto"])
 def test_equations_compute_what_the_graph_computes(realization: str) -> None:
     made = example_design("flange_wear_bench.toml", core="filter", realization=realization).quantized
@@ -114,6 +115,7 @@ def test_the_diagram_has_every_name_gain_and_coefficient() -> None:
     assert diagram(SMALLEST) == diagram(SMALLEST)
 
 
+@pytest.mark.slow
 def test_the_page_shows_it() -> None:
     page = Page(page_of(evidence(recursions=(SMALLEST,))))
     assert "section0 as realized, df1_ef2" in page.words

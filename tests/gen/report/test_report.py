@@ -541,6 +541,7 @@ def test_texts_are_escaped_once(tmp_path: Path) -> None:
     assert "&amp;lt;" not in page
 
 
+@pytest.mark.slow
 def test_texts_from_outside_are_escaped() -> None:
     """Every text that the page takes, each with markup and its own mark, appears in words and not as markup."""
     nasty = "<script>alert('{}')</script>&amp;\"$x$"
@@ -569,6 +570,7 @@ def test_texts_from_outside_are_escaped() -> None:
         assert nasty.format(number)[:26] in words
 
 
+@pytest.mark.slow
 def test_a_dollar_sign_in_a_figure_is_no_formula() -> None:
     assert "output in $x^2$" in Page(page_of(evidence(output=replace(OUTPUT, unit="$x^2$")))).words
 

@@ -102,6 +102,7 @@ def test_nothing_is_limited_before_the_decimator() -> None:
     assert worst_error(made, codes) <= float(made.quantized.bound)
 
 
+@pytest.mark.slow
 def test_the_locomotive_costs_less_than_without() -> None:
     made = whole()
     ours, theirs = rate_costs(made), rate_costs(direct_design(made))
@@ -175,6 +176,7 @@ def test_each_has_the_smallest_architecture_that_keeps_up() -> None:
         at_clock(3500, architecture="folded")
 
 
+@pytest.mark.slow
 def test_multipliers_are_shared_out() -> None:
     """Of a single multiplier block the calibration takes all there is, so that the filter shifts and adds."""
     made = at_clock(12_000_000, multipliers=1)

@@ -121,6 +121,7 @@ def test_order_of_butterworth_sections_equals_exhaustive_search(order: int, feed
         check(noisy(butterworth(order, u), feedback=feedback), scale, "l2", pairing=False)
 
 
+@pytest.mark.sweep(12)
 @pytest.mark.parametrize("scale", NORMS)
 @pytest.mark.parametrize("feedback", [0, 2])
 @pytest.mark.parametrize("order", range(3, 9))

@@ -95,6 +95,7 @@ def ideal_coefficients(planned: Plan) -> list[dict[str, Fraction]]:
 # What the estimates are worth.
 
 
+@pytest.mark.sweep(6)
 @pytest.mark.parametrize("realization", CASCADES)
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_what_is_estimated_is_what_is_proven(name: str, realization: str) -> None:
@@ -344,6 +345,7 @@ def test_words_that_fit_need_no_second_way(realization: str, fallbacks: list[Pla
     assert fallbacks == []
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize("realization", CASCADES)
 def test_an_estimate_that_is_too_low_is_made_up_for(
     realization: str, fallbacks: list[Plan], monkeypatch: pytest.MonkeyPatch

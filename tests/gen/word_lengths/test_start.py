@@ -88,6 +88,7 @@ def test_a_gain_that_is_not_1_is_rounded_within_a_share_of_the_error(inputs: Por
         assert error(made, codes) <= float(made.bound)
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("name", ["audio_lowpass.toml", "flange_wear_bench.toml", "flange_wear_locomotive.toml"])
 def test_examples_are_right_from_the_first_sample_on(name: str) -> None:
     """10,000 channels start at 10,000 constant inputs; no result ever leaves the bound about the exact value."""
@@ -108,6 +109,7 @@ def with_wear(start: str) -> CoreDesign:
     return replace(made, quantized=replace(made.quantized, datapath=replace(made.datapath, wear=(tuple(limits),))))
 
 
+@pytest.mark.slow
 def test_no_false_wear_flag_in_ten_thousand_starts_and_a_true_one_at_once() -> None:
     """Constant clearances up to the bound below the warning: the filter that starts from zero overshoots it.
 

@@ -69,6 +69,7 @@ def sent(data: tuple[int, ...], ratio: Fraction) -> list[int]:
     return levels[levels.index(0) :]
 
 
+@pytest.mark.sweep(4)
 @pytest.mark.parametrize("ratio", RATIOS, ids=str)
 @pytest.mark.parametrize("drift", [0.99, 1.0, 1.01])
 def test_bytes_without_a_gap_are_received(ratio: Fraction, drift: float) -> None:

@@ -142,6 +142,7 @@ def test_every_length_of_a_program(count: int, protect: str) -> None:
     simulate(dut, testbench)
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(("serial", "channels"), [(False, 1), (False, 2), (False, 5), (True, 3)])
 def test_a_reset_in_mid_run_clears_every_channel(serial: bool, channels: int) -> None:
     datapath = mixer()

@@ -73,6 +73,7 @@ def test_nothing_before_a_reset_counts(name: str, restart: int) -> None:
     assert run(made, codes, Pace(idle=0.2, stall=0.2), restart=restart).results == expected(made, codes)
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("hold", [False, True])
 @pytest.mark.parametrize(
     ("name", "before"), [("parallel", "parallel"), ("folded", "folded"), ("folded", "parallel"), ("parallel", "folded")]
@@ -95,6 +96,7 @@ def test_its_clocks_are_those_stated(name: str, before: str, hold: bool) -> None
     assert max(waits) == made.latency_cycles - early
 
 
+@pytest.mark.slow
 def test_a_serial_one_takes_no_longer_than_it_states() -> None:
     made = made_in("serial")
     seen = run(made, codes_for(25), Pace(idle=0, stall=0))
@@ -113,6 +115,7 @@ BROKEN = [
 ]
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(("right", "wrong"), [pytest.param(*case, id=subject) for subject, *case in BROKEN])
 def test_what_is_broken_is_found(right: str, wrong: str, monkeypatch: pytest.MonkeyPatch) -> None:
     made, codes = made_in("parallel"), codes_for(60)

@@ -111,6 +111,7 @@ def run(
     return seen
 
 
+@pytest.mark.sweep(5)
 @pytest.mark.parametrize("signed", [True, False])
 @pytest.mark.parametrize("flags", [True, False])
 @pytest.mark.parametrize(

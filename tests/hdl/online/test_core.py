@@ -74,6 +74,7 @@ def test_other_filters(kind: str, order: int) -> None:
     check(made(kind, order), 100, Pace())
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(("realization", "bits"), [("df1", 16), ("df1", 24), ("df1_ef2", 16)])
 def test_latency_and_interval_are_as_stated(realization: str, bits: int) -> None:
     architecture = audio(realization, bits=bits)
@@ -140,6 +141,7 @@ def test_a_reset_of_one_clock_leaves_nothing_behind(clock: int) -> None:
     assert after_reset(online.OnlineCore(datapath), codes, clock) == datapath.compute_exact(codes)
 
 
+@pytest.mark.slow
 def test_what_a_reset_leaves_behind_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     wrong = broken(
         cascade,

@@ -7,6 +7,7 @@ from tests.gen.designs import example_design
 from sosmith.hdl.plan.pipeline import pipeline_depth, pipeline_stages
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(
     ("realization", "depths"),
     [

@@ -163,6 +163,7 @@ def test_refits_from_the_store_are_the_same_to_the_bit(store: MeasurementStore, 
         assert again.version.polynomial.coefficients == version.polynomial.coefficients
 
 
+@pytest.mark.slow
 def test_a_process_that_takes_the_processor_for_an_older_one_finds_the_same_bits(
     store: MeasurementStore, tmp_path: Path
 ) -> None:

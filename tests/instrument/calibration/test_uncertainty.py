@@ -34,6 +34,7 @@ def test_intervals_of_a_line_through_a_curve_include_what_it_misses() -> None:
     assert found.standard_error(V, T).max() < 0.3 * found.half_width(V, T).min()
 
 
+@pytest.mark.slow
 def test_bayesian_intervals_hold_the_clearance_of_readings_on_another_day() -> None:
     inside, over_days = [], []
     for seed in range(5):

@@ -22,6 +22,7 @@ def motion() -> Motion:
     return vehicle_run(built_in(), track="paper", speed=20.0, **settings).motion
 
 
+@pytest.mark.slow
 def test_zero_is_written_without_a_sign(motion: Motion) -> None:
     values = {name: getattr(motion, name)[:1] for name in motion.__dataclass_fields__}
     text = vehicle_csv(Motion(**values | {"body_lateral": np.array([-1e-12]), "body_yaw": np.array([-2e-6])}))
@@ -106,6 +107,7 @@ def test_an_amplitude_at_half_the_sample_rate_counts_once() -> None:
     assert ripple(values, 100.0, 50.0) == pytest.approx(2)
 
 
+@pytest.mark.slow
 def test_only_the_papers_track_speed_and_rate_are_compared() -> None:
     given = built_in()
     short = replace(given, track=replace(given.track, curve=10.0, run_out=0.0))

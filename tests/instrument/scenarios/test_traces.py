@@ -4,6 +4,7 @@ import subprocess
 import sys
 
 
+@pytest.mark.slow
 def test_no_simulator_is_imported() -> None:
     listed = "[m for m in sys.modules if m.startswith(('sosmith.sim', 'cocotb'))]"
     code = f"import sys, sosmith.instrument.scenarios.traces; print({listed})"

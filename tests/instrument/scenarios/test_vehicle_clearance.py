@@ -28,6 +28,7 @@ def test_it_is_the_models_own_motion(name: str, make: object, model: str) -> Non
         assert (found == vehicle_clearance(name, time, 3)).all()
 
 
+@pytest.mark.slow
 def test_a_curve_shows_and_another_seed_differs() -> None:
     time = np.arange(6 * 25) / 6
     curve, straight = (vehicle_clearance(track, time, 1, model="linear") for track in ("paper", "tangent"))

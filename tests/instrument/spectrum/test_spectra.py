@@ -105,6 +105,7 @@ def test_refusals(given: dict[str, Any], message: str) -> None:
 # Lines that are called out.
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize("window", WINDOWS)
 def test_a_pure_tone_is_one_line_with_its_amplitude(window: str) -> None:
     """Whatever its frequency and phase: nothing else is called out, as the trend that it resembles in a segment."""

@@ -151,6 +151,7 @@ def bogie(speed: float, start: float, seconds: float, stiffness: float = 14.6e6)
     return y[:, [0, 2, 4]]
 
 
+@pytest.mark.slow
 def test_cooperriders_bogie_hunts_between_its_flanges_above_its_critical_speed() -> None:
     """As on bifurcation.de (exd10): from an offset of 0.1 it comes to rest at 60 and to a periodic orbit at 70 m/s.
 

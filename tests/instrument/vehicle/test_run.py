@@ -35,6 +35,7 @@ def motion() -> Motion:
     return run(GIVEN, PAPER, speed=20.0, sample_rate=100.0)
 
 
+@pytest.mark.slow
 def test_a_run_lasts_until_the_first_wheelset_is_at_the_end(motion: Motion) -> None:
     assert len(motion.time) == 3051
     assert motion.time == pytest.approx(np.arange(3051) / 100, abs=1e-12)
@@ -294,6 +295,7 @@ def test_vertical_motion_holds_half_the_cant_and_the_cones_lift_wheels(motion: M
     assert (motion.right_wheel_rise == -motion.left_wheel_rise).all()
 
 
+@pytest.mark.slow
 def test_limits_tell_where_flanges_and_friction_would_act(motion: Motion) -> None:
     found = limits(GIVEN, PAPER, motion)
     assert not found.kept
@@ -395,6 +397,7 @@ def test_a_track_goes_on_as_it_ends() -> None:
     assert circle.offset_at(s) == pytest.approx(0.001 * s**2, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_position_on_the_rails_is_that_on_the_track_less_the_irregularity() -> None:
     straight = tangent_track(GIVEN.track)
     found = run(GIVEN, straight, speed=20.0, sample_rate=100.0)
@@ -442,6 +445,7 @@ def test_wheel_loads_carry_weight_and_overturning_moment(ridden: tuple[Track, Mo
     assert 0.7465 * (loads[:, 1] - loads[:, 0]).sum() == pytest.approx(moment, rel=0.02)
 
 
+@pytest.mark.slow
 def test_small_motion_is_the_linear_models() -> None:
     straight = tangent_track(replace(GIVEN.track, irregularity=2e-5))
     both = [run_any(GIVEN, straight, speed=20.0, sample_rate=50.0, distance=40.0, model=name) for name in MODELS]

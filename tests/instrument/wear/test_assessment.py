@@ -108,6 +108,7 @@ def test_wild_readings_do_not_move_the_rate() -> None:
     assert abs(np.polyfit(time, clearance, 1)[0] - 0.05) > 0.05  # least squares would be far off
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(("correlation", "blocks", "least"), [(0.0, 20, 0.93), (0.4, 40, 0.91), (0.7, 120, 0.9)])
 def test_the_interval_holds_the_rate_as_often_as_it_says(correlation: float, blocks: int, least: float) -> None:
     time = np.arange(blocks, dtype=np.float64)
@@ -193,6 +194,7 @@ def test_the_last_fall_is_where_the_wheel_was_turned(turned: tuple[int, ...], sc
         assert after.rate.rate == pytest.approx(0.02, abs=0.1 * scatter + 1e-9)
 
 
+@pytest.mark.slow
 def test_noise_with_memory_has_no_fall() -> None:
     time = np.arange(200.0)
     for seed in range(200):

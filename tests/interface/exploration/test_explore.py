@@ -228,6 +228,7 @@ def hangs_at_the_second(task: Any) -> Any:
     return made
 
 
+@pytest.mark.slow
 def test_what_processes_leave_that_are_ended_is_deleted(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(processes, "evaluate", hangs_at_the_second)
     batches: Any = [[False, True]]

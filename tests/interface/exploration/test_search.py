@@ -84,6 +84,7 @@ def search(tmp_path_factory: pytest.TempPathFactory) -> Outcome:
     return searched(tmp_path_factory.mktemp("searched"))
 
 
+@pytest.mark.slow
 def test_no_design_is_made_twice(found: Outcome) -> None:
     assert len({point["key"] for point in found.points}) == len(found.points) == COUNT
     assert [task.key for task in found.tasks] == [point["key"] for point in found.points]

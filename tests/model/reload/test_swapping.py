@@ -42,6 +42,7 @@ def test_a_swap_acts_from_its_sample_on() -> None:
     assert compute_swapping(first, [(20, first), (20, other)], codes) == compute_swapping(first, [(20, other)], codes)
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("realization", ["df1", "df1_ef1", "df1_ef2"])
 def test_direct_form_i_is_continuous_at_rest(realization: str) -> None:
     """Its states are samples: where input and output stand still, another filter of the same gain moves nothing."""

@@ -45,6 +45,7 @@ def test_peers_of_another_maker(architecture: str, realization: str, channels: i
     assert len({status for _, _, status in wanted}) > 1  # rails were met
 
 
+@pytest.mark.slow
 def test_a_sample_of_a_channel_that_does_not_exist_is_dropped(tmp_path: Path) -> None:
     for architecture in ("parallel", "folded"):
         made = made_of(architecture, "df1_ef2", 3)

@@ -28,6 +28,7 @@ def worst(made: CoreDesign, kind: str, samples: int, folder: Path, simulator: st
     assert write_report(evidence, folder)["passed"]
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("lanes", "simulator"),

@@ -57,6 +57,7 @@ def samples_of(made: CoreDesign, count: int) -> Trace:
     return replace(trace, codes=codes, truth=None, reading=None)
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(1)
 @without_pictures
 @pytest.mark.parametrize(

@@ -130,6 +130,7 @@ endmodule
 """Words of which a bit is wired to a constant, and their initial values, as Yosys writes them."""
 
 
+@pytest.mark.slow
 def test_cxxrtl_agrees_on_them_too(outcomes: list[list[Any]], tmp_path: Path) -> None:
     folder = tmp_path / "cxxrtl"
     prepare(folder)

@@ -203,6 +203,7 @@ def name(table: dict[str, Any]) -> str:
     return "-".join(str(word) for word in [*words, *table.get("cutoff", ())] if word)
 
 
+@pytest.mark.sweep(60)
 @pytest.mark.parametrize("table", NEAR, ids=name)
 def test_the_generators_filter_is_as_near_as_doubles_can_be(table: dict[str, Any]) -> None:
     made = entries(design(specification(table), Fraction(1)).rows)

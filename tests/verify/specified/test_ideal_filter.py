@@ -57,6 +57,7 @@ def scipys_responses(zeros: Any, poles: Any, gain: float, frequencies: list[floa
         return result
 
 
+@pytest.mark.sweep(25)
 @pytest.mark.parametrize("cutoff", ["0.0001", "0.01", "0.2", "0.45"])
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("family", FAMILIES)

@@ -19,6 +19,7 @@ from sosmith.gen.output.packages.facts import package_facts
 PACKAGE = Invocation("package")
 
 
+@pytest.mark.slow
 def test_two_runs_write_the_same_bytes(tmp_path: Path) -> None:
     """The second run is another process with another hash seed."""
     spec = tmp_path / "plain.toml"
