@@ -35,7 +35,7 @@ def made_in(example: str, architecture: str, realization: str, board: str | None
     return design_core(wanted, board=None if board is None else find_board(board))
 
 
-@pytest.mark.sweep(3)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(("example", "architecture", "realization", "simulator"), CASES)
 def test_hardware_equals_the_integer_model(
     example: str, architecture: str, realization: str, simulator: str, tmp_path: Path

@@ -168,6 +168,7 @@ def test_a_second_sample_moves_whether_another_one_comes_or_not() -> None:
     assert re.fullmatch(sentence, rejection(core, waits)), rejection(core, waits)
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(("bits", "lanes", "count"), [(8, 2, 40), (12, 2, 20), (10, 2, 20), (12, 16, 2)], ids=str)
 def test_edits(bits: int, lanes: int, count: int) -> None:
     found = sweep(small(with_output(bits), lanes=lanes), count, seed=4, clocks=150)

@@ -28,6 +28,7 @@ LOCOMOTIVE = "flange_wear_locomotive.toml"
 # What the generator writes is accepted.
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("architecture", ["folded", "serial"])
 @pytest.mark.parametrize("name", ALL)
 def test_examples(name: str, architecture: str) -> None:
@@ -41,6 +42,7 @@ def test_examples(name: str, architecture: str) -> None:
     assert verdict.states > 5
 
 
+@pytest.mark.sweep(8)
 @pytest.mark.parametrize("architecture", ["folded", "serial"])
 @pytest.mark.parametrize("realization", FOLDABLE)
 @pytest.mark.parametrize("spec", [PLAIN, INSTRUMENT], ids=["plain", "instrument"])
