@@ -114,11 +114,10 @@ def test_each_kind_of_break_is_named(kind: str) -> None:
     assert re.fullmatch(sentence, rejection(core, text)), rejection(core, text)
 
 
-@pytest.mark.slow
-def test_forty_edits() -> None:
-    found = sweep(looking_ahead(FIRST_ORDER), 40, seed=6, clocks=300)
-    assert found["accepted"] + found["rejected"] == 40
-    assert found["rejected"] > 20
+def test_a_dozen_edits() -> None:
+    found = sweep(looking_ahead(FIRST_ORDER), 12, seed=6, clocks=300)
+    assert found["accepted"] + found["rejected"] == 12
+    assert found["rejected"] > 5
 
 
 @pytest.mark.slow
