@@ -14,7 +14,8 @@ pytest_plugins = ["pytester"]
 
 @pytest.hookimpl(tryfirst=True)  # before `-m` takes its choice
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark the cases of a sweep that do not run always as slow."""
+    """Mark the cases of a sweep that do not run always as slow; let tests marked so come first."""
+    items.sort(key=lambda item: item.get_closest_marker("first") is None)
     sweeps: dict[str, list[pytest.Function]] = {}
     for item in items:
         if isinstance(item, pytest.Function) and item.get_closest_marker("sweep") and hasattr(item, "callspec"):
