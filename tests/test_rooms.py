@@ -26,8 +26,6 @@ PAST_THE_INTERFACE = {
     "instrument/calibrate.py": 11,
     "instrument/spectrum.py": 3,
     "instrument/vehicle.py": 5,
-    "monitor.py": 13,
-    "stream.py": 5,
     "tables/calibration.py": 6,
     "tables/spectrum.py": 5,
     "tables/vehicle.py": 3,

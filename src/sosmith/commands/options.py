@@ -63,11 +63,6 @@ BAUD = click.option(
 )
 
 
-def default_folder(name: str) -> Path:
-    """Return the default output folder for the specification `name`."""
-    return Path("build") / name
-
-
 def print_tables(tables: Iterable[Table]) -> None:
     """Print tables on stdout."""
     from sosmith.commands.tables.console import print_all  # and with it rich, which is slow to import
