@@ -11,7 +11,7 @@ import click
 from sosmith.interface.choices import BOARDS, CORES, ERROR_FEEDBACK, REALIZATIONS, board_named, did_you_mean
 
 if TYPE_CHECKING:
-    from sosmith.interface.tables.table import Table
+    from sosmith import Table
 
 
 class OneOf(click.Choice[str]):

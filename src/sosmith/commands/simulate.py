@@ -270,7 +270,7 @@ def emulate_command(
     asked = Specification.load(spec)
     kind = _kind(asked, core)
     if scenario is None:
-        from sosmith.interface.tables.table import Table
+        from sosmith import Table
 
         rows = [(name, SCENARIOS[name]) for name in fitting(kind)]
         print_tables([Table(f"Scenarios for {asked.name}", rows, ("name", "description"))])
