@@ -44,6 +44,7 @@ from benchmarks.synthesis import TARGETS, Area, place, placer, synthesize, title
 
 from sosmith.gen.architectures.architecture import Architecture
 from sosmith.gen.output.verilog import converted, to_rtlil, to_verilog
+from sosmith.gen.specification.combinations import PARALLEL
 
 
 def jobs() -> list[Job]:
@@ -52,7 +53,7 @@ def jobs() -> list[Job]:
 
     def rank(job: Job) -> int:
         core, key = job
-        hopeless = core.architecture == "parallel" and TARGETS[key].device.family == "ice40"
+        hopeless = core.architecture == PARALLEL.name and TARGETS[key].device.family == "ice40"
         if core in FAST:
             return -1
         return 0 if job in wanted or core in OF_THEIR_OWN else 1 + (core.channels > 1) + 2 * hopeless

@@ -16,6 +16,7 @@ from sosmith.gen.architectures import registry
 from sosmith.gen.architectures.architecture import Architecture
 from sosmith.gen.architectures.blocks import blocks_for
 from sosmith.gen.core import CoreDesign, design_core
+from sosmith.gen.specification import combinations
 from sosmith.gen.specification.specification import from_text, load
 from sosmith.gen.word_lengths.objective import Objective
 from sosmith.model.dataflow.protection import PROTECTIONS
@@ -23,7 +24,7 @@ from sosmith.model.dataflow.protection import PROTECTIONS
 ROOT = Path(__file__).resolve().parent.parent
 RECORD = ROOT / "benchmarks" / "cost.json"
 EXAMPLES = {"audio_lowpass": "filter", "flange_wear_bench": "instrument", "flange_wear_locomotive": "instrument"}
-ARCHITECTURES = ("parallel", "folded", "serial")
+ARCHITECTURES = tuple(terms.name for terms in (combinations.PARALLEL, combinations.FOLDED, combinations.SERIAL))
 CHANNELS = (1, 12, 64)
 SEEDS = (1, 2, 3, 4, 5)
 GROWTH = 1.05
@@ -46,7 +47,7 @@ class Core:
     example : str
         Name of its specification.
     architecture : str
-        One of `ARCHITECTURES`, or "online".
+        One that a specification can name.
     channels : int
         Number of channels.
     protect : str
@@ -98,17 +99,21 @@ class Core:
             return ["ecp5_85"]
         if self.realization or self.lanes > 1 or self.clock:
             return ["ecp5"]
-        if self.bits or self.architecture == "online":
+        if self.bits or self.architecture == combinations.ONLINE.name:
             return ["hx8k", "ecp5"]
-        wanted = [key for key in _ORDINARY if key != _SMALLEST or self.architecture == "serial"]
+        wanted = [key for key in _ORDINARY if key != _SMALLEST or self.architecture == combinations.SERIAL.name]
         if self.protect == "none":
             return wanted
-        return [key for key in wanted if key == "ecp5" or (key == "up5k" and self.architecture != "parallel")]
+        return [
+            key
+            for key in wanted
+            if key == "ecp5" or (key == "up5k" and self.architecture != combinations.PARALLEL.name)
+        ]
 
     @property
     def extra_channels(self) -> tuple[int, ...]:
         """Numbers of channels in addition to `CHANNELS`."""
-        return (8,) if (self.example, self.architecture) == ("audio_lowpass", "parallel") else ()
+        return (8,) if (self.example, self.architecture) == ("audio_lowpass", combinations.PARALLEL.name) else ()
 
 
 PROTECTED = tuple(
@@ -120,12 +125,13 @@ PROTECTED = tuple(
         ("audio_lowpass", "parallel", 12),
     )
     for protect in PROTECTIONS[1:]
-    if (channels, protect) != (1, "correct") or architecture != "parallel"  # registers have parity in both
+    if (channels, protect) != (1, "correct")
+    or architecture != combinations.PARALLEL.name  # registers have parity in both
 )
 """Cores whose memories and states are protected."""
 ONLINE = (
     Core("audio_lowpass", "online"),
-    *(Core("audio_lowpass", architecture, bits=24) for architecture in (*ARCHITECTURES, "online")),
+    *(Core("audio_lowpass", architecture, bits=24) for architecture in (*ARCHITECTURES, combinations.ONLINE.name)),
 )
 """Sections in on-line arithmetic, and what they are compared with for longer words."""
 REALIZED = tuple(

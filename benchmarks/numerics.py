@@ -194,7 +194,7 @@ def slope_table(curves: dict[str, list[float] | str]) -> str:
     rows = []
     for name, curve in curves.items():
         slope = curve if isinstance(curve, str) else f"{slope_of(curve):+.1f}"
-        rows.append(f"| {name} | {REALIZATIONS[name].title} | {slope} |")
+        rows.append(f"| {name} | {REALIZATIONS[name].terms.title} | {slope} |")
     return "\n".join(["| realization | | slope, dB per decade of the cutoff |", "|---|---|---|", *rows])
 
 

@@ -24,6 +24,7 @@ from sosmith.gen.filter.decimation import choose
 from sosmith.gen.output.decimation_facts import decimation_facts, rate_costs
 from sosmith.gen.picture import settled
 from sosmith.gen.quantity import quantity
+from sosmith.gen.specification.combinations import PARALLEL
 from sosmith.gen.specification.specification import FilterSpec, load
 from sosmith.gen.word_lengths.cost import LUTS_OF_A_BLOCK
 
@@ -205,7 +206,7 @@ def curve_of(core: Core) -> tuple[str, str]:
     if core.channels > 1:
         several = sorted(other.channels for other in CORES if replace(other, channels=core.channels) == core)[1:]
         mark = f"{several[0]} to {several[-1]} channels" if core.channels == several[-1] else ""
-        return ("parallel, channels in turn", mark) if core.architecture == "parallel" else ("", "")
+        return ("parallel, channels in turn", mark) if core.architecture == PARALLEL.name else ("", "")
     lanes = f"{core.lanes} a clock"
     if core.clock:
         # One curve over the samples of a clock; of one sample, the core that was made for the highest clock.

@@ -12,9 +12,9 @@ from sosmith.gen.architectures.registry import candidates, fitting, reason_for
 from sosmith.gen.calibration.fit import Fit, fit, read_measurements
 from sosmith.gen.filter.design import Filter, design
 from sosmith.gen.fpga.boards import Board
-from sosmith.gen.realizations.registry import ERROR_FEEDBACK, REALIZATIONS
+from sosmith.gen.realizations.registry import REALIZATIONS
 from sosmith.gen.search import AskedRealization, Response, Search
-from sosmith.gen.specification.choices import AUTO, CORES
+from sosmith.gen.specification.choices import AUTO, CORES, ERROR_FEEDBACK
 from sosmith.gen.specification.combinations import asked_by
 from sosmith.gen.specification.specification import Specification
 from sosmith.gen.word_lengths.decimator import Front, front_of

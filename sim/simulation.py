@@ -20,12 +20,12 @@ from sosmith.gen.fpga.synthesis import synthesize
 from sosmith.gen.output.core_facts import CoreFacts, InterfaceFacts, core_facts
 from sosmith.gen.output.generate import generate
 from sosmith.gen.output.vectors import Vectors, vector_files, whole_beats
-from sosmith.gen.realizations.registry import ERROR_FEEDBACK
 from sosmith.gen.report.evidence import Alternative, Evidence
 from sosmith.gen.report.input_ranges import input_ranges
 from sosmith.gen.report.provenance import provenance_of
 from sosmith.gen.report.recursion import recursion_of
 from sosmith.gen.report.run import Run, run_of
+from sosmith.gen.specification.choices import ERROR_FEEDBACK
 from sosmith.gen.word_lengths.other_realization import with_realization
 from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.model.arrays import Codes

@@ -1,6 +1,7 @@
 """The registry of realizations: how a section of the ideal filter becomes an integer stage.
 
-Each realization is registered once, here. Word lengths, proof, C model, hardware, report and test matrix follow.
+Each realization is registered once, here; its terms stand in `sosmith.gen.specification.realizations`. Word lengths,
+proof, C model, hardware, report and test matrix follow.
 """
 
 from __future__ import annotations
@@ -16,6 +17,8 @@ from sosmith.gen.realizations.section_format import WIDE, SectionFormat
 from sosmith.gen.realizations.state_space import minimum_noise, normal, state_space
 from sosmith.gen.realizations.transposed import transposed_form
 from sosmith.gen.specification import choices
+from sosmith.gen.specification import realizations as terms
+from sosmith.gen.specification.realizations import RealizationTerms
 from sosmith.model.dataflow.datapath import Stage
 
 Row = Sequence[float]
@@ -47,10 +50,8 @@ class Realization:
 
     Attributes
     ----------
-    name : str
-        As in the specification.
-    title : str
-        Short description.
+    terms : RealizationTerms
+        Its name, and what is said of it.
     build : callable
         Makes the stage for a part, given its formats and name.
     parts : callable
@@ -58,20 +59,20 @@ class Realization:
         ShortfallError if the filter has no such realization.
     cascade : bool
         Whether every stage is one of the ideal sections, in any order.
-    feedback_order : int or None
-        Order of its error feedback, where that is all it differs in from others, so that they can be compared at the
-        same word lengths; None otherwise.
     not_decimated : str
         Why a filter that corrects a decimator's droop is not made so, half a sentence; empty if it is.
     """
 
-    name: str
-    title: str
+    terms: RealizationTerms
     build: Callable[[Any, SectionFormat, str], Section]
     parts: Callable[[Sequence[Row]], Sequence[Any]] = tuple
     cascade: bool = True
-    feedback_order: int | None = None
     not_decimated: str = ""
+
+    @property
+    def name(self) -> str:
+        """As in the specification."""
+        return self.terms.name
 
 
 def _section(make: Callable[..., Section], **options: Any) -> Callable[[Row, SectionFormat, str], Section]:
@@ -104,34 +105,19 @@ def _lattice(part: Part, form: SectionFormat, name: str) -> Section:
     )
 
 
-def _with_error_feedback(name: str, title: str, order: int) -> Realization:
-    build = _section(direct_form, feedback_order=order)
-    return Realization(name=name, title=title, build=build, feedback_order=order)
-
-
 REALIZATIONS: dict[str, Realization] = {
     realization.name: realization
     for realization in (
-        _with_error_feedback("df1", "direct form I", 0),
-        _with_error_feedback("df1_ef1", "direct form I, first-order error feedback", 1),
-        _with_error_feedback("df1_ef2", "direct form I, second-order error feedback", 2),
-        Realization(name="df2t", title="transposed direct form II", build=_section(transposed_form, delta=False)),
-        Realization(
-            name="delta", title="transposed direct form II, delta operator", build=_section(transposed_form, delta=True)
+        *(
+            Realization(terms=each, build=_section(direct_form, feedback_order=each.feedback_order))
+            for each in (terms.DF1, terms.DF1_EF1, terms.DF1_EF2)
         ),
+        Realization(terms=terms.DF2T, build=_section(transposed_form, delta=False)),
+        Realization(terms=terms.DELTA, build=_section(transposed_form, delta=True)),
+        Realization(terms=terms.STATE_SPACE, build=_section(state_space, design=minimum_noise, truncating=False)),
+        Realization(terms=terms.NORMAL, build=_section(state_space, design=normal, truncating=True)),
         Realization(
-            name="state_space",
-            title="state space with minimum roundoff noise",
-            build=_section(state_space, design=minimum_noise, truncating=False),
-        ),
-        Realization(
-            name="normal",
-            title="normal form with truncated magnitudes, free of limit cycles",
-            build=_section(state_space, design=normal, truncating=True),
-        ),
-        Realization(
-            name="lattice_wdf",
-            title="lattice wave digital filter, free of limit cycles",
+            terms=terms.LATTICE_WDF,
             build=_lattice,
             parts=lattice_parts,
             cascade=False,
@@ -143,8 +129,9 @@ REALIZATIONS: dict[str, Realization] = {
 
 LOOK_AHEAD: dict[int, Realization] = {
     samples: Realization(
-        name=f"look_ahead_{samples}",
-        title=f"direct form with scattered look-ahead over {samples} samples",
+        terms=RealizationTerms(
+            f"look_ahead_{samples}", f"direct form with scattered look-ahead over {samples} samples"
+        ),
         build=_section(look_ahead, doublings=samples.bit_length() - 1),
     )
     for samples in choices.LOOK_AHEAD
@@ -161,8 +148,5 @@ def realization_of(name: str) -> Realization:
 CASCADES = tuple(name for name, realization in REALIZATIONS.items() if realization.cascade)
 """Names of the realizations whose stages are the ideal sections."""
 
-ERROR_FEEDBACK = tuple(name for name, realization in REALIZATIONS.items() if realization.feedback_order is not None)
-"""Names of the realizations that differ only in their error feedback."""
-
-BEST_KEPT = "df1_ef2"
+BEST_KEPT = terms.DF1_EF2.name
 """Realization that needs the fewest bits at low cutoffs: if it fails too, its reason is the most informative."""

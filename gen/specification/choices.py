@@ -5,6 +5,7 @@ Those of `hardware.protect` are in `sosmith.model.dataflow.protection`.
 
 from fractions import Fraction
 
+from sosmith.gen.specification import realizations
 from sosmith.gen.specification.combinations import TERMS
 
 AUTO = "auto"
@@ -20,12 +21,10 @@ LOSSES = {
 """Losses that a family needs in addition to order and cutoff: they set the size of its ripples."""
 
 METHODS = ("bilinear", "impulse_invariant")
-REALIZATIONS = ("auto", "df1", "df1_ef1", "df1_ef2", "df2t", "delta", "state_space", "normal", "lattice_wdf")
-"""Names in the registry, `sosmith.gen.realizations.registry`, in its order."""
-
+REALIZATIONS = (AUTO, *(each.name for each in realizations.ALL))
 STARTS = ("steady", "zero")
-ARCHITECTURES = ("auto", *TERMS)
-PIPELINES = ("auto", "plain", "look-ahead")
+ARCHITECTURES = (AUTO, *TERMS)
+PIPELINES = (AUTO, "plain", "look-ahead")
 SAMPLES_PER_CLOCK = (1, 2, 4, 8, 16)
 LOOK_AHEAD = (2, 4, 8, 16)
 """Samples over which recursions can look ahead: more than a beat holds."""
@@ -33,8 +32,8 @@ LOOK_AHEAD = (2, 4, 8, 16)
 CORES = ("instrument", "filter", "calibration")
 """What can be generated from a specification: the whole instrument, or one part."""
 
-ERROR_FEEDBACK = ("df1", "df1_ef1", "df1_ef2")
-"""Those that differ only in their error feedback, so that they can be compared at the same word lengths."""
+ERROR_FEEDBACK = tuple(each.name for each in realizations.ALL if each.feedback_order is not None)
+"""Realizations that differ only in their error feedback, so that they can be compared at the same word lengths."""
 
 CALIBRATION_INPUTS = ("voltage", "temperature")
 """Inputs of the calibration polynomial, in the order of its indices."""

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from sosmith.gen.realizations.registry import ERROR_FEEDBACK
+from sosmith.gen.specification.choices import ERROR_FEEDBACK
 from sosmith.gen.specification.values import listed
 from sosmith.gen.word_lengths.cost import Cost, area_of, cost_of_graphs
 from sosmith.model.dataflow.datapath import Datapath

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from sosmith.gen.version import __version__
 
 if TYPE_CHECKING:
+    from sosmith.gen.facts.table import Table
     from sosmith.host.board import Board, Results
     from sosmith.host.loading import Loaded
     from sosmith.interface.build import Build
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
     from sosmith.interface.reload import Reload
     from sosmith.interface.report import Report
     from sosmith.interface.specification import Specification
-    from sosmith.interface.tables.table import Table
     from sosmith.interface.trace import Trace
     from sosmith.model.errors import (
         LinkError,
@@ -87,7 +87,7 @@ _MODULES = {
     "interface.design": ("Coefficient", "Design", "Section", "design"),
     "interface.exploration": ("Exploration", "explore"),
     "interface.filter": ("Filter",),
-    "interface.tables.table": ("Table",),
+    "gen.facts.table": ("Fact", "Table"),
     "interface.quantity": ("Quantity",),
     "interface.reload": ("Reload",),
     "interface.report": ("Report",),

@@ -47,7 +47,7 @@ def test_add_reports_the_fit() -> None:
     for row in (
         "Sensor sensor, version 1 of 2024-03-01: new",
         "  measurements  60",
-        "  orders  2 in voltage, 1 in temperature, to reach r = 0.999",
+        "  orders  2 in voltage, 1 in temperature; to reach r = 0.999",
     ):
         assert row in shown
     for row in ("adjusted r", "residual, rms", "cross-validated error", "covered", "leverage", "Largest residuals"):
@@ -106,7 +106,7 @@ def test_a_store_that_another_process_makes_meanwhile_is_kept(monkeypatch: pytes
             add(opened, "sensor", Path("a.csv"), "2024-03-01")
         return refused_first_file(*arguments, **options)
 
-    monkeypatch.setattr("sosmith.instrument.calibration.self_updating.refused_first_file", meanwhile)
+    monkeypatch.setattr("sosmith.interface.instrument.calibration_store.refused_first_file", meanwhile)
     refused("a.csv must hold new measurements, not those already added as a.csv", "add", "a.csv")
     Path("calibration.db").unlink()
     good("add", "b.csv")

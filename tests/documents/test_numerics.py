@@ -8,6 +8,7 @@ import pytest
 from benchmarks import numerics
 
 from sosmith.gen.realizations.registry import REALIZATIONS, Realization
+from sosmith.gen.specification.realizations import RealizationTerms
 from sosmith.model.dataflow.datapath import Stage
 from sosmith.model.errors import ShortfallError
 
@@ -25,7 +26,7 @@ def test_the_numerics_show_a_refusal_as_such(monkeypatch: pytest.MonkeyPatch) ->
     def refuse(*_: object) -> Stage:
         raise ShortfallError("it must fit, and does not")
 
-    only = {"df1": Realization(name="df1", title="", build=refuse)}
+    only = {"df1": Realization(terms=RealizationTerms("df1", ""), build=refuse)}
     monkeypatch.setitem(REALIZATIONS, "df1", only["df1"])
     monkeypatch.setattr(numerics, "REALIZATIONS", only)
     monkeypatch.setattr(numerics, "others", lambda _: [])

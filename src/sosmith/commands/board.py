@@ -7,7 +7,8 @@ from typing import Any
 
 import click
 
-from sosmith.commands.options import BAUD, CORE, REALIZATION, SEED, SPEC, default_folder
+from sosmith.commands.options import BAUD, CORE, REALIZATION, SEED, SPEC
+from sosmith.interface.files import default_folder
 from sosmith.model.errors import SpecificationError
 from sosmith.output_paths import folder_option
 from sosmith.terminal import note, show_progress

@@ -8,8 +8,9 @@ from typing import Any
 
 import click
 
-from sosmith.commands.options import CORE, REALIZATION, SPEC, completed_by, default_folder, print_tables
+from sosmith.commands.options import CORE, REALIZATION, SPEC, completed_by, print_tables
 from sosmith.interface.choices import BUILDABLE, PROJECTS, board_named
+from sosmith.interface.files import default_folder
 from sosmith.model.errors import SpecificationError
 from sosmith.output_paths import folder_option
 from sosmith.terminal import JSON_OPTION, note, print_json, show_progress

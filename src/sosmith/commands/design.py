@@ -7,9 +7,9 @@ from pathlib import Path
 
 import click
 
-from sosmith.commands.options import BOARD, CORE, REALIZATION, SPEC, WIDTHS_OF, default_folder, print_tables
+from sosmith.commands.options import BOARD, CORE, REALIZATION, SPEC, WIDTHS_OF, print_tables
 from sosmith.interface.choices import BUILDABLE, picture_format
-from sosmith.interface.files import DEFAULT, contents, titles, write_contents
+from sosmith.interface.files import DEFAULT, contents, default_folder, titles, write_contents
 from sosmith.model.errors import SpecificationError
 from sosmith.output_paths import folder_option, plot_option
 from sosmith.terminal import JSON_OPTION, note, print_json, show_progress

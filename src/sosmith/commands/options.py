@@ -11,7 +11,7 @@ import click
 from sosmith.interface.choices import BOARDS, CORES, ERROR_FEEDBACK, REALIZATIONS, board_named, did_you_mean
 
 if TYPE_CHECKING:
-    from sosmith.interface.tables.table import Table
+    from sosmith import Table
 
 
 class OneOf(click.Choice[str]):
@@ -61,11 +61,6 @@ BAUD = click.option(
     show_default=True,
     help="Bits per second on the serial port, for which the board was built.",
 )
-
-
-def default_folder(name: str) -> Path:
-    """Return the default output folder for the specification `name`."""
-    return Path("build") / name
 
 
 def print_tables(tables: Iterable[Table]) -> None:

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import click
 
-from sosmith.commands.options import BOARD, CORE, REALIZATION, SPEC, WIDTHS_OF, default_folder
+from sosmith.commands.options import BOARD, CORE, REALIZATION, SPEC, WIDTHS_OF
+from sosmith.interface.files import default_folder
 from sosmith.output_paths import folder_option
 from sosmith.terminal import show_progress
 

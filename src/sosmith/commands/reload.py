@@ -6,8 +6,8 @@ from pathlib import Path
 
 import click
 
-from sosmith.commands.options import BAUD, BOARD, CORE, PORT, REALIZATION, SPEC, WIDTHS_OF, default_folder, print_tables
-from sosmith.interface.files import to_json, write_file
+from sosmith.commands.options import BAUD, BOARD, CORE, PORT, REALIZATION, SPEC, WIDTHS_OF, print_tables
+from sosmith.interface.files import default_folder, to_json, write_file
 from sosmith.output_paths import output_option
 from sosmith.terminal import JSON_OPTION, note, print_json, show_progress
 

@@ -21,7 +21,6 @@ from sosmith.commands.options import (
     WIDTHS_OF,
     OneOf,
     completed_by,
-    default_folder,
     print_tables,
 )
 from sosmith.interface.choices import (
@@ -36,7 +35,7 @@ from sosmith.interface.choices import (
     did_you_mean,
     fitting,
 )
-from sosmith.interface.files import write_file, write_files
+from sosmith.interface.files import default_folder, write_file, write_files
 from sosmith.model.errors import SpecificationError
 from sosmith.output_paths import folder_option, output_option
 from sosmith.terminal import JSON_OPTION, Step, note, print_json, reader_may_leave, show_progress
@@ -271,7 +270,7 @@ def emulate_command(
     asked = Specification.load(spec)
     kind = _kind(asked, core)
     if scenario is None:
-        from sosmith.interface.tables.table import Table
+        from sosmith import Table
 
         rows = [(name, SCENARIOS[name]) for name in fitting(kind)]
         print_tables([Table(f"Scenarios for {asked.name}", rows, ("name", "description"))])

@@ -26,27 +26,14 @@ def stream_command(port: str, trace: Path, baud: int, output: Path | None) -> No
     \b
         sosmith stream /dev/ttyUSB1 ramp.csv -o results.csv
     """
-    from sosmith.host.board import Board
-    from sosmith.host.recording import as_csv, recording
-    from sosmith.host.rows import columns, rows
-    from sosmith.host.trace_samples import samples_for
-    from sosmith.model.text_files import write_file
+    from sosmith.interface.stream import Streamed
 
-    with show_progress() as step, Board(port, baud=baud) as board:
-        about = board.identity
-        step(f"reading {trace}")
-        codes = samples_for(about, trace)
-        results = board.run_codes(codes, lambda done, total: step("streaming", done, total))
-        faults = {name: count for name, count in board.faults.items() if count}
-    text = as_csv([columns(about), *rows(about, results)])
+    with show_progress() as step:
+        streamed = Streamed.through(port, trace, baud=baud, progress=step)
     if output is None:
-        click.echo(text, nl=False)
-    elif output.suffix.lower() == ".parquet":
-        with recording(output, columns(about)) as made:
-            made.add(rows(about, results))
+        click.echo(streamed.csv(), nl=False)
     else:
-        write_file(output, text)
-    if output is not None:
-        note(f"wrote {output}: {results.codes.size} results of {about.name}")
-    if faults:
-        note("mended on the line: " + ", ".join(f"{count} {name}" for name, count in faults.items()))
+        streamed.save(output)
+        note(f"wrote {output}: {streamed.results.codes.size} results of {streamed.identity.name}")
+    if streamed.faults:
+        note("mended on the line: " + ", ".join(f"{count} {name}" for name, count in streamed.faults.items()))

@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from sosmith.gen.facts.table import Table
 from sosmith.gen.fpga.boards import find_board
 from sosmith.gen.output.board_build import BoardBuild
-from sosmith.interface.tables.table import Table
 from sosmith.model.errors import ShortfallError, ToolError
 
 

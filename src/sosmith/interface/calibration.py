@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike, fspath
@@ -14,15 +13,16 @@ import numpy.typing as npt
 
 from sosmith.gen.calibration.acceptance import REQUIRED_R
 from sosmith.gen.calibration.fit import Fit, Measurements, fit, read_measurements, residuals
+from sosmith.gen.facts.table import Table, View
 from sosmith.gen.specification.toml_text import toml_text
+from sosmith.instrument.calibration.calibration_tables import fit_facts
 from sosmith.instrument.calibration.uncertainty import Uncertainty, of_polynomial
 from sosmith.interface.quantity import Quantity
-from sosmith.interface.tables.table import Table
 from sosmith.model.errors import SpecificationError
 
 
 @dataclass(frozen=True, eq=False)
-class Calibration:
+class Calibration(View):
     """The smallest polynomial of voltage and temperature that fits measured clearances to the required accuracy.
 
     Examples
@@ -162,18 +162,11 @@ class Calibration:
         """Return the table ``[calibration]`` as the text of a TOML file."""
         return toml_text({"calibration": self.table()})
 
-    def _repr_html_(self) -> str:
-        m, n = self.orders
-        low, high = self._uncertainty.limits
-        rows: list[Sequence[str]] = [
-            ("measurements", f"{len(self.measurements.clearance):,}"),
-            ("orders", f"{m} in voltage, {n} in temperature"),
-            ("adjusted r", f"{self.adjusted_r:.6f}"),
-            ("residual, rms", str(self.rms)),
-            ("residual, largest", str(Quantity(float(abs(self.residual).max()), "mm"))),
-            ("95 % interval of a reading", f"±{low:.3g} to ±{high:.3g} mm where there are measurements"),
-        ]
-        return Table("Calibration", rows).html()
+    def tables(self) -> list[Table]:
+        """Return its figures in words."""
+        largest = float(abs(self.residual).max())
+        facts = fit_facts(self.fitted, len(self.measurements.clearance), largest, self._uncertainty)
+        return [Table("Calibration", facts)]
 
     def __repr__(self) -> str:
         m, n = self.orders

@@ -9,11 +9,14 @@ from collections.abc import Sequence
 from os import PathLike, fspath
 from pathlib import Path
 
+from sosmith.gen.calibration.acceptance import REQUIRED_R
 from sosmith.gen.fpga.boards import BOARDS, BUILDABLE, MODELLED, PROJECTS, SYNTHESIZED
 from sosmith.gen.fpga.boards import find_board as _find_board
 from sosmith.gen.picture import format_of as picture_format
 from sosmith.gen.specification.choices import CORES, ERROR_FEEDBACK, REALIZATIONS
 from sosmith.gen.specification.verilog_names import identifier_from
+from sosmith.instrument.calibration.acceptance import DEFAULT_RANGES
+from sosmith.instrument.calibration.acceptance import METHODS as FIT_METHODS
 from sosmith.instrument.scenarios.summaries import SUMMARIES, check_scenario, fitting
 from sosmith.instrument.vehicle.choices import LEVELS, MODELS, TRACK_NAMES
 from sosmith.instrument.wear.record_columns import CLEARANCES, TIMES
@@ -24,12 +27,15 @@ __all__ = [
     "BUILDABLE",
     "CLEARANCES",
     "CORES",
+    "DEFAULT_RANGES",
     "ERROR_FEEDBACK",
+    "FIT_METHODS",
     "LEVELS",
     "MODELLED",
     "MODELS",
     "PROJECTS",
     "REALIZATIONS",
+    "REQUIRED_R",
     "SCENARIOS",
     "SIMULATORS",
     "SYNTHESIZED",

@@ -8,6 +8,7 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
 
+from sosmith.gen.facts.table import Table
 from sosmith.gen.report.comparison.baseline import Judgement, judge, read_tolerances
 from sosmith.gen.report.comparison.choice import Choice, choose
 from sosmith.gen.report.comparison.differences import Difference, differences
@@ -18,7 +19,6 @@ from sosmith.gen.report.comparison.rows import Row, column_names
 from sosmith.gen.report.comparison.rows import compare as compare_reports
 from sosmith.gen.report.comparison.summary import comparison_json
 from sosmith.interface.report import Report
-from sosmith.interface.tables.table import Table
 from sosmith.model.errors import SpecificationError
 
 __all__ = ["Comparison", "Difference", "Judgement", "compare"]

@@ -27,6 +27,7 @@ from sosmith.interface.trace import Trace
 from sosmith.model.errors import SpecificationError, falling_short
 
 if TYPE_CHECKING:
+    from sosmith.gen.facts.table import Table
     from sosmith.gen.output.decimation_facts import RateCosts
     from sosmith.host.board import Board
     from sosmith.instrument.uncertainty.instrument_budget import InstrumentBudget
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
     from sosmith.interface.certificate import Certificate, Progress, Proof
     from sosmith.interface.reload import Reload
     from sosmith.interface.report import Report
-    from sosmith.interface.tables.table import Table
 
 Floats = npt.NDArray[np.float64]
 Codes = npt.NDArray[np.int64]

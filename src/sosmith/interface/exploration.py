@@ -9,12 +9,12 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from sosmith.gen.facts.table import Table
 from sosmith.gen.fpga.boards import SYNTHESIZED, find_board
 from sosmith.gen.quantity import number, quantity
 from sosmith.gen.specification.exact_values import exact
 from sosmith.interface.certificate import Progress
 from sosmith.interface.specification import Specification, specification_of
-from sosmith.interface.tables.table import Table
 from sosmith.model.errors import SpecificationError, ToolError
 from sosmith.model.text_files import to_json, write_contents, write_files
 

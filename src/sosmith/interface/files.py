@@ -2,7 +2,24 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from sosmith.gen.specification.examples import DEFAULT, contents, titles
 from sosmith.model.text_files import check_file, to_json, write_contents, write_file, write_files
 
-__all__ = ["DEFAULT", "check_file", "contents", "titles", "to_json", "write_contents", "write_file", "write_files"]
+__all__ = [
+    "DEFAULT",
+    "check_file",
+    "contents",
+    "default_folder",
+    "titles",
+    "to_json",
+    "write_contents",
+    "write_file",
+    "write_files",
+]
+
+
+def default_folder(name: str) -> Path:
+    """Return the default output folder for the specification `name`."""
+    return Path("build") / name

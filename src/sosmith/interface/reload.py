@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from sosmith.gen.facts.table import Table
 from sosmith.gen.reload.register_writes import reload_json
 from sosmith.gen.reload.reload import Swap, check_swap, own_set, set_for
 from sosmith.interface.specification import Specification
-from sosmith.interface.tables.table import Table
 from sosmith.model.errors import falling_short
 
 if TYPE_CHECKING:

@@ -10,11 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from sosmith.gen.core import CoreDesign
+from sosmith.gen.facts.table import Table
 from sosmith.gen.report.evidence import Evidence
 from sosmith.gen.report.report import write_report
 from sosmith.interface.quantity import Quantity
 from sosmith.interface.tables.report import report_table
-from sosmith.interface.tables.table import Table
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import datetime
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -10,18 +9,17 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sosmith.gen.calibration.acceptance import REQUIRED_R
-from sosmith.instrument.calibration.acceptance import DEFAULT_RANGES, METHODS, Method, Range
-from sosmith.interface.choices import picture_format
+from sosmith.commands.options import print_tables
+from sosmith.interface.choices import DEFAULT_RANGES, FIT_METHODS, REQUIRED_R, picture_format
 from sosmith.interface.files import write_file
 from sosmith.model.errors import ShortfallError, SpecificationError
 from sosmith.output_paths import output_option, plot_option
 from sosmith.terminal import JSON_OPTION, note, print_json, show_progress
 
 if TYPE_CHECKING:
-    from sosmith.instrument.calibration.measurement_files import Refusal
-    from sosmith.instrument.calibration.self_updating import Calibration
-    from sosmith.instrument.calibration.sensor_type import SensorType
+    from sosmith.interface.instrument.calibration_store import Added, FitOptions, Fitted
+
+_Range = tuple[float, float]
 
 _SHOWN = 20
 """Number of refused lines that are printed; JSON has all of them."""
@@ -49,18 +47,16 @@ def calibrate() -> None:
 
 
 def _day(ctx: click.Context, parameter: click.Parameter, text: str | None) -> str:
-    if text is None:
-        return datetime.date.today().isoformat()
-    from sosmith.instrument.calibration.measurement_files import parse_date
+    from sosmith.interface.instrument.calibration_store import day_of
 
-    return parse_date(text)
+    return day_of(text)
 
 
 def _optional_day(ctx: click.Context, parameter: click.Parameter, text: str | None) -> str | None:
     return None if text is None else _day(ctx, parameter, text)
 
 
-def _range(quantity: str, unit: str, usual: Range) -> Callable[[Any], Any]:
+def _range(quantity: str, unit: str, usual: _Range) -> Callable[[Any], Any]:
     return click.option(
         f"--{quantity}-range",
         nargs=2,
@@ -72,7 +68,7 @@ def _range(quantity: str, unit: str, usual: Range) -> Callable[[Any], Any]:
     )
 
 
-def _check_range(ctx: click.Context, parameter: click.Parameter, given: Range | None) -> Range | None:
+def _check_range(ctx: click.Context, parameter: click.Parameter, given: _Range | None) -> _Range | None:
     if given is not None and not -1e9 <= given[0] < given[1] <= 1e9:
         raise SpecificationError(
             f"{parameter.opts[0]} must be two numbers, the lower one first, not {given[0]:g} {given[1]:g}"
@@ -95,28 +91,24 @@ def _lengths(ctx: click.Context, parameter: click.Parameter, texts: tuple[str, .
 
 
 def _length(name: str, text: str) -> float:
-    found = re.fullmatch(r"(\d+(?:\.\d+)?) ?mm", text.strip())
-    if found is None or not 0 < float(found[1]) <= 1000:
+    number = re.fullmatch(r"(\d+(?:\.\d+)?) ?mm", text.strip())
+    if number is None or not 0 < float(number[1]) <= 1000:
         raise SpecificationError(f"{name} must be a length such as 0.2mm, not {text[:60]!r}")
-    return float(found[1])
+    return float(number[1])
 
 
-def _sensor_type(ctx: click.Context, parameter: click.Parameter, given: str | None) -> SensorType | None:
-    if given is None:
-        return None
-    from sosmith.instrument.calibration.sensor_type_file import sensor_type_named
+def _options(
+    method: str, sensor_type: str | None, required_r: float | None, robust: bool, accept: float | None
+) -> FitOptions:
+    from sosmith.interface.instrument.calibration_store import FitOptions
 
-    return sensor_type_named(given)
-
-
-def _method(method: str, required_r: float | None, robust: bool) -> tuple[Method, float]:
-    """Return the method and the required r."""
-    if method == "paper":
-        return "paper", REQUIRED_R if required_r is None else required_r
-    for name, given in (("--required-r", required_r is not None), ("--robust", robust)):
-        if given:
-            raise SpecificationError(f"{name} must go with --method paper, not with --method {method}")
-    return "bayes", REQUIRED_R
+    return FitOptions(
+        method="paper" if method == "paper" else "bayes",
+        sensor_type=sensor_type,
+        required_r=required_r,
+        robust=robust,
+        accept=accept,
+    )
 
 
 _STORE = click.option(
@@ -138,12 +130,15 @@ _REQUIRED_R = click.option(
 )
 _ROBUST = click.option("--robust", is_flag=True, help="With --method paper: give outliers less weight (Huber).")
 _METHOD = click.option(
-    "--method", type=click.Choice(METHODS), default=METHODS[0], show_default=True, help="How to fit the measurements."
+    "--method",
+    type=click.Choice(FIT_METHODS),
+    default=FIT_METHODS[0],
+    show_default=True,
+    help="How to fit the measurements.",
 )
 _TYPE = click.option(
     "--type",
     "sensor_type",
-    callback=_sensor_type,
     metavar="NAME|FILE",
     help="With --method bayes: type of the sensor, equation_5a, equation_4 or a TOML file; kept for later fits.  "
     "[default: unchanged; equation_5a for a new sensor]",
@@ -179,11 +174,11 @@ def add_command(
     sensor: str,
     date: str,
     keep_good: bool,
-    clearance_range: Range | None,
-    voltage_range: Range | None,
-    temperature_range: Range | None,
+    clearance_range: _Range | None,
+    voltage_range: _Range | None,
+    temperature_range: _Range | None,
     method: str,
-    sensor_type: SensorType | None,
+    sensor_type: str | None,
     accept: float | None,
     required_r: float | None,
     robust: bool,
@@ -200,50 +195,41 @@ def add_command(
         sosmith calibrate add bench.csv --sensor left
         sosmith calibrate add april.xlsx --sensor left --date 2026-04-20 --keep-good
     """
-    from sosmith.instrument.calibration.calibration_report import addition_json
-    from sosmith.instrument.calibration.measurement_store import open_store
-    from sosmith.instrument.calibration.self_updating import add, refused_first_file
+    from sosmith.interface.instrument.calibration_store import CalibrationStore
 
-    ranges = (clearance_range, voltage_range, temperature_range)
-    chosen, needed_r = _method(method, required_r, robust)
+    options = _options(method, sensor_type, required_r, robust, accept)
     with show_progress() as step:
-        step(f"adding {file}")
-        addition = None
-        if not store.exists():
-            addition = refused_first_file(sensor, file, date, ranges=ranges, keep_good=keep_good)
-        if addition is None:
-            with open_store(store, create=True) as opened:
-                addition = add(
-                    opened,
-                    sensor,
-                    file,
-                    date,
-                    ranges=ranges,
-                    keep_good=keep_good,
-                    method=chosen,
-                    sensor_type=sensor_type,
-                    required_r=needed_r,
-                    robust=robust,
-                    accept=accept,
-                    progress=lambda tried, count: step("fitting", tried, count),
-                )
+        added = CalibrationStore(store).add(
+            sensor,
+            file,
+            date,
+            options,
+            ranges=(clearance_range, voltage_range, temperature_range),
+            keep_good=keep_good,
+            progress=step,
+        )
     if as_json:
-        print_json(addition_json(addition))
-    refusals, good = addition.file.refusals, len(addition.file.readings)
-    _note_refusals(file, refusals)
-    if not addition.kept:
-        rows = len(refusals) + good
-        way = ", or skipped with --keep-good" if good else ""
+        print_json(added.as_dict())
+    _note_addition(file, store, added)
+    fitted = added.fitted
+    _warn(fitted)
+    if not as_json:
+        print_tables(fitted.tables())
+
+
+def _note_addition(file: Path, store: Path, added: Added) -> None:
+    """Say which rows were refused and how many stored; raises SpecificationError if none was."""
+    refusals = added.refusals
+    for refusal in refusals[:_SHOWN]:
+        note(f"{file}, line {refusal.line}: {refusal.reason}")
+    if len(refusals) > _SHOWN:
+        note(f"... and {len(refusals) - _SHOWN:,} more lines; --json lists all")
+    if not added.kept:
+        rows = len(refusals) + added.good
+        way = ", or skipped with --keep-good" if added.good else ""
         raise SpecificationError(f"{file}: every row must be valid{way}, not {len(refusals):,} of {rows:,} refused")
     left_out = f", {_counted(len(refusals), 'row')} skipped" if refusals else ""
-    note(f"stored {_counted(good, 'measurement')} from {file} in {store}{left_out}")
-    if addition.calibration is None:
-        raise ShortfallError(addition.shortfall)
-    _warn(addition.calibration)
-    if not as_json:
-        from sosmith.commands.tables.calibration import print_calibration
-
-        print_calibration(addition.calibration)
+    note(f"stored {_counted(added.good, 'measurement')} from {file} in {store}{left_out}")
 
 
 @calibrate.command("fit")
@@ -261,7 +247,7 @@ def fit_command(
     sensor: str,
     date: str,
     method: str,
-    sensor_type: SensorType | None,
+    sensor_type: str | None,
     accept: float | None,
     required_r: float | None,
     robust: bool,
@@ -276,30 +262,16 @@ def fit_command(
         sosmith calibrate fit --sensor left --accept 0.2mm
         sosmith calibrate fit --sensor left --method paper --robust --required-r 0.99
     """
-    chosen, needed_r = _method(method, required_r, robust)
-    from sosmith.commands.tables.calibration import print_calibration
-    from sosmith.instrument.calibration.calibration_report import calibration_json
-    from sosmith.instrument.calibration.measurement_store import open_store
-    from sosmith.instrument.calibration.self_updating import refit
+    from sosmith.interface.instrument.calibration_store import CalibrationStore
 
-    with show_progress() as step, open_store(store) as opened:
-        step(f"fitting {sensor}")
-        made = refit(
-            opened,
-            sensor,
-            date,
-            method=chosen,
-            sensor_type=sensor_type,
-            required_r=needed_r,
-            robust=robust,
-            accept=accept,
-            progress=lambda tried, count: step(f"fitting {sensor}", tried, count),
-        )
-    _warn(made)
+    options = _options(method, sensor_type, required_r, robust, accept)
+    with show_progress() as step:
+        fitted = CalibrationStore(store).fit(sensor, date, options, step)
+    _warn(fitted)
     if as_json:
-        print_json(calibration_json(made))
+        print_json(fitted.as_dict())
     else:
-        print_calibration(made)
+        print_tables(fitted.tables())
 
 
 @calibrate.command("history")
@@ -317,26 +289,17 @@ def history_command(store: Path, sensor: str, verify: bool, as_json: bool) -> No
     \b
         sosmith calibrate history --sensor left --verify
     """
-    from sosmith.commands.tables.calibration import print_history
-    from sosmith.instrument.calibration.calibration_report import version_json
-    from sosmith.instrument.calibration.measurement_store import open_store
-    from sosmith.instrument.calibration.self_updating import calibration_of, find_version
+    from sosmith.interface.instrument.calibration_store import CalibrationStore
 
-    with show_progress() as step, open_store(store) as opened:
-        newest = find_version(opened, sensor)
-        versions = opened.versions(sensor)
-        if verify:
-            step("checking the file")
-            opened.check()
-            for version in versions:
-                step("fitting again", version.number, newest.number)
-                calibration_of(opened, sensor, version.number)
+    with show_progress() as step:
+        history = CalibrationStore(store).history(sensor, verify=verify, progress=step)
     if as_json:
-        print_json([version_json(sensor, version) for version in versions])
+        print_json(history.entries())
     else:
-        print_history(sensor, versions)
+        print_tables(history.tables())
     if verify:
-        note(f"every version is reproduced bit for bit: {len(versions)} of {len(versions)}")
+        count = len(history.versions)
+        note(f"every version is reproduced bit for bit: {count} of {count}")
 
 
 @calibrate.command("export")
@@ -363,27 +326,23 @@ def export_command(store: Path, sensor: str, number: int | None, file_format: st
         sosmith calibrate export --sensor left -o left.toml
         sosmith calibrate export --sensor left --version 1 --format csv -o left.csv
     """
-    from sosmith.instrument.calibration.calibration_report import measurements_csv, specification_table
-    from sosmith.instrument.calibration.measurement_store import open_store
-    from sosmith.instrument.calibration.self_updating import calibration_of, find_version
+    from sosmith.interface.instrument.calibration_store import CalibrationStore
 
-    with show_progress() as step, open_store(store) as opened:
-        version = find_version(opened, sensor, number)
+    kept = CalibrationStore(store)
+    with show_progress() as step:
+        version = kept.version(sensor, number).number
         if file_format == "toml":
             step("fitting again")
-            made = None
-            try:
-                made = calibration_of(opened, sensor, version.number)
-            except ShortfallError as error:
-                note(f"the uncertainty is left out: {error}")
-            text = specification_table(sensor, version, made)
+            text, left_out = kept.specification(sensor, version)
+            if left_out:
+                note(f"the uncertainty is left out: {left_out}")
         else:
-            text = measurements_csv(opened.measurements(sensor, version.last_measurement))
+            text = kept.measurements(sensor, version)
     if output is None:
         click.echo(text, nl=False)
     else:
         write_file(output, text)
-        note(f"wrote {output}: version {version.number} of sensor {sensor}")
+        note(f"wrote {output}: version {version} of sensor {sensor}")
 
 
 @calibrate.command("plot")
@@ -399,18 +358,14 @@ def plot_command(store: Path, sensor: str, number: int | None, output: Path | No
     """
     path = output or Path("calibration.svg")
     file_format = picture_format(path)
-    from sosmith.instrument.calibration.calibration_plot import calibration_plot
-    from sosmith.instrument.calibration.measurement_store import open_store
-    from sosmith.instrument.calibration.self_updating import calibration_of
+    from sosmith.interface.instrument.calibration_store import CalibrationStore
 
-    with show_progress() as step, open_store(store) as opened:
-        step("fitting again")
-        made = calibration_of(opened, sensor, number)
-        versions = opened.versions(sensor)[: made.version.number]
-        step("drawing")
-        drawn = calibration_plot(made, versions, file_format)
+    kept = CalibrationStore(store)
+    with show_progress() as step:
+        version = kept.version(sensor, number).number
+        drawn = kept.picture(sensor, file_format, version, step)
     write_file(path, drawn)
-    note(f"wrote {path}: version {made.version.number} of sensor {sensor}")
+    note(f"wrote {path}: version {version} of sensor {sensor}")
 
 
 @calibrate.command("advise")
@@ -447,23 +402,19 @@ def advise_command(
     \b
         sosmith calibrate advise 2mm 3mm 4mm --sensor left --within 0.2mm
     """
-    from sosmith.commands.tables.calibration import print_advice
-    from sosmith.instrument.calibration.calibration_report import advice_json
-    from sosmith.instrument.calibration.measurement_store import open_store
-    from sosmith.instrument.calibration.self_updating import advice_for
+    from sosmith.interface.instrument.calibration_store import CalibrationStore
 
-    with show_progress() as step, open_store(store) as opened:
+    with show_progress() as step:
         step(f"fitting {sensor}")
-        found = advice_for(opened, sensor, date, clearances, temperatures, within, most)
-    if as_json:
-        print_json(advice_json(sensor, date, within, found))
-    else:
-        print_advice(sensor, date, found)
-    if not found.reached:
-        raise ShortfallError(
-            f"the intervals must be within {within:g} mm, and {found.count} measurements bring them to "
-            f"{max(found.after):.3g} mm only"
+        advised = CalibrationStore(store).advice(
+            sensor, date, clearances, temperatures=temperatures, within=within, most=most
         )
+    if as_json:
+        print_json(advised.as_dict())
+    else:
+        print_tables(advised.tables())
+    if advised.shortfall:
+        raise ShortfallError(advised.shortfall)
 
 
 @calibrate.command("health")
@@ -489,42 +440,30 @@ def health_command(store: Path, sensor: str, since: str | None, plot: Path | Non
         sosmith calibrate health --sensor left --since 2026-04-20
     """
     file_format = "" if plot is None else picture_format(plot)
-    from sosmith.commands.tables.calibration import print_health
-    from sosmith.instrument.calibration.health.health_report import health_json
-    from sosmith.instrument.calibration.measurement_store import open_store
-    from sosmith.instrument.calibration.self_updating import health_for
+    from sosmith.interface.instrument.calibration_store import CalibrationStore
 
-    with show_progress() as step, open_store(store) as opened:
+    with show_progress() as step:
         step(f"going through the days of {sensor}")
-        found = health_for(opened, sensor, since)
+        checked = CalibrationStore(store).health(sensor, since)
         if plot is not None:
-            from sosmith.instrument.calibration.health.health_plot import health_plot
-
             step("drawing")
-            write_file(plot, health_plot(sensor, found, file_format))
+            write_file(plot, checked.picture(file_format))
     if plot is not None:
         note(f"wrote {plot}")
     if as_json:
-        print_json(health_json(sensor, found))
+        print_json(checked.as_dict())
     else:
-        print_health(sensor, found)
-    if found.alarms:
+        print_tables(checked.tables())
+    if checked.alarms:
         raise ShortfallError(
-            f"sensor {sensor}: {_counted(len(found.alarms), 'alarm')}; look at the sensor, then use --since"
+            f"sensor {sensor}: {_counted(checked.alarms, 'alarm')}; look at the sensor, then use --since"
         )
 
 
-def _warn(made: Calibration) -> None:
-    for warning in made.warnings:
+def _warn(fitted: Fitted) -> None:
+    for warning in fitted.warnings:
         note(f"warning: {warning}")
 
 
 def _counted(count: int, what: str) -> str:
     return f"{count:,} {what}{'' if count == 1 else 's'}"
-
-
-def _note_refusals(file: Path, refusals: tuple[Refusal, ...]) -> None:
-    for refusal in refusals[:_SHOWN]:
-        note(f"{file}, line {refusal.line}: {refusal.reason}")
-    if len(refusals) > _SHOWN:
-        note(f"... and {len(refusals) - _SHOWN:,} more lines; --json lists all")

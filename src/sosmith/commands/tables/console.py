@@ -12,7 +12,7 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
-from sosmith.interface.tables.table import Table as Facts
+from sosmith import Table as Facts
 from sosmith.terminal import NARROWEST
 
 _VERDICTS = {None: "", True: ": [bold green]passed[/]", False: ": [bold red]fell short[/]"}
@@ -63,3 +63,5 @@ def print_all(tables: Iterable[Facts]) -> None:
             heading = escape(first) if style is None else f"[{style}]{escape(first)}[/]"
             table.add_row(heading, *map(escape, rest))
         console.print(table)
+        for sentence in facts.notes:
+            console.print(escape(sentence), highlight=False)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from functools import cached_property
 from typing import Any
 
+from sosmith.gen.facts.table import Table
 from sosmith.instrument.paper.comparison import LABELS
 from sosmith.instrument.paper.document import paper_files, paper_json, summary_rows
 from sosmith.instrument.paper.figures import read_paper_figures
-from sosmith.interface.tables.table import Table
 
 
 class Paper:

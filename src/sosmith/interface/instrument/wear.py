@@ -8,12 +8,12 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
 
+from sosmith.gen.facts.table import Table
 from sosmith.instrument.uncertainty.instrument_budget import instrument_of
 from sosmith.instrument.wear.assessment import WearLimits, WearReport, judge
 from sosmith.instrument.wear.record_file import WearRecord, moment_text, read_wear_record
 from sosmith.interface.certificate import Progress
 from sosmith.interface.specification import Specification
-from sosmith.interface.tables.table import Table
 from sosmith.model.errors import SpecificationError
 
 __all__ = ["Wear", "WearLimits"]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from sosmith.gen.architectures.architecture import Architecture
 from sosmith.gen.calibration.fit import Fit, read_measurements
+from sosmith.gen.facts.table import Table
 from sosmith.gen.output.core_facts import CoreFacts, LimitCycleFacts, SectionFacts
 from sosmith.gen.output.decimation_facts import DecimationFacts, RateCosts
 from sosmith.gen.quantity import LEAST_PART, quantity
@@ -18,7 +19,6 @@ from sosmith.instrument.calibration.uncertainty import of_polynomial
 from sosmith.instrument.uncertainty.budget import SHARE
 from sosmith.instrument.uncertainty.instrument_budget import InstrumentBudget
 from sosmith.interface.quantity import Quantity
-from sosmith.interface.tables.table import Table
 from sosmith.model.dataflow.program import Program
 from sosmith.model.port import Port
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from sosmith.gen.facts.table import Table
 from sosmith.gen.quantity import count, duration, in_own_unit, plain_number, quantity
-from sosmith.interface.tables.table import Table
 
 
 def report_table(summary: Mapping[str, Any]) -> Table:

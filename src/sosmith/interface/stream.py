@@ -1,0 +1,72 @@
+"""A trace that went through a board: its results as rows of a file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from os import PathLike, fspath
+from pathlib import Path
+
+from sosmith.host.board import BAUD, Board, Results
+from sosmith.host.recording import as_csv, recording
+from sosmith.host.rows import columns, rows
+from sosmith.host.trace_samples import samples_for
+from sosmith.model.link.identity import Identity
+from sosmith.model.text_files import write_file
+
+
+@dataclass(frozen=True, eq=False)
+class Streamed:
+    """What a board made of a trace.
+
+    Attributes
+    ----------
+    identity : Identity
+        What the board says that it is.
+    results : Results
+        One result for each sample.
+    faults : dict of str to int
+        Faults of the line that were mended, by their kinds; those that did not occur are left out.
+    """
+
+    identity: Identity
+    results: Results = field(repr=False)
+    faults: dict[str, int]
+
+    @classmethod
+    def through(
+        cls,
+        port: str,
+        trace: str | PathLike[str],
+        *,
+        baud: int = BAUD,
+        progress: Callable[[str, int, int], None] = lambda step, done, total: None,
+    ) -> Streamed:
+        """Send the samples of a CSV file through the board at a port, from reset.
+
+        Raises
+        ------
+        SpecificationError
+            If the file does not fit the board.
+        ToolError
+            If there is no board, or the link fails.
+        """
+        with Board(port, baud=baud) as board:
+            progress(f"reading {trace}", 0, 0)
+            codes = samples_for(board.identity, Path(fspath(trace)))
+            results = board.run_codes(codes, lambda done, total: progress("streaming", done, total))
+            faults = {name: count for name, count in board.faults.items() if count}
+            return cls(board.identity, results, faults)
+
+    def csv(self) -> str:
+        """Return a row for each result: time_s, channel if there are several, the value with its unit, code, status."""
+        return as_csv([columns(self.identity), *rows(self.identity, self.results)])
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the same rows to a CSV file, or to a new Parquet file if its name ends so."""
+        target = Path(fspath(path))
+        if target.suffix.lower() != ".parquet":
+            write_file(target, self.csv())
+            return
+        with recording(target, columns(self.identity)) as file:
+            file.add(rows(self.identity, self.results))
