@@ -22,6 +22,12 @@ if TYPE_CHECKING:
 MAX_SOCKETS = 32
 """Most websockets at once; a page has one."""
 
+MAX_CONNECTIONS = 128
+"""Most connections at once, whatever they ask for: with more, files of the monitor could not be opened any more."""
+
+OPEN_TIMEOUT = 5.0
+"""Seconds within which a request must be complete."""
+
 MAX_MESSAGE = 1 << 10
 """Longest message in bytes from a page that has nothing to say."""
 
@@ -89,9 +95,14 @@ class Loopback:
         port: int = 0,
         max_message: int = MAX_MESSAGE,
     ) -> None:
-        from websockets.sync.server import serve
+        from websockets.sync.server import ServerConnection, serve
+
+        def create(*given: Any, **options: Any) -> ServerConnection:
+            self._check_free()
+            return ServerConnection(*given, **options)
 
         self._pages, self._talk = pages, talk
+        self._lock, self._threads = threading.Lock(), set[threading.Thread]()
         self._token = secrets.token_urlsafe(24)
         self._free = threading.BoundedSemaphore(MAX_SOCKETS)
         # What a browser or a stranger does to a connection is of no interest to who reads the terminal.
@@ -103,7 +114,9 @@ class Loopback:
                 port,
                 process_request=self._answer,
                 max_size=max_message,
+                open_timeout=OPEN_TIMEOUT,
                 close_timeout=1,
+                create_connection=create,
                 server_header=None,
                 logger=silent,
             )
@@ -120,6 +133,13 @@ class Loopback:
         self._server.shutdown()
         self._thread.join()
 
+    def _check_free(self) -> None:
+        """Refuse one connection too many, which closes it; called in the thread of each."""
+        with self._lock:
+            self._threads = {thread for thread in self._threads if thread.is_alive()} | {threading.current_thread()}
+            if len(self._threads) > MAX_CONNECTIONS:
+                raise ConnectionRefusedError
+
     def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
         """Answer a request for a page; let one for the websocket pass."""
         hosts, origins = request.headers.get_all("Host"), request.headers.get_all("Origin")
@@ -128,6 +148,8 @@ class Loopback:
             return connection.respond(403, "The host must be 127.0.0.1 or localhost, with the port of this page.\n")
         if any(origin.removeprefix("http://") not in self._hosts for origin in origins):
             return connection.respond(403, "The origin must be this page.\n")
+        if getattr(request, "method", "GET") != "GET":  # older versions of websockets know no other
+            return connection.respond(405, "The method must be GET.\n")
         place = request.path.encode()
         if secrets.compare_digest(place, f"/{self._token}/live".encode()):
             return None
