@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import random
 import re
 from collections.abc import Iterator
@@ -15,13 +16,13 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from sosmith.host.loopback import MAX_SOCKETS, POLICY_VIOLATION
+from sosmith.host.loopback import MAX_SOCKETS, POLICY_VIOLATION, Loopback, take_messages
 from sosmith.host.page import LivePage
 from sosmith.host.readings import Readings
 from sosmith.studio.server import Studio
 from tests.host.lines import device_of
 from tests.interface.small import instrument_design
-from tests.studio.sessions import session_in
+from tests.studio.sessions import session_in, until
 
 
 @pytest.fixture(scope="module", name="studio")
@@ -90,6 +91,8 @@ BAD = [
     '{"do": "trace", "source": "x", "csv": 5}',
     '{"do": "calibration", "csv": "\\udfff"}',
     "9" * 5000,
+    '{"do": "text", "text": "\\ud800"}',
+    '{"do": "change", "changes": {"name": "\\ud800"}}',
 ]
 
 
@@ -115,3 +118,58 @@ def test_random_messages(studio: str, tmp_path: Path, capfd: pytest.CaptureFixtu
             page.send(json.dumps(made))
     assert status(studio) == 200
     assert "Traceback" not in capfd.readouterr().err
+
+
+class _Broken:
+    """A session or a reading with a fault of its own."""
+
+    def __getattr__(self, name: str) -> object:
+        raise KeyError(f"a\n\x1b[2J{name}")
+
+
+def told(caplog: pytest.LogCaptureFixture) -> str:
+    """Return the only sentence that was logged, without the number of a line."""
+    (sentence,) = caplog.messages
+    return re.sub(r"line \d+", "line N", sentence)
+
+
+def test_a_fault_of_our_own_in_a_page_is_told(caplog: pytest.LogCaptureFixture) -> None:
+    broken = _Broken()
+    pages = {"": lambda: broken.page, "other": lambda: ("<p>", "default-src 'none'")}
+    server = Loopback(pages, lambda connection: None)  # type: ignore[arg-type]
+    try:
+        assert (status(server.address), status(server.address + "other")) == (500, 200)
+    finally:
+        server.close()
+    assert told(caplog) == (
+        "the page itself must be answered, not end in a fault of this program, KeyError: 'a\\\\n\\\\x1b[2Jpage' "
+        "in test_server.py, line N: please report it"
+    )
+
+
+def test_a_fault_of_our_own_in_a_message_is_told(caplog: pytest.LogCaptureFixture) -> None:
+    def take(message: object) -> None:
+        json.loads("{")  # a ValueError, as those of bad messages
+
+    server = Loopback({}, lambda connection: take_messages(connection, take))
+    try:
+        with connect(server.address.replace("http", "ws") + "live") as page:
+            page.send("{}")
+            with pytest.raises(ConnectionClosed):
+                page.recv(20)
+            assert page.close_code == 1011
+    finally:
+        server.close()
+    assert told(caplog) == (
+        "a message of a page must be answered, not end in a fault of this program, JSONDecodeError: Expecting property "
+        "name enclosed in double quotes: line N column 2 (char 1) in decoder.py, line N: please report it"
+    )
+
+
+def test_a_dropped_file_that_the_disk_does_not_take_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with session_in(tmp_path) as session:
+        monkeypatch.setattr(Path, "write_bytes", lambda *_: os.open(tmp_path / "none" / "none", os.O_RDONLY))
+        for message, topic in (({"do": "calibration"}, "calibration"), ({"do": "trace", "source": "x"}, "trace")):
+            session.handle(message | {"csv": "a"}, "page")
+            known = until(session, lambda known, topic=topic: known[topic]["state"] == "refused")  # type: ignore[misc]
+            assert "must be a folder that can be written, not: No such file or directory" in known[topic]["error"]

@@ -13,7 +13,8 @@ from tests.studio.lives import lives
 from tests.studio.sessions import TEXT, file_in, proven, session_in, state, until
 
 import sosmith
-from sosmith.studio.session import MAX_FILE, MAX_TEXT, MessageError, Session, opened
+from sosmith.host.loopback import MessageError
+from sosmith.studio.session import MAX_FILE, MAX_TEXT, Session, opened
 
 LONG = {"filter.order": 9, "filter.cutoff": 3.0, "hardware.realization": "auto", "hardware.architecture": "auto"}
 """Changes that take seconds to prove."""

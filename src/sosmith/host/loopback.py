@@ -7,8 +7,10 @@ import logging
 import os
 import secrets
 import threading
+import traceback
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sosmith.model.errors import SpecificationError
@@ -20,11 +22,19 @@ if TYPE_CHECKING:
 MAX_SOCKETS = 32
 """Most websockets at once; a page has one."""
 
+MAX_CONNECTIONS = 128
+"""Most connections at once, whatever they ask for: with more, files of the monitor could not be opened any more."""
+
+OPEN_TIMEOUT = 5.0
+"""Seconds within which a request must be complete."""
+
 MAX_MESSAGE = 1 << 10
 """Longest message in bytes from a page that has nothing to say."""
 
 POLICY_VIOLATION = 1008
 """Code with which a websocket is closed that says what no page of ours says."""
+
+_NOT_HERE = "There is nothing here.\n"
 
 _NOTHING = (
     "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'; "
@@ -32,6 +42,16 @@ _NOTHING = (
 )
 REPORT_POLICY = _NOTHING + "script-src 'unsafe-inline'"
 """Content policy of a report, which asks for nothing."""
+
+
+_FAULT = 1011
+"""Code with which a websocket is closed that a fault of our own has ended."""
+
+_log = logging.getLogger(__name__)
+
+
+class MessageError(Exception):
+    """A page has said what no page of ours says."""
 
 
 def page_policy(nonce: str) -> str:
@@ -51,6 +71,7 @@ class Loopback:
         Each gives HTML and its content policy, or None if there is nothing yet; by the path after the random part.
     talk : callable
         Serves one websocket, at the path ``live``; called in a thread of its own.
+        A fault of ours in either is logged by a sentence, and answered by the status 500, or by closing with 1011.
     port : int
         TCP port; 0 for a free one.
     max_message : int
@@ -74,9 +95,14 @@ class Loopback:
         port: int = 0,
         max_message: int = MAX_MESSAGE,
     ) -> None:
-        from websockets.sync.server import serve
+        from websockets.sync.server import ServerConnection, serve
+
+        def create(*given: Any, **options: Any) -> ServerConnection:
+            self._check_free()
+            return ServerConnection(*given, **options)
 
         self._pages, self._talk = pages, talk
+        self._lock, self._threads = threading.Lock(), set[threading.Thread]()
         self._token = secrets.token_urlsafe(24)
         self._free = threading.BoundedSemaphore(MAX_SOCKETS)
         # What a browser or a stranger does to a connection is of no interest to who reads the terminal.
@@ -88,7 +114,9 @@ class Loopback:
                 port,
                 process_request=self._answer,
                 max_size=max_message,
+                open_timeout=OPEN_TIMEOUT,
                 close_timeout=1,
+                create_connection=create,
                 server_header=None,
                 logger=silent,
             )
@@ -105,6 +133,13 @@ class Loopback:
         self._server.shutdown()
         self._thread.join()
 
+    def _check_free(self) -> None:
+        """Refuse one connection too many, which closes it; called in the thread of each."""
+        with self._lock:
+            self._threads = {thread for thread in self._threads if thread.is_alive()} | {threading.current_thread()}
+            if len(self._threads) > MAX_CONNECTIONS:
+                raise ConnectionRefusedError
+
     def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
         """Answer a request for a page; let one for the websocket pass."""
         hosts, origins = request.headers.get_all("Host"), request.headers.get_all("Origin")
@@ -113,13 +148,23 @@ class Loopback:
             return connection.respond(403, "The host must be 127.0.0.1 or localhost, with the port of this page.\n")
         if any(origin.removeprefix("http://") not in self._hosts for origin in origins):
             return connection.respond(403, "The origin must be this page.\n")
+        if getattr(request, "method", "GET") != "GET":  # older versions of websockets know no other
+            return connection.respond(405, "The method must be GET.\n")
         place = request.path.encode()
         if secrets.compare_digest(place, f"/{self._token}/live".encode()):
             return None
         for name, made in self._pages.items():
-            if secrets.compare_digest(place, f"/{self._token}/{name}".encode()) and (found := made()) is not None:
-                return _page(connection, *found)
-        return connection.respond(404, "There is nothing here.\n")
+            if secrets.compare_digest(place, f"/{self._token}/{name}".encode()):
+                return self._page(connection, name, made)
+        return connection.respond(404, _NOT_HERE)
+
+    def _page(self, connection: ServerConnection, name: str, made: Callable[[], tuple[str, str] | None]) -> Response:
+        try:
+            found = made()
+        except Exception as error:
+            _tell_fault(f"the page {name or 'itself'}", error)
+            return connection.respond(500, "A fault of this program, not of the request: its terminal tells more.\n")
+        return connection.respond(404, _NOT_HERE) if found is None else _page(connection, *found)
 
     def _serve(self, connection: ServerConnection) -> None:
         if not self._free.acquire(blocking=False):
@@ -127,22 +172,52 @@ class Loopback:
             return
         try:
             self._talk(connection)
+        except Exception as error:
+            _tell_fault("a message of a page", error)
+            connection.close(_FAULT)
         finally:
             self._free.release()
 
 
 def take_messages(connection: ServerConnection, take: Callable[[Any], None]) -> None:
-    """Hand each message of a page to `take`, until it leaves or says what it never says: that ends the connection."""
+    """Hand each message of a page to `take`, until it leaves or says what it never says: that ends the connection.
+
+    Parameters
+    ----------
+    connection : ServerConnection
+        The websocket.
+    take : callable
+        Takes a tree of JSON; raises `MessageError` for one that no page of ours sends. What else it raises is a fault
+        of its own, and is passed on.
+    """
     from websockets.exceptions import ConnectionClosed
 
     with suppress(ConnectionClosed):
         for text in connection:
             try:
-                take(json.loads(text))
-            except ConnectionClosed:
-                raise
-            except Exception:
+                take(_tree(text))
+            except MessageError:
                 connection.close(POLICY_VIOLATION)
+
+
+def _tree(text: str | bytes) -> Any:
+    """Read JSON."""
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError):  # bytes that are no text and numbers of too many digits included
+        raise MessageError from None
+
+
+def _tell_fault(what: str, error: Exception) -> None:
+    """Log a fault of our own, and where it is, in one sentence."""
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    _log.error(
+        "%s must be answered, not end in a fault of this program, %s in %s, line %s: please report it",
+        what,
+        ascii(f"{type(error).__name__}: {error}")[1:-1],
+        Path(place.filename).name,
+        place.lineno,
+    )
 
 
 def _page(connection: ServerConnection, html: str, policy: str) -> Response:

@@ -7,13 +7,14 @@ import math
 import secrets
 import threading
 import time
+from contextlib import suppress
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.host.loopback import Loopback, page_policy
+from sosmith.host.loopback import POLICY_VIOLATION, Loopback, page_policy
 from sosmith.host.readings import Readings
 from sosmith.model.templates import render
 
@@ -22,6 +23,9 @@ if TYPE_CHECKING:
 
 INTERVAL = 0.25
 """Seconds between two pictures that the page is sent, at least."""
+
+LOOK = 0.1
+"""Seconds after which it is looked whether a page is still there, where there are no new pictures."""
 
 FAREWELL = 2.0
 """Seconds that readers have to take the last picture."""
@@ -99,7 +103,7 @@ class LivePage:
             self._changed.notify_all()
 
     def _serve(self, connection: ServerConnection) -> None:
-        """Send each new picture, or the newest one if several were made meanwhile."""
+        """Send each new picture, or the newest one if several were made meanwhile, until the page is gone."""
         from websockets.exceptions import ConnectionClosed
 
         seen, ended = 0, False
@@ -108,10 +112,13 @@ class LivePage:
         try:
             while not ended:
                 with self._changed:
-                    while self._number == seen:
-                        self._changed.wait()
+                    fresh = self._changed.wait_for(lambda last=seen: self._number != last, LOOK)  # type: ignore[misc]
                     seen, shown, ended = self._number, self._picture, self._ended
-                connection.send(shown)
+                if fresh:
+                    connection.send(shown)
+                with suppress(TimeoutError):  # it raises ConnectionClosed if the page is gone
+                    connection.recv(timeout=0)
+                    connection.close(POLICY_VIOLATION)  # this page says nothing
             connection.close()
         except ConnectionClosed:
             pass

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from sosmith import SosmithError, Specification, SpecificationError
-from sosmith.model.text_files import write_files
+from sosmith.host.loopback import MessageError
+from sosmith.model.text_files import write_file, write_files
 from sosmith.studio.edits import changed
 from sosmith.studio.lane import Lane, warm_up
 
@@ -21,10 +22,6 @@ MAX_FILE = 8 << 20
 
 LATE = 1.0
 """Seconds after which a preview is given up for a newer one; before that, the newer one waits."""
-
-
-class MessageError(Exception):
-    """A page has said what no page of ours says."""
 
 
 class Session:
@@ -134,7 +131,7 @@ class Session:
             "stop": self._stop,
             "calibration": self._calibrate,
         }
-        if not isinstance(message, dict) or message.get("do") not in actions:
+        if not isinstance(message, dict) or _typed(message, "do", str) not in actions:
             raise MessageError
         with self._changed:
             self._last = client, int(_typed(message, "n", int, 0))
@@ -207,7 +204,10 @@ class Session:
             raise MessageError
         source = _typed(message, "source", str)
         if message.get("csv") is not None:
-            source = self._dropped("trace.csv", message)
+            kept = self._dropped(topic, "trace.csv", message)
+            if kept is None:
+                return
+            source = kept
         elif source not in (self._state["proof"].get("result") or {}).get("scenarios", {}):
             raise MessageError  # a name of ours, never a path
         arguments: dict[str, Any] = {"source": source, "seconds": None if message.get("csv") is not None else seconds}
@@ -234,7 +234,9 @@ class Session:
                 self._tell(topic, {"state": "none"})
 
     def _calibrate(self, message: dict[str, Any]) -> None:
-        place = self._dropped("measurements.csv", message)
+        place = self._dropped("calibration", "measurements.csv", message)
+        if place is None:
+            return
 
         def news(kind: str, value: Any) -> None:
             with self._changed:
@@ -247,11 +249,14 @@ class Session:
         self._tell("calibration", {"state": "working", "step": "fitting"})
         self._others.run(news, "calibrate", measurements=place)
 
-    def _dropped(self, name: str, message: dict[str, Any]) -> str:
-        """Keep a file that was dropped on the page, under a name of ours."""
-        place = self._folder / name
-        place.write_text(_short(_typed(message, "csv", str), MAX_FILE), encoding="utf-8")
-        return str(place)
+    def _dropped(self, topic: str, name: str, message: dict[str, Any]) -> str | None:
+        """Keep a file that was dropped on the page, under a name of ours; if the disk does not take it, say so."""
+        text = _short(_typed(message, "csv", str), MAX_FILE)
+        try:
+            return str(write_file(self._folder / name, text))
+        except SosmithError as error:
+            self._noted(topic)("refused", str(error))
+            return None
 
     # What follows
 
@@ -391,6 +396,11 @@ def _typed(message: dict[str, Any], key: str, kind: type, default: Any = None) -
 
 
 def _short(text: str, longest: int) -> str:
+    """Check a text from a page: that it is not longer, and can be written as UTF-8."""
     if len(text) > longest:
         raise MessageError
+    try:
+        text.encode()
+    except UnicodeEncodeError:  # half a character, which JSON can say
+        raise MessageError from None
     return text
