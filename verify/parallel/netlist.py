@@ -45,12 +45,16 @@ class Register:
 
 @dataclass(frozen=True)
 class Memory:
-    """A memory: its words before the first clock, and what is executed at each."""
+    """A memory: its words before the first clock, and what is executed at each.
+
+    `unchecked` says that it may read anything at the clock at which that word is written.
+    """
 
     name: str
     width: int
     first: tuple[int, ...]
     statements: tuple[Statement, ...]
+    unchecked: bool = False
 
 
 @dataclass
@@ -190,6 +194,7 @@ class _Flattening:
                 module.widths[name],
                 tuple(held[k] for k in range(depth_)),
                 _prefixed_all(statements.pop(name, ()), prefix),
+                name in module.unchecked,
             )
         require(not statements, f"a process must load a register, not {', '.join(sorted(statements))}")
         for target, value in module.assigns:

@@ -134,6 +134,9 @@ class StateMemories(ABC):
         )
         ahead, most = state.behind - position, self.distance(name) - 1
         require(0 <= ahead <= most, f"{what} at most {most} positions before it is written, not {ahead}")
+        # Between 1 and `most` positions lie no two samples with one address: the word is not the one that is written.
+        collides = self._netlist.memories[name].unchecked and ahead == 0
+        require(not collides, f"{what} before the clock at which it is written, or not be marked with no_rw_check")
         return self.read(name, state, unknown)
 
     def check(self) -> None:

@@ -35,7 +35,7 @@ from sosmith.verify.reader.syntax import (
     Statement,
     Word,
 )
-from sosmith.verify.reader.tokens import Tokens
+from sosmith.verify.reader.tokens import UNCHECKED, Tokens
 
 _NUMBER = re.compile(r"(\d+)'(?:h([0-9a-f]+)|d(\d+)|b([01]+))")
 _UNKNOWN = re.compile(r"(\d+)'[hb]x+")
@@ -152,6 +152,7 @@ class Reader:
 
     def _declaration(self) -> None:
         tokens, module = self._tokens, self._module
+        marks = tokens.marks
         kind = tokens.next()
         top = 0
         ranged = tokens.take("[")
@@ -178,6 +179,8 @@ class Reader:
             require(name not in module.registers, f"{name} must be declared once, not twice")
             if tokens.take("["):
                 kind = "memory"
+                if UNCHECKED in marks:
+                    module.unchecked.add(name)
                 module.depths[name] = tokens.integer() + 1
                 require(module.depths[name] <= _MAX_WORDS, f"{name} must have at most {_MAX_WORDS} words")
                 tokens.expect(":", "0", "]")

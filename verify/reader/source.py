@@ -18,11 +18,11 @@ from sosmith.verify.reader.syntax import (
     Load,
     Module,
     Number,
-    Operator,
     Statement,
     Word,
 )
 from sosmith.verify.reader.tokens import Tokens
+from sosmith.verify.reader.widths import width_of
 
 _MAX_CHARACTERS = 1 << 28
 _MAX_MODULES = 400
@@ -243,18 +243,3 @@ def _loads(statements: tuple[Statement, ...]) -> Iterator[Load]:
             yield from _loads((*statement.yes, *statement.no))
         else:
             yield statement
-
-
-def width_of(value: Expression, module: Module) -> int:
-    """Width of an expression in bits, as an operand of its own."""
-    if isinstance(value, Number):
-        return value.width
-    if isinstance(value, Bits):
-        return module.widths[value.name] if value.width is None else value.width
-    if isinstance(value, Word):
-        return module.widths[value.name]
-    if isinstance(value, Joined):
-        return sum(width_of(part, module) for part in value.parts)
-    if isinstance(value, Operator) and value.symbol == "?":
-        return max(width_of(part, module) for part in value.operands[1:])
-    return max(width_of(part, module) for part in value.operands)

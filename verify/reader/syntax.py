@@ -85,6 +85,8 @@ class Module:
         What each register holds before the first clock; None if that is not said.
     depths : dict of str to int
         Number of words of each memory.
+    unchecked : set of str
+        Memories that may read anything at the clock at which that word is written.
     held : dict of str to dict of int to int
         What the words of each memory hold before the first clock.
     assigns : list
@@ -99,6 +101,7 @@ class Module:
     widths: dict[str, int] = field(default_factory=dict)
     registers: dict[str, int | None] = field(default_factory=dict)
     depths: dict[str, int] = field(default_factory=dict)
+    unchecked: set[str] = field(default_factory=set)
     held: dict[str, dict[int, int]] = field(default_factory=dict)
     assigns: list[tuple[Expression, Expression]] = field(default_factory=list)
     clocked: list[tuple[str, tuple[Statement, ...]]] = field(default_factory=list)

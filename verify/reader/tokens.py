@@ -28,8 +28,10 @@ _ATTRIBUTES = {
     "no_rw_check = 32'd1": re.compile(r" *reg (?:\[\d+:0\] )?(?:instructions|words\d+|\w+_memory) \[\d+:0\];"),
     'ram_style = "block"': re.compile(r" *reg (?:\[\d+:0\] )?\w+ \[\d+:0\];"),
 }
-"""Attributes, and what they may stand before. A memory whose words are read and written at the same clock must not be
-one with ``no_rw_check``: the words of a program are not, which its check shows."""
+"""Attributes, and what they may stand before. With ``no_rw_check``, what a memory reads at the clock at which that word
+is written may be anything: `Tokens.marks` says where it stands, and whoever follows the memory has to show that nobody
+looks at such a word."""
+UNCHECKED = "no_rw_check = 32'd1"
 
 _TOKEN = re.compile(
     r"[A-Za-z_]\w*|\$signed|[1-9]\d*'h[0-9a-fx]+|[1-9]\d*'d\d+|[1-9]\d*'b[01x]+|\d+|<=|>=|==|!=|<<|>>|[-+*/&|^~!<>=?:;,.(){}\[\]@]"
@@ -53,8 +55,13 @@ class Tokens:
     """
 
     def __init__(self, text: str) -> None:
-        self._tokens = [token for line in _lines(text) for token in _cut(line)]
+        self._tokens: list[str] = []
+        self._marks: dict[int, list[str]] = {}
         self._at = 0
+        for line, attributes in _lines(text):
+            if attributes:
+                self._marks[len(self._tokens)] = attributes
+            self._tokens += _cut(line)
 
     def peek(self) -> str:
         """Return the next token; "" at the end."""
@@ -107,19 +114,25 @@ class Tokens:
         """Number of tokens that were taken."""
         return self._at
 
+    @property
+    def marks(self) -> list[str]:
+        """Attributes of what begins with the next token."""
+        return self._marks.get(self._at, [])
+
     def refused(self, wanted: str, found: str) -> RejectedError:
         """Return the rejection of a token, the last one that was taken."""
         before = " ".join(self._tokens[max(self._at - 6, 0) : self._at - 1])
         return RejectedError(f"the SystemVerilog must have {wanted} after {before!r}, not {found!r}")
 
 
-def _lines(text: str) -> list[str]:
-    """Return the lines of a text that are neither comments nor attributes."""
+def _lines(text: str) -> list[tuple[str, list[str]]]:
+    """Return the lines of a text that are neither comments nor attributes, each with the attributes before it."""
     require(
         _TEXT.fullmatch(text) is not None,
         "the SystemVerilog must be printable ASCII and line feeds, without tabs or others",
     )
-    kept = []
+    kept: list[tuple[str, list[str]]] = []
+    before: list[str] = []
     lines = text.split("\n")
     for number, line in enumerate(lines):
         comment = _COMMENT.fullmatch(line)
@@ -132,14 +145,16 @@ def _lines(text: str) -> list[str]:
             continue
         attribute = _ATTRIBUTE.fullmatch(line)
         if attribute is not None:
-            before = _ATTRIBUTES.get(attribute[1])
+            place = _ATTRIBUTES.get(attribute[1])
             following = next((other for other in lines[number + 1 :] if not _ATTRIBUTE.fullmatch(other)), "")
             require(
-                before is not None and before.fullmatch(following) is not None,
+                place is not None and place.fullmatch(following) is not None,
                 f"line {number + 1} must be an attribute that changes no value, not {line.strip()[:60]!r}",
             )
+            before.append(attribute[1])
             continue
-        kept.append(line)
+        kept.append((line, before))
+        before = []
     return kept
 
 

@@ -36,6 +36,11 @@ _NOT_ALL = 4
     type=click.Choice(["instrument", "filter", "calibration"]),
     help="With --spec, the core that must be proven; all that the specification describes by default.",
 )
+@click.option(
+    "--second-reader",
+    type=click.Choice(["yosys"]),
+    help="With --files, compare what is read with what this front end sees, every register bit by bit.",
+)
 @click.option("--partial", is_flag=True, help="Exit with 0 where nothing is wrong, though a part is not proven.")
 @click.option(
     "--time-limit",
@@ -52,6 +57,7 @@ def verify(
     files: Path | None,
     rebuild: bool,
     core: str | None,
+    second_reader: str | None,
     partial: bool,
     time_limit: float,
     as_json: bool,
@@ -73,7 +79,15 @@ def verify(
     read = Certificate.load(certificate)
     with show_progress() as step:
         try:
-            proof = read.verify(step, spec=spec, files=files, rebuild=rebuild, core=core, seconds=time_limit)
+            proof = read.verify(
+                step,
+                spec=spec,
+                files=files,
+                rebuild=rebuild,
+                core=core,
+                second_reader=second_reader,
+                seconds=time_limit,
+            )
         except ShortfallError as error:
             raise ShortfallError(f"{certificate}: {error}") from None
     if as_json:

@@ -9,6 +9,8 @@ from pathlib import Path
 
 from sosmith.gen.specification.specification import Specification, from_text, load
 from sosmith.interface.quantity import Quantity
+from sosmith.interface.second_reader import SECOND_READERS, read_again
+from sosmith.model.errors import SpecificationError
 from sosmith.model.text_files import write_files
 from sosmith.verify.around.cic import DecimatorVerdict
 from sosmith.verify.certificate_file import Certificate as Entries
@@ -38,6 +40,15 @@ Progress = Callable[[str, int, int], None]
 
 def _stated(spec: Specification, core: str | None) -> Stated:
     return Stated(spec.text, spec.path.parent, None if spec.calibration is None else spec.calibration.data, core)
+
+
+def _check_second_reader(name: str | None, files: str | PathLike[str] | None) -> None:
+    if name is None:
+        return
+    if name not in SECOND_READERS:
+        raise SpecificationError(f"the second reader must be {' or '.join(SECOND_READERS)}, not {name}")
+    if files is None:
+        raise SpecificationError("the second reader must be given files to read")
 
 
 @dataclass(frozen=True)
@@ -77,7 +88,7 @@ class Proof:
     """Number of files that were generated again."""
     scope: Mapping[str, Part] = field(default_factory=dict)
     """How much of each part is proven: arithmetic, filter, calibration, hardware, program, unit, flags, liveness,
-    c_model and rtlil, in this order."""
+    c_model and rtlil, in this order, and second_reader if there was one."""
 
     @property
     def missing(self) -> dict[str, Part]:
@@ -137,6 +148,7 @@ class Certificate:
         files: str | PathLike[str] | None = None,
         rebuild: bool = False,
         core: str | None = None,
+        second_reader: str | None = None,
         seconds: float = 600.0,
     ) -> Proof:
         """Prove the certificate by a different method than the one that made it, and hold it against its subject.
@@ -159,6 +171,9 @@ class Certificate:
         core : str
             With `spec`, the core that must be proven: instrument, filter or calibration; all that the specification
             describes if it is not given.
+        second_reader : str
+            With `files`, "yosys": an outside front end reads the SystemVerilog as well, and every register, memory,
+            port and instance must be the same, bit by bit, as what the proof reads.
         seconds : float
             Time that the proof may take, in s, where it runs in the main thread; 0 for any.
 
@@ -173,7 +188,10 @@ class Certificate:
             If any claim does not follow exactly, or anything disagrees.
         SpecificationError
             If a file cannot be read, or the specification is invalid.
+        ToolError
+            If the second reader is missing.
         """
+        _check_second_reader(second_reader, files)
         checked = None if spec is None else load(Path(fspath(spec)))
         found = judge(
             self.entries,
@@ -183,6 +201,15 @@ class Certificate:
             content=self.text().encode() if self.path is None else self.path.read_bytes(),
             seconds=seconds,
         )
+        scope = dict(found.scope)
+        if second_reader is not None and files is not None:
+            progress("second reader", 0, 0)
+            readings = read_again(Path(fspath(files)) / f"{self.name}.sv", seconds)
+            why = (
+                f"Yosys sees the same {readings.register_bits} bits of registers and {readings.words} words of "
+                f"memories in {readings.modules} modules, and what each of them becomes"
+            )
+            scope["second_reader"] = Part(State.PROVEN, why)
         verdict, again = found.verdict, 0
         if rebuild:
             from sosmith.gen.output.rebuild import rebuilt
@@ -204,7 +231,7 @@ class Certificate:
             hardware=found.proofs.hardware,
             decimator=found.decimator,
             rebuilt=again,
-            scope=found.scope,
+            scope=scope,
         )
 
     def text(self) -> str:
