@@ -115,7 +115,7 @@ def run(folder: Path, tool: str, *arguments: str) -> subprocess.CompletedProcess
     """
     program = Path(sys.executable).parent / tool
     if not program.exists():
-        sys.exit(f"{tool} must be installed: pip install -c constraints.txt -e '.[boards]'")
+        sys.exit(f"{tool} must be installed: pip install -e '.[boards]'")
     return subprocess.run([str(program), *arguments], cwd=folder, check=False, capture_output=True, text=True)
 
 

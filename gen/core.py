@@ -98,10 +98,10 @@ def design_core(
     ShortfallError
         If no formats meet the specification.
     """
-    kind = _chosen_core(spec, core)
+    kind = chosen_core(spec, core)
     source = "in the specification" if realization is None else "on the command line"
     asked = AskedRealization(_known(realization or spec.hardware.realization), source, widths_of)
-    response, decimates = _response(spec, kind, progress)
+    response, decimates = response_of(spec, kind, progress)
     _check_realization(spec, asked, response)
     ahead, budget, calibrates = _ahead(spec, response, _budget(spec, response.front, board), board)
     search = Search(
@@ -134,8 +134,10 @@ def _given(core: str | None, realization: str | None, widths_of: str | None, boa
     return {key: name for key, name in names.items() if name is not None}
 
 
-def _response(spec: Specification, kind: str, progress: Progress) -> tuple[Response, dict[str, str]]:
-    """Design what a core computes, and say why it decimates if it does.
+def response_of(
+    spec: Specification, kind: str, progress: Progress = lambda step: None
+) -> tuple[Response, dict[str, str]]:
+    """Design what a core of this `kind` computes, and say why it decimates if it does.
 
     Raises
     ------
@@ -150,7 +152,7 @@ def _response(spec: Specification, kind: str, progress: Progress) -> tuple[Respo
         polynomial, fitted = polynomial_of(spec)
     progress("filter design")
     front, decimates = front_in(spec, kind, polynomial)
-    inputs = _inputs(spec, kind)
+    inputs = inputs_of(spec, kind)
     if front is not None:
         ideal: Filter | None = front.filter
     else:
@@ -209,7 +211,14 @@ def _check_realization(spec: Specification, asked: AskedRealization, response: R
         )
 
 
-def _chosen_core(spec: Specification, core: str | None) -> str:
+def chosen_core(spec: Specification, core: str | None) -> str:
+    """Return the kind of core, one of `CORES`: the one that is asked for, or everything in the specification.
+
+    Raises
+    ------
+    SpecificationError
+        If the specification has no such core.
+    """
     if core is not None and core not in CORES:
         raise SpecificationError(f"the core must be one of {', '.join(CORES)}, not {core}{did_you_mean(core, CORES)}")
     if spec.calibration is None:
@@ -234,7 +243,7 @@ def front_in(spec: Specification, core: str, polynomial: Polynomial | None) -> t
     front, reason = front_of(
         spec.filter,
         spec.sample_rate,
-        _inputs(spec, core),
+        inputs_of(spec, core),
         spec.output,
         spec.max_error,
         polynomial,
@@ -303,7 +312,8 @@ def _known(wanted: str) -> str:
     return wanted
 
 
-def _inputs(spec: Specification, core: str) -> tuple[Port, ...]:
+def inputs_of(spec: Specification, core: str) -> tuple[Port, ...]:
+    """Return the inputs of a kind of core."""
     if core == "filter" and spec.calibration is not None:
         # A filter core takes the output of the calibration as its input, in the output's format.
         return (replace(spec.output, name=f"{spec.output.name}_in"),)

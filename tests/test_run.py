@@ -5,9 +5,14 @@ import shutil
 import subprocess
 import sys
 import tomllib
+from collections.abc import Iterator
+from importlib import metadata
 from pathlib import Path
 
 import pytest
+from packaging.markers import default_environment
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).parents[1]
 SUPPORTED = ("3.11", "3.12", "3.13", "3.14")
@@ -32,8 +37,9 @@ def installed(tmp_path: Path, *versions: str) -> subprocess.CompletedProcess[str
             f'-c) exec {sys.executable} -c "{as_told}; $2" ;;\n-m) exit 1 ;;\nesac\n'
         )
         path.chmod(0o755)
-    for name in ("run", "pyproject.toml", "constraints.txt"):
+    for name in ("run", "pyproject.toml"):
         shutil.copy(ROOT / name, tmp_path)
+    shutil.copytree(ROOT / "requirements", tmp_path / "requirements")
     return subprocess.run(
         [tmp_path / "run", "--help"],
         capture_output=True,
@@ -80,3 +86,43 @@ def test_the_versions_are_the_same_everywhere() -> None:
     assert tuple(f"3.{minor}" for minor in classified) == SUPPORTED
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     assert re.findall(r"Python (3\.\d+ to 3\.\d+)", readme) == ["3.11 to 3.14"]
+
+
+def required(level: str) -> dict[str, Requirement]:
+    """Return what a file in requirements/ pins, by name."""
+    text = (ROOT / "requirements" / f"{level}.txt").read_text(encoding="utf-8")
+    entries = [Requirement(one.split(" \\\n")[0]) for one in re.split(r"\n(?=\S)", text.strip())]
+    return {canonicalize_name(one.name): one for one in entries}
+
+
+def test_every_package_has_hashes_and_the_version_of_the_constraints() -> None:
+    lines = (ROOT / "constraints.txt").read_text(encoding="utf-8").split()
+    pins = {canonicalize_name(one.name): str(one.specifier) for one in map(Requirement, lines)}
+    found: dict[str, str] = {}
+    for path in (ROOT / "requirements").glob("*.txt"):
+        text = path.read_text(encoding="utf-8")
+        assert not re.sub(r"\S+==[^\n]+( \\\n    --hash=sha256:[0-9a-f]{64})+\n", "", text)
+        found |= {name: str(one.specifier) for name, one in required(path.stem).items()}
+    assert found == pins
+
+
+@pytest.mark.parametrize(("extras", "files"), [((), ("base",)), (("boards",), ("base", "boards")), (("test",), ())])
+def test_what_run_installs_is_all_that_the_package_needs(extras: tuple[str, ...], files: tuple[str, ...]) -> None:
+    names = {name for level in ("build", *(files or ("base", "boards", "test"))) for name in required(level)}
+    assert set(needed("sosmith", extras)) <= names
+
+
+def needed(name: str, extras: tuple[str, ...], seen: frozenset[str] = frozenset()) -> Iterator[str]:
+    """Yield what an installed package needs, and what that needs, by the metadata of what is installed."""
+    for text in metadata.requires(name) or ():
+        one = Requirement(text)
+        if one.marker is not None and not any(
+            one.marker.evaluate({**default_environment(), "extra": extra}) for extra in ("", *extras)
+        ):
+            continue
+        below = canonicalize_name(one.name)
+        if below != "sosmith":
+            yield below
+        if f"{below}{sorted(one.extras)}" not in seen:
+            seen |= {f"{below}{sorted(one.extras)}"}
+            yield from needed(one.name, tuple(one.extras), seen)

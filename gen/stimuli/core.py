@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from sosmith.gen.core import CoreDesign
+from sosmith.gen.core import CoreDesign, chosen_core, inputs_of, response_of
+from sosmith.gen.specification.specification import Specification
 from sosmith.gen.stimuli.run import Bench
 from sosmith.gen.word_lengths.error_paths import error_responses
 
@@ -23,4 +24,24 @@ def bench_of(design: CoreDesign, *, errors: bool = True) -> Bench:
         polynomial=quantized.polynomial,
         impulse_response=response,
         error_responses=responses,
+    )
+
+
+def bench_before(spec: Specification, core: str | None = None) -> Bench:
+    """Return the same before there is a design, from the specification alone, but for the responses to errors.
+
+    Raises
+    ------
+    SpecificationError, ShortfallError
+        If the specification has no such core, or its filter cannot be designed.
+    """
+    kind = chosen_core(spec, core)
+    made, _ = response_of(spec, kind)
+    response = np.ones(1) if made.ideal is None else made.ideal.impulse_response
+    return Bench(
+        ports=inputs_of(spec, kind),
+        output=spec.output,
+        sample_rate=spec.sample_rate,
+        polynomial=made.polynomial,
+        impulse_response=response if made.front is None else made.front.decimator.before(response),
     )

@@ -61,6 +61,11 @@ def temperature_ramp(run: Run) -> Emulated:
     return Emulated(_sense(run, clearance, run.between(RAMP_TEMPERATURE)), clearance, reading)
 
 
+def least_wear_ramp(bench: Bench) -> int:
+    """Return the lowest number of samples of `wear_ramp`: the filter has to settle, and one is to be read."""
+    return bench.settling(WEAR_CLEARANCE[1]) + 1
+
+
 def wear_ramp(run: Run) -> Emulated:
     """Wear under vehicle motion; read after the filter has settled. Raises if the trace is too short."""
     wear = run.between(WEAR_CLEARANCE)

@@ -5,9 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from sosmith.gen.core import CoreDesign
-from sosmith.gen.stimuli.core import bench_of
+from sosmith.gen.specification.specification import Specification
+from sosmith.gen.stimuli.core import bench_before, bench_of
 from sosmith.instrument.scenarios.catalogue import SCENARIOS, emulate
 from sosmith.instrument.scenarios.file import emulate_file, load_scenario, range_notes
+from sosmith.instrument.scenarios.instrument_signals import least_wear_ramp
 from sosmith.instrument.scenarios.vehicle_clearance import vehicle_clearance
 from sosmith.model.errors import SpecificationError
 from sosmith.model.traces.trace import Trace
@@ -80,6 +82,20 @@ def notes_on(design: CoreDesign, source: str) -> tuple[str, ...]:
     return range_notes(load_scenario(Path(source)), design.datapath.inputs)
 
 
-def default_traces(design: CoreDesign, seed: int, seconds: float) -> tuple[Trace, ...]:
-    """Make a trace of the default scenario for every channel, as `traces_for`."""
-    return traces_for(design, default_scenario(design), seed=seed, seconds=seconds)
+class DefaultTraces:
+    """Traces of the default scenario, one for every channel, as `traces_for` makes them."""
+
+    def __call__(self, design: CoreDesign, seed: int, seconds: float) -> tuple[Trace, ...]:
+        """Make the traces."""
+        return traces_for(design, default_scenario(design), seed=seed, seconds=seconds)
+
+    def least(self, spec: Specification, core: str | None) -> int:
+        """Return the lowest number of samples that they can have, before there is a design.
+
+        Raises
+        ------
+        SpecificationError, ShortfallError
+            If the specification has no such core, or its filter cannot be designed.
+        """
+        bench = bench_before(spec, core)
+        return 1 if bench.polynomial is None else least_wear_ramp(bench)

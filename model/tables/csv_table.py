@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import csv
-import io
 import math
 import re
+from array import array
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,12 +16,19 @@ import numpy.typing as npt
 
 from sosmith.model.arrays import Values
 from sosmith.model.errors import SpecificationError
+from sosmith.model.foreign_files import read_lines
 
 # float() would also accept "nan", "1_000" and digits of other scripts.
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 LARGEST = 1e100
 """Largest magnitude of a number; sums of squares below it do not overflow, and no physical value is above it."""
+
+CHUNK = 1 << 16
+"""Rows of a chunk."""
+
+MAX_CELLS = 1 << 26
+"""Most cells of a table that is read as a whole, which takes half a gigabyte."""
 
 MAX_SHOWN = 60
 """Longest cell, in characters, that a message quotes in full."""
@@ -39,14 +46,14 @@ class CsvTable:
         Column names, all different.
     values : ndarray, shape (n_rows, n_columns)
         Cells; at least one row.
-    lines : tuple of int
+    lines : ndarray of uint32, shape (n_rows,)
         Line of the file, from 1, on which each row ends.
     """
 
     path: Path
     header: tuple[str, ...]
     values: Values
-    lines: tuple[int, ...]
+    lines: npt.NDArray[np.uint32]
 
     def __contains__(self, column: str) -> bool:
         """Whether the table has a column of that name."""
@@ -58,7 +65,7 @@ class CsvTable:
 
     def take(self, rows: npt.NDArray[np.intp]) -> CsvTable:
         """Return a table of the rows with these indices, in their order."""
-        return CsvTable(self.path, self.header, self.values[rows], tuple(self.lines[row] for row in rows))
+        return CsvTable(self.path, self.header, self.values[rows], self.lines[rows])
 
     def refuse(self, row: int, what: str) -> SpecificationError:
         """Return an error about row index `row`; `what` is the sentence after file and line."""
@@ -90,48 +97,83 @@ def read_csv_table(
     Raises
     ------
     SpecificationError
-        If the file cannot be read or is not UTF-8 text; if it is empty or has only a header; if a column is unknown,
-        missing or repeated; if a row has too few or too many cells; if a cell is not a finite number of magnitude up
-        to `LARGEST`. The message is one sentence with the file and, if there is one, the line.
+        As for `read_lines`; if the file is empty or has only a header; if a column is unknown, missing or repeated; if
+        a row has too few or too many cells; if a cell is not a finite number of magnitude up to `LARGEST`; if there are
+        more than `MAX_CELLS`. The message is one sentence with the file and, if there is one, the line.
     """
-    reader = csv.reader(io.StringIO(_read_text(path), newline=""), strict=True)
-    rows: list[list[float]] = []
-    lines: list[int] = []
+    cells, lines = array("d"), array("I")
+    for chunk in read_csv_chunks(path, known, required, readers):
+        cells.frombytes(chunk.values.tobytes())
+        lines.frombytes(chunk.lines.tobytes())
+        if len(cells) > MAX_CELLS:
+            raise chunk.refuse(-1, f"the table must have at most {MAX_CELLS:,} cells, not go on")
+    values = np.frombuffer(cells).reshape(len(lines), -1)
+    return CsvTable(path, chunk.header, values, np.frombuffer(lines, dtype=np.uint32))
+
+
+def read_csv_chunks(
+    path: Path, known: Sequence[str], required: Sequence[str] = (), readers: Mapping[str, Reader] | None = None
+) -> Iterator[CsvTable]:
+    """Yield a CSV file of numbers as tables of up to `CHUNK` rows, at least one, which take little memory at a time.
+
+    Parameters and errors are those of `read_csv_table`, but for the number of cells.
+    """
+    header: tuple[str, ...] = ()
+    cells, lines, any_rows = array("d"), array("I"), False
+    for header, line, row in _rows(path, known, required, readers or {}):
+        cells.extend(row)
+        lines.append(line)
+        if len(lines) == CHUNK:
+            yield _chunk(path, header, cells, lines)
+            cells, lines, any_rows = array("d"), array("I"), True
+    if lines:
+        yield _chunk(path, header, cells, lines)
+    elif not any_rows:
+        raise SpecificationError(f"{path} must hold rows of numbers below its header, not only the header")
+
+
+def _chunk(path: Path, header: tuple[str, ...], cells: array[float], lines: array[int]) -> CsvTable:
+    values = np.frombuffer(cells).reshape(len(lines), len(header))
+    return CsvTable(path, header, values, np.frombuffer(lines, dtype=np.uint32))
+
+
+def _rows(
+    path: Path, known: Sequence[str], required: Sequence[str], readers: Mapping[str, Reader]
+) -> Iterator[tuple[tuple[str, ...], int, list[float]]]:
+    """Yield the header, the line and the numbers of each row."""
+    reader = csv.reader(read_lines(path, what="CSV file"), strict=True)
     header: tuple[str, ...] = ()
     try:
         for cells in reader:
-            where = f"{path}, line {reader.line_num}"
             if not any(cell.strip() for cell in cells) and len(cells) <= 1:
                 continue
             if not header:
                 header = tuple(cell.strip() for cell in cells)
-                _check_header(where, header, known, required)
+                _check_header(f"{path}, line {reader.line_num}", header, known, required)
                 continue
             if len(cells) != len(header):
                 expected = "1 cell" if len(header) == 1 else f"{len(header)} cells"
-                raise SpecificationError(f"{where}: row must have {expected}, not {len(cells)}")
-            rows.append([_number(where, name, cell, readers or {}) for name, cell in zip(header, cells, strict=True)])
-            lines.append(reader.line_num)
+                raise SpecificationError(
+                    f"{path}, line {reader.line_num}: row must have {expected}, not {len(cells)}"
+                )
+            line = reader.line_num
+            yield header, line, [_number(path, line, *each, readers) for each in zip(header, cells, strict=True)]
     except csv.Error as error:
         raise SpecificationError(
             f"{path}, line {reader.line_num}: row must be valid CSV, not broken ({error})"
         ) from None
     if not header:
         raise SpecificationError(f"{path} must hold a header line and rows of numbers, not be empty")
-    if not rows:
-        raise SpecificationError(f"{path} must hold rows of numbers below its header, not only the header")
-    return CsvTable(path, header, np.array(rows, dtype=np.float64), tuple(lines))
 
 
 def csv_header(path: Path) -> list[str]:
     """Return the names in the first line that is not blank; none if unreadable, which `read_csv_table` then reports."""
     try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            for cells in csv.reader(file, strict=True):
-                if any(cell.strip() for cell in cells):
-                    check_separator(str(path), cells)
-                    return [cell.strip() for cell in cells]
-    except (OSError, UnicodeDecodeError, csv.Error, SpecificationError):
+        for cells in csv.reader(read_lines(path, what="CSV file"), strict=True):
+            if any(cell.strip() for cell in cells):
+                check_separator(str(path), cells)
+                return [cell.strip() for cell in cells]
+    except (csv.Error, SpecificationError):
         pass
     return []
 
@@ -162,20 +204,6 @@ def check_rows(table: CsvTable, bad: npt.NDArray[np.bool_], what: Callable[[int]
         raise table.refuse(row, what(row))
 
 
-def _read_text(path: Path) -> str:
-    try:
-        return path.read_bytes().decode("utf-8-sig")
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise SpecificationError(f"{path} must be a readable CSV file ({reason})") from None
-    except UnicodeDecodeError as error:
-        line = error.object.count(b"\n", 0, error.start) + 1
-        byte = error.object[error.start]
-        raise SpecificationError(
-            f"{path}, line {line}: text must be UTF-8, not contain the byte 0x{byte:02x}"
-        ) from None
-
-
 def _check_header(where: str, header: Sequence[str], known: Sequence[str], required: Sequence[str]) -> None:
     check_separator(where, header)
     for name, count in Counter(header).items():
@@ -188,18 +216,19 @@ def _check_header(where: str, header: Sequence[str], known: Sequence[str], requi
             raise SpecificationError(f"{where}: column {name} must be present, not missing from {', '.join(header)}")
 
 
-def _number(where: str, column: str, cell: str, readers: Mapping[str, Reader]) -> float:
+def _number(path: Path, line: int, column: str, cell: str, readers: Mapping[str, Reader]) -> float:
     text = cell.strip()
+    if column not in readers and NUMBER.fullmatch(text) and abs(number := float(text)) <= LARGEST:
+        return number
+    where = f"{path}, line {line}"
     if column in readers:
         try:
             return readers[column](text)
         except ValueError as error:
             raise SpecificationError(f"{where}: {column} must be {error}, not {text!r}") from None
-    if not NUMBER.fullmatch(text) or math.isinf(float(text)):
+    if not NUMBER.fullmatch(text) or float(text) in {math.inf, -math.inf}:
         raise SpecificationError(f"{where}: {column} must be a finite number, not {shortened(text)}")
-    if abs(float(text)) > LARGEST:
-        raise SpecificationError(f"{where}: {column} must be from -{LARGEST:g} to {LARGEST:g}, not {shortened(text)}")
-    return float(text)
+    raise SpecificationError(f"{where}: {column} must be from -{LARGEST:g} to {LARGEST:g}, not {shortened(text)}")
 
 
 def shortened(text: str) -> str:

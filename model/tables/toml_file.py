@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from sosmith.model.errors import SpecificationError
+from sosmith.model.foreign_files import read_text
 
 
 def read_toml(path: Path, *, what: str, max_bytes: int, parse_float: Callable[[str], Any] = float) -> dict[str, Any]:
@@ -28,42 +29,6 @@ def read_toml(path: Path, *, what: str, max_bytes: int, parse_float: Callable[[s
         As `read_text`, or if the file is no TOML.
     """
     return parse_toml(read_text(path, what=what, max_bytes=max_bytes), str(path), what=what, parse_float=parse_float)
-
-
-def read_text(path: Path, *, what: str, max_bytes: int) -> str:
-    """Read a file of text as it is.
-
-    Parameters
-    ----------
-    path : Path
-        The file, UTF-8 with or without a byte order mark.
-    what : str
-        What the file is, such as "the specification", for messages.
-    max_bytes : int
-        Largest size of the file.
-
-    Raises
-    ------
-    SpecificationError
-        If the file cannot be read, is longer than `max_bytes`, or is no UTF-8.
-    """
-    try:
-        with path.open("rb") as file:
-            content = file.read(max_bytes + 1)
-    except OSError as error:
-        found = (error.strerror or str(error)).lower()
-        raise SpecificationError(f"{path}: {what} must be a readable file, not: {found}") from None
-    except ValueError:
-        raise SpecificationError(f"{str(path)!r} must be the path of a file, not an impossible one") from None
-    if len(content) > max_bytes:
-        raise SpecificationError(f"{path}: {what} must be at most {max_bytes} bytes, not longer")
-    try:
-        return content.decode("utf-8")
-    except UnicodeDecodeError as error:
-        line = content.count(b"\n", 0, error.start) + 1
-        raise SpecificationError(
-            f"{path}: line {line} must be UTF-8 text, not the byte 0x{content[error.start]:02x}"
-        ) from None
 
 
 def parse_toml(text: str, name: str, *, what: str, parse_float: Callable[[str], Any] = float) -> dict[str, Any]:

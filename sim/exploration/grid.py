@@ -5,23 +5,33 @@ from __future__ import annotations
 import hashlib
 import itertools
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, Protocol, cast
 
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.specification.exact_values import exact
 from sosmith.gen.specification.specification import Specification, from_tree
 from sosmith.gen.version import __version__
-from sosmith.model.errors import SpecificationError
+from sosmith.model.errors import ShortfallError, SpecificationError
 from sosmith.model.traces.trace import Trace
 from sosmith.sim.exploration.parameters import Parameters, Span
 
-Traces = Callable[[CoreDesign, int, float], tuple[Trace, ...]]
-"""Makes a trace for each channel of a core, from a seed and a length in s; a function that can be pickled."""
+
+class Traces(Protocol):
+    """Makes what designs are run on; can be pickled."""
+
+    def __call__(self, design: CoreDesign, seed: int, seconds: float) -> tuple[Trace, ...]:
+        """Make a trace for each channel of a core, from a seed and a length in s."""
+        ...
+
+    def least(self, spec: Specification, core: str | None) -> int:
+        """Return the lowest number of samples, before there is a design."""
+        ...
+
 
 MAX_POINTS = 100_000
 """Combinations, at most."""
@@ -161,6 +171,32 @@ def refusal_of(task: Task) -> str | None:
     except SpecificationError as error:
         return str(error)
     return None
+
+
+def check_samples(tasks: Sequence[Task]) -> None:
+    """Check that there is a task whose filter settles within its samples, or that has another reason to be refused.
+
+    Raises
+    ------
+    SpecificationError
+        If every task would be refused, after its design, for the samples that all have.
+    """
+    least: dict[str, int] = {}
+    for task in tasks:
+        filtered = json.dumps({key: value for key, value in task.tree.items() if key != "hardware"}, sort_keys=True)
+        if filtered not in least:
+            try:
+                least[filtered] = task.traces.least(task.specification(), task.core)
+            except (SpecificationError, ShortfallError):
+                return  # it is for the evaluation to tell
+        if least[filtered] <= task.samples:
+            return
+    if least:
+        low, high = min(least.values()), max(least.values())
+        slower = "" if low == high else f", and {high:,} for the slowest of these"
+        raise SpecificationError(
+            f"samples must be at least {low:,} for the filter to settle{slower}, not {tasks[0].samples:,}"
+        )
 
 
 def changed(source: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from typing import Any
 from sosmith.gen.specification.specification import Specification
 from sosmith.sim.exploration.evaluation import Point
 from sosmith.sim.exploration.front import pareto_front
-from sosmith.sim.exploration.grid import Subject, Task, Traces, tasks_of
+from sosmith.sim.exploration.grid import Subject, Task, Traces, check_samples, tasks_of
 from sosmith.sim.exploration.parameters import Parameters, in_json
 from sosmith.sim.exploration.record import record_in
 from sosmith.sim.exploration.search import Search
@@ -149,13 +149,14 @@ def explore(
     Raises
     ------
     SpecificationError
-        As `tasks_of`, `Search` and `record_in`.
+        As `tasks_of`, `check_samples`, `Search` and `record_in`; a search checks the samples of its first batch.
     ToolError
         As the runner and `Search`, or if the disk is full.
     """
     progress("checking combinations", 0, 0)
     subject = Subject(spec=spec, core=core, samples=samples, seed=seed, board=board, traces=traces)
     tasks = tasks_of(subject, parameters) if search is None else []
+    check_samples(tasks)
     with record_in(folder) as record:
         searched = None if search is None else Search(subject, parameters, search, record.points)
         done, total = 0, search or len(tasks)
@@ -163,7 +164,9 @@ def explore(
         def missing() -> Iterator[list[Task]]:
             """Leave out of each batch what is on record."""
             nonlocal done
-            for batch in [tasks] if searched is None else searched.batches():
+            for number, batch in enumerate([tasks] if searched is None else searched.batches()):
+                if searched is not None and number == 0:
+                    check_samples(batch)
                 left = {task.key: task for task in batch if task.key not in record.points}
                 done += len(batch) - len(left)
                 progress("designs", done, total)

@@ -28,7 +28,7 @@ from sosmith.gen.specification.coefficients.content import (
 from sosmith.gen.specification.coefficients.mat_file import matrices
 from sosmith.gen.specification.coefficients.text import of_rows
 from sosmith.model.errors import SpecificationError
-from sosmith.model.tables.toml_file import read_text
+from sosmith.model.foreign_files import read_text
 
 MAX_BYTES = 1 << 22
 """Largest size of a file in bytes."""

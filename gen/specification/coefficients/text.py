@@ -22,7 +22,7 @@ from pathlib import Path
 
 from sosmith.gen.specification.coefficients.content import Content, Row, StatedSections, TransferFunction
 from sosmith.model.errors import SpecificationError
-from sosmith.model.tables.toml_file import read_text
+from sosmith.model.foreign_files import read_text
 
 MAX_BYTES = 1 << 20
 """Largest size of a text file in bytes."""

@@ -204,7 +204,7 @@ def explore(
     >>> found
     <sosmith.Exploration sos_filter: 4 points, ... on the front>
     """
-    from sosmith.instrument.scenarios.traces import default_traces
+    from sosmith.instrument.scenarios.traces import DefaultTraces
     from sosmith.instrument.uncertainty.instrument_budget import budget_in_json
     from sosmith.sim.exploration.confirmation import confirmed
     from sosmith.sim.exploration.parameters import default_parameters
@@ -230,7 +230,7 @@ def explore(
         swept,
         place,
         runner,
-        traces=default_traces,
+        traces=DefaultTraces(),
         search=search,
         core=core,
         samples=samples,

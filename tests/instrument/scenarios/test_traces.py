@@ -3,7 +3,15 @@
 import subprocess
 import sys
 
+import numpy as np
 import pytest
+from tests.interface.small import FILTER, INSTRUMENT, instrument_design
+
+import sosmith
+from sosmith import SpecificationError
+from sosmith.gen.stimuli.core import bench_before, bench_of
+from sosmith.instrument.scenarios.traces import DefaultTraces
+
 
 
 @pytest.mark.slow
@@ -12,3 +20,27 @@ def test_no_simulator_is_imported() -> None:
     code = f"import sys, sosmith.instrument.scenarios.traces; print({listed})"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("core", [None, "filter", "calibration"])
+def test_what_traces_depend_on_is_known_before_the_design(core: str | None) -> None:
+    spec = sosmith.Specification.load(INSTRUMENT)
+    before, after = bench_before(spec.checked, core), bench_of(sosmith.design(spec, core=core).core, errors=False)
+    assert (before.ports, before.output.lsb, before.sample_rate) == (after.ports, after.output.lsb, after.sample_rate)
+    assert np.array_equal(before.impulse_response, after.impulse_response)
+
+
+def test_so_is_what_stands_before_a_decimator() -> None:
+    tables = {**FILTER, "filter": {**FILTER["filter"], "cutoff": 10.0, "decimate": 4}}
+    spec = sosmith.Specification.load(tables)
+    before, after = bench_before(spec.checked), bench_of(sosmith.design(spec).core, errors=False)
+    assert np.array_equal(before.impulse_response, after.impulse_response)
+
+
+def test_the_least_samples_are_enough_and_one_fewer_is_not() -> None:
+    made = instrument_design().core
+    traces, rate = DefaultTraces(), float(made.spec.sample_rate)
+    least = traces.least(made.spec, None)
+    assert traces(made, 1, least / rate)[0].reading.sum() == 1
+    with pytest.raises(SpecificationError, match=r"^seconds must be at least \S+ for wear_ramp \("):
+        traces(made, 1, (least - 1) / rate)

@@ -191,6 +191,23 @@ def test_options_that_do_not_fit(options: dict[str, Any], message: str, tmp_path
         explored(tmp_path, **options)
 
 
+def test_too_few_samples_for_every_design_are_told_before_the_first(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(processes, "evaluate", lambda task: pytest.fail("a design must not be made"))
+    spec = sosmith.Specification.example()
+    bits = {"output.bits": [16]}
+    slow = bits | {"filter.cutoff": [0.02, 0.01], "hardware.realization": ["df1", "delta"]}
+    message = "samples must be at least 43,043 for the filter to settle, and 86,085 for the slowest of these, not 200"
+    with pytest.raises(SpecificationError, match=f"^{message}$"):
+        sosmith.explore(spec, slow, folder=tmp_path / "grid", samples=200)
+    assert not (tmp_path / "grid").exists()
+    with pytest.raises(SpecificationError, match=r"^samples must be at least 86,085 for the filter to settle, not 1$"):
+        sosmith.explore(spec, slow | {"filter.cutoff": [0.01]}, search=1, folder=tmp_path / "search", samples=1)
+    with pytest.raises(pytest.fail.Exception):  # some filters settle
+        sosmith.explore(spec, bits | {"filter.cutoff": [0.01, 1.0]}, folder=tmp_path / "some", samples=2000, jobs=1)
+
+
 def test_a_scheduler_that_is_not_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
     message = r"the package distributed is needed for --scheduler, and was not found: pip install 'sosmith\[cluster\]'"
