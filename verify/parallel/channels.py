@@ -10,6 +10,8 @@
 - The input buffer is a queue of two. It takes a sample when the handshake of the stream does, unless the channel does
   not exist, and none while the states are being cleared; it gives one away when that enters the pipeline.
 - After a reset, and before the first sample, every word of the states is cleared, one channel at each clock.
+- A sample in front enters as soon as none of the first positions holds one, whatever else there is: while the sink is
+  ready it waits for as many clocks as there are copies of valid bits, at most.
 
 The buffer and the copies of valid bits that a sample in front is compared with are looked for by the names that the
 generator gives them; what they do is checked here, and that the comparison is enough in
@@ -145,3 +147,9 @@ def _check_leaving(netlist: Netlist, buffer: Buffer, control: Control) -> None:
     require(not value, f"{ready} must be 0 while the pipeline stands")
     forms, logic = search.logic({buffer.held: 1, control.full: 0})
     require(same_word(forms, logic.net(enters), logic.net(ready), 1), f"{ready} must be 1 just when {enters} is")
+    assert control.entrance is not None
+    _, value = search.net(enters, {buffer.held: 1, control.full: 0, **dict.fromkeys(control.entrance.near, 0)})
+    require(
+        value == constant(1),
+        f"{enters} must be 1 for a sample in front while none of those that it may wait for is in the pipeline",
+    )

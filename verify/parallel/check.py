@@ -41,6 +41,7 @@ from sosmith.verify.parallel.netlist import Netlist, flattened
 from sosmith.verify.parallel.pipeline import DATA, Pipeline
 from sosmith.verify.parallel.split import split
 from sosmith.verify.program.normal_form import Form, constant, plus
+from sosmith.verify.progress import Progress
 from sosmith.verify.reader.source import read_modules
 from sosmith.verify.reader.syntax import Module
 from sosmith.verify.specified.words import words_of
@@ -68,12 +69,29 @@ class HardwareVerdict:
         Number of registers whose content was found, of memories, and of those of both that hold a DELAY node.
     latency : int
         Clocks from the edge that accepts a sample to the edge that can hand its result on, without a stall.
+    waits : int
+        Clocks that a sample may have to wait at the entrance for one before it, of its channel.
+    clearing : int
+        Clocks after a reset in which no sample is taken.
     """
 
     registers: int
     memories: int
     states: int
     latency: int
+    waits: int
+    clearing: int
+
+    @property
+    def progress(self) -> Progress:
+        """Within how many clocks samples are taken and results leave, while the sink is ready.
+
+        At the first clock the output buffer may be full. From the second on all samples in the pipeline move at each
+        clock, and one in front enters after `waits` clocks at most; then the input buffer has room, if there is one.
+        Behind an input buffer a sample may wait for itself and for the one before it.
+        """
+        buffered = int(self.clearing > 0)
+        return Progress(2 + buffered * (1 + self.waits), self.latency + 2 * self.waits, self.clearing)
 
 
 def check_hardware(text: str, certificate: Certificate, channels: int = 1, lanes: int = 1) -> HardwareVerdict:
@@ -167,7 +185,8 @@ def _checked(netlist: Netlist, certificate: Certificate, channels: int, inside: 
         raise fault(netlist, pipeline, graph) or error from None
     memories = 0 if pipeline.memories is None else len(pipeline.memories.states)
     latency = len(control.valid) + (channels > 1)
-    return HardwareVerdict(pipeline.registers, memories, len(pipeline.states) + memories, latency)
+    waits, clearing = (0, 0) if control.entrance is None else (len(control.entrance.near), channels)
+    return HardwareVerdict(pipeline.registers, memories, len(pipeline.states) + memories, latency, waits, clearing)
 
 
 def _check_output(

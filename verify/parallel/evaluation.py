@@ -35,6 +35,18 @@ _ONE_BIT = frozenset({"==", "!=", "<", ">", "<=", ">=", "!"})
 _ARITHMETIC = frozenset({"+", "-", "*"})
 
 
+def is_signed(value: Expression) -> bool:
+    """Whether an expression is signed, so that it is extended by its top bit."""
+    if not isinstance(value, Operator) or value.symbol in _ONE_BIT:
+        return False
+    if value.symbol == "signed":
+        return True
+    if value.symbol in {"&", "|"} and len(value.operands) == 1:
+        return False
+    operands = value.operands[1:] if value.symbol == "?" else value.operands
+    return all(is_signed(operand) for operand in operands)
+
+
 class Evaluation:
     """The values of all nets, for one choice of what registers and inputs hold.
 
@@ -114,6 +126,10 @@ class Evaluation:
         """Return whether an expression is not 0: a form that is 0 or 1."""
         return self._any(value)
 
+    def product(self, a: Form, b: Form) -> Form:
+        """Return the product of two forms."""
+        return self._forms.times(a, b)
+
     def _executed(self, statement: Statement) -> tuple[Expression, Form] | None:
         if isinstance(statement, Load):
             return statement.target, self._extended(statement.value, self._netlist.width(statement.target))
@@ -171,16 +187,6 @@ class Evaluation:
 
     # Expressions.
 
-    def _is_signed(self, value: Expression) -> bool:
-        if not isinstance(value, Operator) or value.symbol in _ONE_BIT:
-            return False
-        if value.symbol == "signed":
-            return True
-        if value.symbol in {"&", "|"} and len(value.operands) == 1:
-            return False
-        operands = value.operands[1:] if value.symbol == "?" else value.operands
-        return all(self._is_signed(operand) for operand in operands)
-
     def _exact(self, value: Expression, *, signed: bool) -> Form:
         """Value of an expression by its own width."""
         width = self._netlist.width(value)
@@ -195,12 +201,12 @@ class Evaluation:
         word = self._plain(value)
         if width <= own:
             return word
-        signed = self._is_signed(value)
+        signed = is_signed(value)
         return self._forms.signed(word, own) if signed else self._forms.unsigned(word, own)
 
     def _widened(self, value: Operator, width: int) -> Form:
         """Return an operation whose operands are extended to `width` bits, all by their sign or none."""
-        signed = self._is_signed(value)
+        signed = is_signed(value)
 
         def operand(of: Expression) -> Form:
             if self._netlist.width(of) >= width:
@@ -262,6 +268,9 @@ class Evaluation:
         if value.symbol == "|" and a == constant((1 << width) - 1):
             return a
         b = self._exact(second, signed=False)
+        neutral = constant((1 << width) - 1 if value.symbol == "&" else 0)
+        if neutral in (a, b):
+            return a if b == neutral else b
         total: Form = {}
         for place in range(width):
             x, y = (self._forms.unsigned(self._cut(word, place), 1) for word in (a, b)) if width > 1 else (a, b)
@@ -298,7 +307,7 @@ class Evaluation:
 
     def _compared(self, value: Operator) -> Form:
         require(value.symbol in _ONE_BIT and len(value.operands) == 2, f"the operator {value.symbol} must be known")
-        signed = all(self._is_signed(operand) for operand in value.operands)
+        signed = all(is_signed(operand) for operand in value.operands)
         a, b = (self._exact(operand, signed=signed) for operand in value.operands)
         less, more = self._forms.negative(plus(a, b, -1)), self._forms.negative(plus(b, a, -1))
         one = constant(1)

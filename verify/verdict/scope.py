@@ -67,7 +67,7 @@ def scope_of(
     """
     parts = {"arithmetic": Part(State.PROVEN, "the error bound and all ranges follow from the certificate's graphs")}
     parts |= _specified(certificate, item, agreement, core)
-    parts |= _hardware(item, proofs)
+    parts |= _hardware(item, proofs, is_decimated=certificate.decimation is not None)
     return parts
 
 
@@ -99,23 +99,21 @@ def _specified(
 _OF_FILES = ("hardware", "program", "unit", "flags", "liveness", "c_model", "rtlil")
 
 
-def _hardware(item: ItemEntry | None, proofs: Proofs | None) -> dict[str, Part]:
+def _hardware(item: ItemEntry | None, proofs: Proofs | None, *, is_decimated: bool) -> dict[str, Part]:
     if proofs is None:
         return dict.fromkeys(_OF_FILES, Part(State.NOT_READ, "no files were given", asked=False))
     parts = {
         "c_model": Part(State.NOT_READ, "its text is held by its SHA-256 alone"),
         "rtlil": Part(State.NOT_READ, "its text is held by its SHA-256 alone"),
-        "liveness": Part(
-            State.NOT_READ, "that a sample is ever taken and its result ever leaves, and when, is not proven"
-        ),
     }
     kinds = [proofs.program, proofs.hardware, proofs.calibration]
     programs = [found for found in kinds if isinstance(found, ProgramVerdict)]
     pipelines = [found for found in kinds if isinstance(found, HardwareVerdict)]
     if not programs and not pipelines:
         why = _why_not(item)
-        parts |= {name: Part(State.NOT_READ, why) for name in ("hardware", "program", "unit", "flags")}
+        parts |= {name: Part(State.NOT_READ, why) for name in ("hardware", "program", "unit", "flags", "liveness")}
         return {name: parts[name] for name in _OF_FILES}
+    parts["liveness"] = _liveness(proofs, is_decimated=is_decimated)
     none = Part(State.PROVEN, "there is none in this architecture", asked=False)
     parts["program"] = Part(State.PROVEN, "its instructions compute the graph") if programs else none
     parts["unit"] = (
@@ -134,6 +132,15 @@ def _hardware(item: ItemEntry | None, proofs: Proofs | None) -> dict[str, Part]:
         else Part(State.PARTIAL, "all but outside_calibration, wear_warning and wear_critical")
     )
     return {name: parts[name] for name in _OF_FILES}
+
+
+def _liveness(proofs: Proofs, *, is_decimated: bool) -> Part:
+    """Whether a sample is always taken, and its result always leaves."""
+    if is_decimated:
+        return Part(State.NOT_READ, "when a decimator takes a sample and hands its result on is not proven")
+    if proofs.hardware is None:
+        return Part(State.NOT_READ, "that a sample is ever taken and its result ever leaves, and when, is not proven")
+    return Part(State.PROVEN, str(proofs.hardware.progress))
 
 
 def _why_not(item: ItemEntry | None) -> str:

@@ -65,6 +65,8 @@ def test_a_word_of_the_calibration_that_is_negative() -> None:
 def accept(core: Made) -> None:
     found = core.check()
     assert found.latency == latency_cycles(core.design.datapath, core.channels)
+    assert found.progress.given == found.latency + 2 * found.waits
+    assert found.progress.cleared == (core.channels if core.channels > 1 else 0)
     assert found.states == sum(len(stage.graph.delays) for stage in core.design.datapath.stages) > 0
 
 
@@ -162,6 +164,16 @@ BREAKS = {
         "assign take2 = advance & valid2;\n  assign take2 = advance;",
         r"each bit of take2 in plain_section0 must be driven once",
     ),
+    "a core that takes nothing": (
+        r"(assign advance = ).*full;",
+        r"\g<1>1'h0;",
+        "not s_axis_tready must be one register, not logic of 0 signals",
+    ),
+    "a core that waits for its sink": (
+        r"(assign advance = ).*full;",
+        r"\1o_ready & inverse96;",
+        "not s_axis_tready must be one register, not logic of 2 signals",
+    ),
     "a source": (
         r"\.i_valid\(s_axis_tvalid\)",
         ".i_valid(1'h1)",
@@ -174,6 +186,8 @@ BREAKS = {
     ),
 }
 
+
+IN_FRONT = "for a sample in front while none of those that it may wait for is in the pipeline"
 
 CHANNEL_BREAKS = {
     "an address in time": (
@@ -220,6 +234,16 @@ CHANNEL_BREAKS = {
         r"(assign o_ready = advance)( & .*);",
         r"\1;",
         r"input_buffer\.o_ready must be 1 just when i_valid\S+ is",
+    ),
+    "a sample that never enters": (
+        r"= (o_valid|advance) & (n23|n30);",
+        r"= \1 & 1'h0;",
+        rf"i_valid\S+ must be 1 {IN_FRONT}",
+    ),
+    "a sample that waits for its data": (
+        r"= (o_valid|advance) & (n23|n30);",
+        r"= \1 & s_axis_tdata[0];",
+        rf"i_valid\S+ must be 1 {IN_FRONT}",
     ),
     "a label": (
         r"(m_axis_tdest = .*)\[15:14\]",
