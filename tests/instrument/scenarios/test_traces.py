@@ -13,7 +13,6 @@ from sosmith.gen.stimuli.core import bench_before, bench_of
 from sosmith.instrument.scenarios.traces import DefaultTraces
 
 
-
 @pytest.mark.slow
 def test_no_simulator_is_imported() -> None:
     listed = "[m for m in sys.modules if m.startswith(('sosmith.sim', 'cocotb'))]"
