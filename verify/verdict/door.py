@@ -17,6 +17,7 @@ from sosmith.verify.decimation import at_lower_rate, behind_decimator, calibrati
 from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.parallel.check import HardwareVerdict, check_hardware
 from sosmith.verify.program.check import ProgramVerdict, check_program
+from sosmith.verify.program.text import ProgramText, read_program
 from sosmith.verify.reader.source import read_source
 from sosmith.verify.specified.calibration_fit import Refit, check_fit
 from sosmith.verify.specified.stated_specification import Agreement, check_specification
@@ -32,7 +33,6 @@ from sosmith.verify.verdict.generated_files import (
 )
 from sosmith.verify.verdict.item import (
     check_item,
-    check_manifest,
     check_ports,
     check_stated,
     core_of,
@@ -40,6 +40,7 @@ from sosmith.verify.verdict.item import (
     whole_core,
 )
 from sosmith.verify.verdict.limits import SECONDS, limited
+from sosmith.verify.verdict.manifest import latency_of, read_manifest
 from sosmith.verify.verdict.scope import Part, Proofs, scope_of
 from sosmith.verify.verification import Progress, Verdict, verify
 
@@ -159,8 +160,23 @@ def _files_proven(
     modules = read_source(text, certificate.name).modules
     if item is None:
         return Proofs(), None
+    progress("manifest", 0, 0)
     check_ports(modules[certificate.name], item)
-    check_manifest(content_of(folder / f"{certificate.name}.json"), certificate, item)
+    manifest = read_manifest(content_of(folder / f"{certificate.name}.json"), certificate, item)
+    proofs, decimator = _hardware_proven(certificate, item, text, progress)
+    manifest.hold_clocks(latency_of(proofs.hardware, certificate))
+    manifest.hold_program(None if proofs.program is None else _program_of(certificate, text))
+    return replace(proofs, unheld=tuple(manifest.open)), decimator
+
+
+def _program_of(certificate: Certificate, text: str) -> ProgramText:
+    behind = certificate.name if certificate.decimation is None else f"{certificate.name}_behind"
+    return read_program(behind_decimator(text, certificate), behind)
+
+
+def _hardware_proven(
+    certificate: Certificate, item: ItemEntry, text: str, progress: Progress
+) -> tuple[Proofs, DecimatorVerdict | None]:
     decimator = None
     if certificate.decimation is not None:
         progress("decimator", 0, 0)

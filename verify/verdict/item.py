@@ -1,12 +1,10 @@
-"""What the item of a certificate is: held against the certificate, the manifest, the files and the SystemVerilog.
+"""What the item of a certificate is: held against the certificate, the specification, the files and the SystemVerilog.
 
-The entry decides which proof the hardware needs. It is held against the parts of the certificate that are proven, and
-the manifest, which programs read, against it, field by field. What stands in neither is named as not proven.
+The entry decides which proof the hardware needs. It is held against the parts of the certificate that are proven.
 """
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from fractions import Fraction
@@ -36,8 +34,6 @@ _LINES = {
     "m_axis_tvalid": ("output", 1),
     "m_axis_tready": ("input", 1),
 }
-_NO_MANIFEST = (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError)
-"""What is raised where a manifest has anything else."""
 
 
 def core_of(certificate: Certificate) -> str:
@@ -184,75 +180,6 @@ def file_names(name: str, item: ItemEntry | None) -> list[str]:
     ends = ["c", "h", "il", "json", "sv", *(("rdl",) if item is not None and item.reload else ())]
     registers = [f"{name}_registers.h"] if item is not None and item.reload else []
     return sorted([*(f"{name}.{end}" for end in ends), *registers])
-
-
-def check_manifest(content: bytes, certificate: Certificate, item: ItemEntry) -> None:
-    """Check the fields of a manifest that the certificate states: name, streams, flags, and what decides the hardware.
-
-    Raises
-    ------
-    RejectedError
-        If it is no manifest, or the first field that differs.
-    """
-    try:
-        manifest = json.loads(content)
-        found = _in_manifest(manifest)
-    except _NO_MANIFEST:
-        raise RejectedError("the manifest must be that of a core, not another file") from None
-    wanted: dict[str, Any] = {
-        "name": certificate.name,
-        "core": item.core,
-        "channels": item.channels,
-        "architecture": item.architecture,
-        "calibration before the decimator": item.ahead,
-        "protect": item.protect,
-        "reload": item.reload,
-        "start": item.start,
-        "streams.s_axis": _stream_of(item.taken, certificate.inputs, item, flags=False),
-        "streams.m_axis": _stream_of(item.given, (certificate.output,), item, flags=True),
-    }
-    for key, value in wanted.items():
-        if key == "start" and item.core == "calibration":
-            continue
-        require(
-            found[key] == value, f"{key} in the manifest must be {value}, as in the certificate, not {_cut(found[key])}"
-        )
-
-
-def _in_manifest(manifest: Mapping[str, Any]) -> dict[str, Any]:
-    found = {key: manifest[key] for key in ("name", "core", "channels", "architecture", "protect", "start")}
-    found["reload"] = manifest["reload"] is not None
-    ahead = (manifest["decimation"] or {}).get("calibration")
-    found["calibration before the decimator"] = None if ahead is None else ahead["architecture"]
-    found |= {f"streams.{key}": manifest["streams"][key] for key in ("s_axis", "m_axis")}
-    return found
-
-
-def _stream_of(stream: StreamEntry, ports: tuple[PortEntry, ...], item: ItemEntry, *, flags: bool) -> dict[str, Any]:
-    made: dict[str, Any] = {} if not stream.dest_width else {"tdest": {"width": stream.dest_width}}
-    made["width"] = stream.width
-    if item.samples > 1:
-        made |= {"samples": item.samples, "sample_width": stream.width // item.samples}
-    made["fields"] = [
-        {
-            "name": field.name,
-            "offset": field.offset,
-            "width": field.width,
-            "signed": field.signed,
-            "lsb": float(field.lsb),
-            "zero": float(field.zero),
-            "unit": port.unit,
-        }
-        for field, port in zip(stream.fields, ports, strict=True)
-    ]
-    if flags:
-        made["tuser"] = {"width": stream.user_width, "flags": dict(item.flags)}
-    return made
-
-
-def _cut(value: object) -> str:
-    text = ascii(value)
-    return text if len(text) <= 200 else f"{text[:200]}.."
 
 
 def check_ports(top: Module, item: ItemEntry) -> None:

@@ -41,6 +41,8 @@ class Proofs:
     program: ProgramVerdict | None = None
     hardware: HardwareVerdict | None = None
     calibration: ProgramVerdict | HardwareVerdict | None = None
+    unheld: tuple[str, ...] = ()
+    """Fields of the manifest that nothing was held against."""
 
 
 def scope_of(
@@ -96,7 +98,7 @@ def _specified(
     return {"filter": filter_, "calibration": calibration}
 
 
-_OF_FILES = ("hardware", "program", "unit", "flags", "liveness", "c_model", "rtlil")
+_OF_FILES = ("manifest", "hardware", "program", "unit", "flags", "liveness", "c_model", "rtlil")
 
 
 def _hardware(item: ItemEntry | None, proofs: Proofs | None, *, is_decimated: bool) -> dict[str, Part]:
@@ -106,6 +108,7 @@ def _hardware(item: ItemEntry | None, proofs: Proofs | None, *, is_decimated: bo
         "c_model": Part(State.NOT_READ, "its text is held by its SHA-256 alone"),
         "rtlil": Part(State.NOT_READ, "its text is held by its SHA-256 alone"),
     }
+    parts["manifest"] = _manifest(item, proofs)
     kinds = [proofs.program, proofs.hardware, proofs.calibration]
     programs = [found for found in kinds if isinstance(found, ProgramVerdict)]
     pipelines = [found for found in kinds if isinstance(found, HardwareVerdict)]
@@ -141,6 +144,14 @@ def _liveness(proofs: Proofs, *, is_decimated: bool) -> Part:
     if proofs.hardware is None:
         return Part(State.NOT_READ, "that a sample is ever taken and its result ever leaves, and when, is not proven")
     return Part(State.PROVEN, str(proofs.hardware.progress))
+
+
+def _manifest(item: ItemEntry | None, proofs: Proofs) -> Part:
+    if item is None:
+        return Part(State.NOT_READ, "the certificate does not state what the item is")
+    if not proofs.unheld:
+        return Part(State.PROVEN, "its fields follow from the certificate")
+    return Part(State.PARTIAL, f"its fields follow from the certificate, but for {', '.join(proofs.unheld)}: not held")
 
 
 def _why_not(item: ItemEntry | None) -> str:

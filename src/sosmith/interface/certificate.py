@@ -87,8 +87,8 @@ class Proof:
     rebuilt: int = 0
     """Number of files that were generated again."""
     scope: Mapping[str, Part] = field(default_factory=dict)
-    """How much of each part is proven: arithmetic, filter, calibration, hardware, program, unit, flags, liveness,
-    c_model and rtlil, in this order, and second_reader if there was one."""
+    """How much of each part is proven: arithmetic, filter, calibration, manifest, hardware, program, unit, flags,
+    liveness, c_model and rtlil, in this order, and second_reader if there was one."""
 
     @property
     def missing(self) -> dict[str, Part]:

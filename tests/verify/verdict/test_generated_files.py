@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 import shutil
 from collections.abc import Callable
@@ -22,7 +21,6 @@ from sosmith.verify.verdict.generated_files import (
     check_texts,
     core_text,
 )
-from sosmith.verify.verdict.item import check_manifest
 from sosmith.verify.verification import RejectedError
 
 NAME = "audio_lowpass"
@@ -95,42 +93,6 @@ def test_sentences(folder: Path) -> None:
         RejectedError, match=r"^the certificate must have the layout in which it was written, not another one$"
     ):
         checked(folder)
-
-
-@pytest.mark.parametrize(("key", "value"), [("channels", 0), ("channels", 1e400), ("samples", 0), ("samples", [])])
-def test_a_manifest_with_other_numbers_is_refused(folder: Path, key: str, value: object) -> None:
-    manifest = json.loads((folder / f"{NAME}.json").read_text(encoding="utf-8"))
-    refused_manifest(folder, json.dumps(manifest), "")
-    (manifest if key == "channels" else manifest["streams"]["m_axis"])[key] = value
-    refused_manifest(folder, json.dumps(manifest), r"^(channels|streams\.m_axis) in the manifest must be ")
-
-
-@pytest.mark.parametrize("architecture", ["systolic", "", None, ["parallel"]])
-def test_an_architecture_that_does_not_exist_is_refused(folder: Path, architecture: object) -> None:
-    manifest = json.loads((folder / f"{NAME}.json").read_text(encoding="utf-8"))
-    sentence = "^architecture in the manifest must be folded, as in the certificate, not "
-    refused_manifest(folder, json.dumps(manifest | {"architecture": architecture}), sentence)
-    ahead = {"calibration": {"architecture": architecture}}
-    if architecture is not None:
-        sentence = "^calibration before the decimator in the manifest must be None, as in the certificate, not "
-        refused_manifest(folder, json.dumps(manifest | {"decimation": ahead}), sentence)
-
-
-def test_a_manifest_nested_too_deep_is_none(folder: Path) -> None:
-    refused_manifest(folder, "[" * 100_000, "^the manifest must be that of a core, not another file$")
-
-
-def refused_manifest(folder: Path, text: str, sentence: str) -> None:
-    """Check that a manifest is refused by a sentence; accepted without one."""
-    certificate = read_certificate(folder / f"{NAME}.certificate.json")
-    assert certificate.about is not None
-    item = certificate.about.item
-    assert item is not None
-    if not sentence:
-        check_manifest(text.encode(), certificate, item)
-        return
-    with pytest.raises(RejectedError, match=sentence):
-        check_manifest(text.encode(), certificate, item)
 
 
 def test_what_is_no_text_is_not_read(folder: Path) -> None:

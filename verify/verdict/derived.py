@@ -1,0 +1,274 @@
+"""What a certificate says of its core in the words of a manifest: formats, sections, operators, errors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from math import inf, log10
+from typing import Any
+
+from sosmith.verify.bounds.l1_response import fraction
+from sosmith.verify.certificate_file import (
+    Certificate,
+    DecimationEntry,
+    ItemEntry,
+    NodeEntry,
+    Operation,
+    PortEntry,
+    StageEntry,
+)
+from sosmith.verify.graph import Transfer, inputs_of
+from sosmith.verify.start import section_alone
+
+_HALF = Fraction(1, 2)
+_ROUNDING = Fraction(1, 2**46)
+"""Relative distance from an exact figure that the arithmetic of doubles may have brought."""
+
+_GRID = Fraction(1, 2**40)
+"""Part of an LSB that the grid of the certificate's claims may have added to them."""
+
+_CLAIM_GRID = Fraction(1, 2**64)
+"""What rounding up to the grid may have added to a gain."""
+
+_DECIBELS = 1e-6
+"""Distance from a gain in dB that the arithmetic of doubles may have brought."""
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A number that a double must stand for: within the rounding of doubles, and `below` or `above` by as much more."""
+
+    value: Fraction
+    below: Fraction = Fraction(0)
+    above: Fraction = Fraction(0)
+
+    def holds(self, found: object) -> bool:
+        """Whether a number in a manifest is this one."""
+        if isinstance(found, bool) or not isinstance(found, int | float) or not -inf < found < inf:
+            return False
+        off, unsure = Fraction(found) - self.value, abs(self.value) * _ROUNDING
+        return -self.below - unsure <= off <= self.above + unsure
+
+    def __str__(self) -> str:
+        return repr(float(self.value))
+
+
+@dataclass(frozen=True)
+class Decibels(Figure):
+    """A gain, whose double is in dB."""
+
+    def holds(self, found: object) -> bool:
+        """Whether a number in a manifest is this gain in dB."""
+        if not isinstance(found, float) or not -inf < found < inf:
+            return False
+        least = self.value - _CLAIM_GRID
+        lowest = 20 * log10(least) if least > 0 else -inf
+        return lowest - _DECIBELS <= found <= 20 * log10(self.value) + _DECIBELS
+
+    def __str__(self) -> str:
+        return f"{20 * log10(self.value):.9g}"
+
+
+def bound_of(certificate: Certificate) -> Figure:
+    """Return the bound on the error: no less than the proven one, and no more than allowed."""
+    lsb = certificate.output.lsb
+    proven = certificate.claims.bound * lsb
+    return Figure(proven, _GRID * lsb, max(certificate.max_error - proven, Fraction(0)))
+
+
+def parts_of(certificate: Certificate) -> dict[str, Figure]:
+    """Return the parts of the bound: each no less than the proven one."""
+    lsb, bound = certificate.output.lsb, bound_of(certificate)
+    return {
+        part: Figure(value * lsb, _GRID * lsb, bound.above + _GRID * lsb)
+        for part, value in certificate.claims.budget.items()
+    }
+
+
+def settling_of(certificate: Certificate, rate: Fraction) -> dict[str, Any] | None:
+    """Return how long a filter settles that starts from zero; None if it does not."""
+    samples = certificate.claims.settling
+    if samples is None or not rate:
+        return None
+    return {
+        "samples": samples,
+        "seconds": Figure(samples / rate),
+        "limit": Figure(certificate.output.lsb * _HALF),
+    }
+
+
+def format_of(node: NodeEntry) -> str:
+    """Return the Q format of a node: ``Qi.f`` for two's complement, i without the sign bit, or ``UQi.f``."""
+    bits = _bits(node) - (node.low < 0)
+    return f"{'Q' if node.low < 0 else 'UQ'}{bits - node.frac}.{node.frac}"
+
+
+def _bits(node: NodeEntry) -> int:
+    """Count the bits of a node, with its sign if it has one."""
+    if node.low < 0:
+        return max((-node.low - 1).bit_length(), node.high.bit_length()) + 1
+    return max(node.high.bit_length(), 1)
+
+
+def _is_bit(node: NodeEntry) -> bool:
+    return _bits(node) == 1 and node.low == 0 and node.op is not Operation.CONSTANT
+
+
+def formats_of(certificate: Certificate) -> list[dict[str, Any]]:
+    """Return the formats of all nodes that have a name, in the order of the datapath."""
+    ahead = None if certificate.decimation is None else certificate.decimation.calibration
+    parts = [] if ahead is None else [(ahead.stages, ahead.output)]
+    parts.append((certificate.stages, certificate.output))
+    variables = {port.name for port in certificate.inputs}
+    return [
+        _format(stage, node, output, plain=stage.role == "polynomial" and node.name in variables)
+        for stages, output in parts
+        for stage in stages
+        for node in stage.nodes
+        if node.name
+    ]
+
+
+def _format(stage: StageEntry, node: NodeEntry, output: PortEntry, *, plain: bool) -> dict[str, Any]:
+    scale = (Fraction(1) if plain else output.lsb) / Fraction(2) ** node.frac
+    return {
+        "stage": stage.name,
+        "node": node.name,
+        "format": format_of(node),
+        "low": Figure(node.low * scale),
+        "high": Figure(node.high * scale),
+        "unit": "" if plain else output.unit,
+    }
+
+
+def sections_of(certificate: Certificate) -> tuple[list[dict[str, Any]], list[str]]:
+    """Return the entries of the sections with one input and one output, and the names of the other sections."""
+    steady = any(stage.role == "start" for stage in certificate.stages)
+    stages = [stage for stage in certificate.stages if stage.role == "section"]
+    passes = steady and all(len(inputs_of(stage)) == len(stage.outputs) > 1 for stage in stages)
+    alone = [section_alone(stage) if passes else stage for stage in stages]
+    single = [len(inputs_of(stage)) == len(stage.outputs) == 1 for stage in alone]
+    entries = [_section(stage) for stage, whole in zip(alone, single, strict=True) if whole]
+    return entries, [stage.name for stage, whole in zip(alone, single, strict=True) if not whole]
+
+
+def _section(stage: StageEntry) -> dict[str, Any]:
+    transfer, nodes = Transfer(stage), stage.nodes
+    (given,) = stage.outputs
+    numerator = transfer.numerator(transfer.inputs[0], given)
+    return {
+        "name": stage.name,
+        "coefficients": [
+            {
+                "name": node.name.removeprefix("product_"),
+                "integer": node.parameter,
+                "frac": node.parameter_frac,
+                "value": Figure(node.parameter / Fraction(2) ** node.parameter_frac),
+            }
+            for node in nodes
+            if node.op is Operation.SCALE
+        ],
+        "states": {node.name: format_of(node) for node in nodes if node.op is Operation.DELAY},
+        "b": _padded([fraction(value) for value in numerator.coeffs()]),
+        "a": _padded([fraction(value) for value in transfer.denominator.coeffs()]),
+        "input": format_of(nodes[inputs_of(stage)[0]]),
+        "output": format_of(nodes[given]),
+    }
+
+
+def _padded(values: Sequence[Fraction]) -> list[Figure]:
+    return [Figure(value) for value in [*values, *[Fraction(0)] * (3 - len(values))]]
+
+
+def operators_of(certificate: Certificate, item: ItemEntry) -> dict[str, Any] | None:
+    """Return the operators of the graphs, each by itself; None where units take the place of some."""
+    if item.architecture == "online":
+        return None
+    entry = certificate.decimation
+    stages = list(certificate.stages)
+    program = {"folded", "serial"}
+    if (
+        entry is not None
+        and entry.calibration is not None
+        and (item.architecture in program or item.ahead not in program)
+    ):
+        stages = [*entry.calibration.stages, *stages]
+    products: list[list[int]] = []
+    adders = registers = 0
+    for stage in stages:
+        for node in stage.nodes:
+            operands = [stage.nodes[index] for index in node.operands]
+            if node.op in {Operation.ADD, Operation.SUBTRACT}:
+                adders += _bits(node)
+            elif node.op is Operation.TRUNCATE:
+                adders += _bits(operands[0])
+            elif node.op is Operation.DELAY:
+                registers += _bits(node)
+            elif node.op is Operation.SCALE:
+                products.append([_bits(operands[0]), abs(node.parameter).bit_length() + (node.parameter < 0)])
+            elif node.op is Operation.MULTIPLY and any(map(_is_bit, operands)):
+                adders += _bits(node)
+            elif node.op is Operation.MULTIPLY:
+                products.append([_bits(each) for each in operands])
+        registers += sum(_bits(stage.nodes[index]) for index in stage.outputs)
+    return {"multipliers": products, "adder_bits": adders, "register_bits": registers}
+
+
+def decimation_of(certificate: Certificate, item: ItemEntry, entry: DecimationEntry, rate: Fraction) -> dict[str, Any]:
+    """Return what is known of a decimator; `rate` is that of the samples, in Hz."""
+    lower, edge = rate / entry.factor, entry.edge * rate
+    port, codes = certificate.inputs[0], None
+    if entry.calibration is not None:
+        port, last = entry.calibration.output, entry.calibration.stages[-1]
+        node = last.nodes[last.outputs[0]]
+        codes = node.low, node.high
+    low, high = codes or (port.lowest, port.highest)
+    amplitude = port.lsb * (high - low) / 2
+    found: dict[str, Any] = {
+        "factor": entry.factor,
+        "stages": entry.stages,
+        "width": entry.width,
+        "dropped": entry.dropped,
+        "sample_rate": Figure(lower),
+        "correction": Figure(entry.correction),
+        "held": item.hold,
+        "calibration": _ahead(certificate, item, entry),
+    }
+    if entry.bands:
+        largest = max(band.gain for band in entry.bands)
+        found |= {
+            "aliasing": [
+                {
+                    "low": Figure(k * lower - edge, above=_GRID, below=_GRID),
+                    "high": Figure(min(k * lower + edge, rate / 2), above=_GRID, below=_GRID),
+                    "gain_db": Decibels(gain),
+                    "whole_low": Figure((k - _HALF) * lower),
+                    "whole_high": Figure(min((k + _HALF) * lower, rate / 2)),
+                    "largest_db": Decibels(band.gain),
+                    "largest_at": Figure(band.at * lower),
+                }
+                for k, (gain, band) in enumerate(zip(entry.aliasing, entry.bands, strict=True), start=1)
+            ],
+            "worst_aliasing": Figure(max(entry.aliasing) * amplitude, _GRID * amplitude),
+            "largest_db": Decibels(largest),
+            "largest": Figure(largest * amplitude, _GRID * amplitude),
+        }
+    return found
+
+
+def _ahead(certificate: Certificate, item: ItemEntry, entry: DecimationEntry) -> dict[str, Any] | None:
+    calibration = entry.calibration
+    if calibration is None:
+        return None
+    port, last = calibration.output, calibration.stages[-1]
+    node = last.nodes[last.outputs[0]]
+    error = calibration.claims.bound * port.lsb
+    return {
+        "architecture": item.ahead,
+        "bits": port.bits,
+        "lsb": Figure(port.lsb),
+        "low": Figure(port.zero + node.low * port.lsb),
+        "high": Figure(port.zero + node.high * port.lsb),
+        "error": Figure(error, _GRID * port.lsb, max(certificate.max_error - error, Fraction(0))),
+    }
