@@ -40,7 +40,7 @@ from sosmith.verify.verdict.item import (
     whole_core,
 )
 from sosmith.verify.verdict.limits import SECONDS, limited
-from sosmith.verify.verdict.manifest import latency_of, read_manifest
+from sosmith.verify.verdict.manifest import read_manifest
 from sosmith.verify.verdict.scope import Part, Proofs, scope_of
 from sosmith.verify.verification import Progress, Verdict, verify
 
@@ -164,7 +164,7 @@ def _files_proven(
     check_ports(modules[certificate.name], item)
     manifest = read_manifest(content_of(folder / f"{certificate.name}.json"), certificate, item)
     proofs, decimator = _hardware_proven(certificate, item, text, progress)
-    manifest.hold_clocks(latency_of(proofs.hardware, certificate))
+    manifest.hold_clocks(proofs.hardware if certificate.decimation is None else None)
     manifest.hold_program(None if proofs.program is None else _program_of(certificate, text))
     return replace(proofs, unheld=tuple(manifest.open)), decimator
 

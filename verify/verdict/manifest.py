@@ -15,7 +15,6 @@ from typing import Any
 from sosmith.verify.certificate_file import Certificate, ItemEntry, PortEntry, StreamEntry
 from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.parallel.check import HardwareVerdict
-from sosmith.verify.program.check import ProgramVerdict
 from sosmith.verify.program.text import ProgramText
 from sosmith.verify.specified.words import table_of, words_of
 from sosmith.verify.verdict.derived import (
@@ -55,11 +54,13 @@ class Manifest:
     tree: Mapping[str, Any]
     open: list[str] = field(default_factory=list)
 
-    def hold_clocks(self, latency: int | None) -> None:
-        """Hold the latency against a proven one, in clocks; None if none is."""
-        if latency is not None:
-            _compare("latency_cycles", self.tree["latency_cycles"], latency)
-        self.open += [key for key in _CLOCKS if key != "latency_cycles" or latency is None]
+    def hold_clocks(self, found: HardwareVerdict | None) -> None:
+        """Hold the clocks against those of a proven pipeline, which takes a sample at each; None without one."""
+        if found is None:
+            self.open += _CLOCKS
+            return
+        for key, value in zip(_CLOCKS, (found.clearing, found.latency, 1), strict=True):
+            _compare(key, self.tree[key], value)
 
     def hold_program(self, found: ProgramText | None) -> None:
         """Hold the schedule against the program that was read from the hardware; None if none was."""
@@ -78,11 +79,6 @@ class Manifest:
         for key, value in wanted.items():
             _compare(f"schedule.{key}", schedule[key], value)
         self.open += ["schedule.states", "schedule.places"]
-
-
-def latency_of(found: ProgramVerdict | HardwareVerdict | None, certificate: Certificate) -> int | None:
-    """Return the latency of a whole core in clocks; None where it is not proven."""
-    return found.latency if isinstance(found, HardwareVerdict) and certificate.decimation is None else None
 
 
 def read_manifest(content: bytes, certificate: Certificate, item: ItemEntry) -> Manifest:

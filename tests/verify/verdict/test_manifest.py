@@ -16,6 +16,7 @@ from sosmith.gen.output.generate import generated
 from sosmith.gen.specification.specification import from_text
 from sosmith.verify.certificate_file import Certificate
 from sosmith.verify.graph import RejectedError
+from sosmith.verify.parallel.check import HardwareVerdict
 from sosmith.verify.program.text import read_program
 from sosmith.verify.verdict.manifest import Manifest, read_manifest
 
@@ -178,15 +179,18 @@ def test_a_key_is_there_once(core: Callable[[str], Core]) -> None:
         core("folded").read(text)
 
 
-def test_clocks_are_those_that_are_proven(core: Callable[[str], Core]) -> None:
-    read = core("parallel").read(core("parallel").manifest)
-    latency = read.tree["latency_cycles"]
-    with pytest.raises(RejectedError, match=rf"^latency_cycles in the manifest must be {latency + 1}, .*$"):
-        read.hold_clocks(latency + 1)
-    read.hold_clocks(latency)
-    assert read.open[-2:] == ["reset_cycles", "cycles_per_sample"]
+@pytest.mark.parametrize(("key", "clocks"), [("reset_cycles", 1), ("latency_cycles", 1), ("cycles_per_sample", 1)])
+def test_clocks_are_those_that_are_proven(key: str, clocks: int, core: Callable[[str], Core]) -> None:
+    parallel = core("parallel")
+    tree = parallel.read(parallel.manifest).tree
+    found = HardwareVerdict(20, 2, 4, tree["latency_cycles"], 2, tree["reset_cycles"])
+    read = parallel.read(parallel.manifest)
+    read.hold_clocks(found)
+    assert key not in read.open
+    with pytest.raises(RejectedError, match=rf"^{key} in the manifest must be \d+, .*$"):
+        parallel.read(parallel.changed(key, lambda right: right + clocks)).hold_clocks(found)
     read.hold_clocks(None)
-    assert "latency_cycles" in read.open
+    assert key in read.open
 
 
 @pytest.mark.parametrize("key", ["digit_bits", "accumulator_bits", "words", "instructions"])
