@@ -119,6 +119,11 @@ class Measurements:
         """Return the number of measurements."""
         return len(self.clearance)
 
+    def of(self, chosen: Values) -> Measurements:
+        """Return those measurements for which `chosen`, shape (n,), is true."""
+        days = tuple(day for day, one in zip(self.days, chosen.tolist(), strict=True) if one) if self.days else ()
+        return Measurements(self.clearance[chosen], self.voltage[chosen], self.temperature[chosen], self.source, days)
+
     @property
     def covered(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Lowest and highest voltage in V, and lowest and highest temperature in degC."""

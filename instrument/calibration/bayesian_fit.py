@@ -40,6 +40,7 @@ from sosmith.instrument.calibration.mixed_effects.model import (
     rows_of,
 )
 from sosmith.instrument.calibration.mixed_effects.systematic_error import SystematicCurves
+from sosmith.instrument.calibration.rails import Rails, rails_of
 from sosmith.instrument.calibration.sensor_type import DEVIATIONS, SYSTEMATIC_FACTOR, TERMS, SensorType
 from sosmith.model.arrays import Values
 from sosmith.model.errors import SpecificationError
@@ -85,7 +86,11 @@ class BayesianFit:
     order : ndarray, shape (n,)
         The measurement of each row of the model.
     at_rail : int
-        Measurements that were left out because the voltage was at an end of its range.
+        Measurements that were left out because the voltage was at an end of its range, or at a rail inside it.
+    rails : Rails
+        Between which voltages the sensor measures.
+    region : CoveredRegion
+        Region of the measurements, without those at a rail inside the range: nothing is calibrated there.
     """
 
     fit: Fit
@@ -94,6 +99,8 @@ class BayesianFit:
     plain: bool
     order: Index
     at_rail: int
+    rails: Rails
+    region: CoveredRegion
 
     @property
     def surprise(self) -> str:
@@ -126,8 +133,8 @@ def bayesian_fit(
 ) -> BayesianFit:
     """Calibrate a sensor for the day of ordinal `date`.
 
-    1. Measurements with the voltage at an end of its range are left out: a sensor at its rail says only that the
-       clearance is there or beyond, and hides the day's systematic error.
+    1. Measurements with the voltage at an end of its range, or at a rail inside it, are left out: a sensor at its rail
+       says only that the clearance is there or beyond, and hides the day's systematic error.
     2. Without systematic errors of the days, the model gives a curve, at which those errors are then taken.
     3. Measurements whose residual from the curve of their day is more than `REJECTED` standard deviations are left
        out, and the model is fitted again, until these are the same.
@@ -157,12 +164,12 @@ def bayesian_fit(
     check_variation(measurements)
     rows, order = rows_of(measurements, sensor_type, date)
     V, T, d = (values[order] for values in (measurements.voltage, measurements.temperature, measurements.clearance))
-    low, high = ranges[1]
-    free = np.where((low < V) & (high > V), 1.0, 0.0)
+    rails = rails_of(measurements, ranges[1])
+    free = rails.hold(V).astype(np.float64)
     at_rail = int(np.count_nonzero(free == 0))
     if at_rail == len(d):
         raise SpecificationError(
-            f"{measurements.source}: some voltage_V must be inside the range {low:g} to {high:g} V, "
+            f"{measurements.source}: some voltage_V must be inside the range {ranges[1][0]:g} to {ranges[1][1]:g} V, "
             f"not all {len(d):,} at an end of it"
         )
     progress(0, 3)
@@ -181,10 +188,20 @@ def bayesian_fit(
             f"{sensor_type.name}, not {outliers:,} of {len(d):,}"
         )
     posterior = model.posterior(model.scatters(), curves, max(date, rows.days[-1]))
-    polynomial, plain = _polynomial(posterior, measurements, ranges)
+    usable = _without_rails(measurements, rails, ranges[1])
+    region = CoveredRegion.of(usable.voltage, usable.temperature)
+    polynomial, plain = _polynomial(posterior, usable, region, ranges)
     given = np.empty(len(d))
     given[order] = weights
-    return BayesianFit(_as_fit(measurements, polynomial, given), posterior, model, plain, order, at_rail)
+    fit = _as_fit(measurements, polynomial, usable.covered, given)
+    return BayesianFit(fit, posterior, model, plain, order, at_rail, rails, region)
+
+
+def _without_rails(measurements: Measurements, rails: Rails, voltages: Range) -> Measurements:
+    """Leave out what is at a rail inside the range of the port, whose ends the hardware knows by itself."""
+    V = measurements.voltage
+    inside = np.logical_or(rails.hold(V), (voltages[0] >= V) | (voltages[1] <= V))
+    return measurements if inside.all() else measurements.of(inside)
 
 
 def _rejecting(
@@ -208,10 +225,9 @@ def _rejecting(
 
 
 def _polynomial(
-    posterior: Posterior, measurements: Measurements, ranges: tuple[Range, Range, Range]
+    posterior: Posterior, measurements: Measurements, region: CoveredRegion, ranges: tuple[Range, Range, Range]
 ) -> tuple[Polynomial, bool]:
     """Return the polynomial, and whether the day's own curve is left out of it."""
-    region = CoveredRegion.of(measurements.voltage, measurements.temperature)
     if posterior.same_day:
         own = _projected(posterior, measurements, ranges)
         if stays_within(own, ranges) and lowest_slope(own, region) > 0:
@@ -261,7 +277,7 @@ def lowest_slope(polynomial: Polynomial, region: CoveredRegion) -> Fraction:
     return min(b + b_t * Fraction(T) + 2 * a * Fraction(v) for v, T in region.corners)
 
 
-def _as_fit(measurements: Measurements, polynomial: Polynomial, weights: Values) -> Fit:
+def _as_fit(measurements: Measurements, polynomial: Polynomial, covered: tuple[Range, Range], weights: Values) -> Fit:
     residual = residuals(measurements, polynomial)
     count, d = math.fsum(weights), measurements.clearance
     off = d - math.fsum(weights * d) / count
@@ -269,4 +285,4 @@ def _as_fit(measurements: Measurements, polynomial: Polynomial, weights: Values)
     adjusted = 1.0 - unexplained / (math.fsum(weights * off**2) / (count - 1.0))
     trial = Trial(ORDERS, len(TERMS), adjusted)
     given = tuple(weights.tolist())
-    return Fit(polynomial, trial, root_mean_square(residual), (), measurements.covered, given)
+    return Fit(polynomial, trial, root_mean_square(residual), (), covered, given)

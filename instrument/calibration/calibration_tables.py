@@ -75,7 +75,11 @@ def _figures(made: Calibration) -> Iterator[Fact]:
         at_rail = made.bayesian.at_rail
         yield Fact("left out as outliers", sum(weight == 0 for weight in made.fit.weights) - at_rail)
         if at_rail:
-            yield Fact("left out at a rail", at_rail, sentence="with the voltage at an end of its range")
+            yield Fact(
+                "left out at a rail",
+                at_rail,
+                sentence="with the voltage at an end of its range, or at a rail inside it",
+            )
     if version.robust:
         yield Fact("given less weight", sum(weight < 1 for weight in made.fit.weights))
     for number, drift in sorted(made.drift.items(), reverse=True)[:5]:

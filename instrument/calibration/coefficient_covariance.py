@@ -11,7 +11,6 @@ import numpy as np
 from sosmith.gen.calibration.fit import Fit, Measurements, residuals, terms_of
 from sosmith.gen.calibration.least_squares import Sums
 from sosmith.instrument.calibration.bayesian_fit import BayesianFit
-from sosmith.instrument.calibration.covered_region import CoveredRegion
 from sosmith.instrument.calibration.lack_of_fit import lack_of_fit
 from sosmith.model.arrays import Values
 
@@ -101,7 +100,7 @@ def of_bayes(measurements: Measurements, made: BayesianFit) -> CoefficientUncert
     """
     posterior, polynomial = made.posterior, made.fit.polynomial
     lengths = tuple(map(len, polynomial.coefficients))
-    V, T = CoveredRegion.of(measurements.voltage, measurements.temperature).points()
+    V, T = made.region.points()
     V, T = V[::EVERY], T[::EVERY]
     x = columns(lengths, V, T)
     scale = np.sqrt(np.mean(x**2, axis=1))

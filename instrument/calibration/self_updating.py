@@ -38,6 +38,7 @@ from sosmith.instrument.calibration.measurement_store import (
     as_measurements,
     data_sha256,
 )
+from sosmith.instrument.calibration.rails import Rails, rails_of
 from sosmith.instrument.calibration.sensor_type import SensorType
 from sosmith.instrument.calibration.uncertainty import largest_half_width
 from sosmith.model.errors import ShortfallError, SpecificationError
@@ -96,7 +97,14 @@ class Calibration:
         found = [lack.warning] if lack.structured else []
         if self.bayesian is not None:
             found += [text for text in (self.bayesian.surprise,) if text]
+            found += [f"{text}; they are left out" for text in self.bayesian.rails.found]
+        else:
+            found += [f"{text}; --method bayes leaves them out" for text in self._rails.found]
         return tuple(found)
+
+    @property
+    def _rails(self) -> Rails:
+        return rails_of(as_measurements(self.stored, self.sensor), self.ranges[1])
 
     @property
     def coverage(self) -> float:
@@ -345,7 +353,7 @@ def health_for(store: MeasurementStore, sensor: str, since: str | None = None) -
     assert ranges is not None, "a sensor has ranges"
     measurements = as_measurements(store.measurements(sensor), f"{store.path}, sensor {sensor}")
     first = None if since is None else datetime.date.fromisoformat(since).toordinal()
-    return health_of(measurements, store.sensor_type(sensor), ranges[1], first)
+    return health_of(measurements, store.sensor_type(sensor), rails_of(measurements, ranges[1]).ends, first)
 
 
 def _known(store: MeasurementStore, sensor: str) -> None:

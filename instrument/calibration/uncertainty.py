@@ -166,8 +166,7 @@ def of_posterior(measurements: Measurements, made: BayesianFit) -> Uncertainty:
     own = made.order[made.kept]
     off = made.model.residuals(posterior.scatters.likeliest)[made.kept]
     lack = lack_of_fit(off, measurements.voltage[own], measurements.temperature[own])
-    region = CoveredRegion.of(measurements.voltage, measurements.temperature)
-    return Uncertainty(standard_error, half_width, lack, lambda: _predicted(made), region)
+    return Uncertainty(standard_error, half_width, lack, lambda: _predicted(made), made.region)
 
 
 def _predicted(made: BayesianFit) -> CrossValidation | None:
