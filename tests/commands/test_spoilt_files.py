@@ -273,7 +273,7 @@ def expected(command: str) -> int:
     return 1 if command.startswith(("spectrum trace.csv", "simulate")) else 0
 
 
-@pytest.mark.sweep(9)
+@pytest.mark.sweep(4)
 @pytest.mark.parametrize("subject", SUBJECTS, ids=NAMES)
 def test_files_as_they_were(subject: Subject, folder: Path) -> None:
     assert check(subject.commands, folder / subject.file) == [expected(command) for command in subject.commands]
@@ -298,7 +298,7 @@ def test_a_name_that_is_no_text(subject: Subject, folder: Path) -> None:
         assert outcome.status == expected(command), (command, outcome)
 
 
-@pytest.mark.sweep(12)
+@pytest.mark.sweep(8)
 @pytest.mark.parametrize("subject", SUBJECTS, ids=NAMES)
 def test_spoilt_files(subject: Subject, folder: Path) -> None:
     try_spoilt(subject, folder, range(0, subject.share, 3))

@@ -195,6 +195,7 @@ def test_a_terminal_is_left_whole_wherever_ctrl_c_comes(before: bool, monkeypatc
         assert not terminal.hides_the_cursor
 
 
+@pytest.mark.slow
 def test_an_interrupted_exploration_says_where_it_goes_on(on_terminal: OnTerminal, tmp_path: Path) -> None:
     cutoffs = ",".join(str(100 + k) for k in range(100))
     command = ("explore", "plain.toml", "-p", f"filter.cutoff={cutoffs}", "--jobs", "1", "-o", "out")

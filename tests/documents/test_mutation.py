@@ -121,6 +121,7 @@ def kinds(trials: list[Trial]) -> list[str]:
     return [trial.kind for trial in trials]
 
 
+@pytest.mark.slow
 def test_a_toy_is_tried(toy: Path, cache: Cache) -> None:
     with closing(Bench(toy, toy / "build", packages=())) as bench:
         mutants = [KILLED, SURVIVES, ENDLESS, EQUIVALENT, UNTRIED]

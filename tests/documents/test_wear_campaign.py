@@ -167,6 +167,7 @@ def test_the_interval_of_a_mean_holds_it_as_often_as_it_says() -> None:
     assert (runs["mean"], runs["run_low"], runs["run_high"]) == pytest.approx((50, 5, 95), abs=1e-12)
 
 
+@pytest.mark.slow
 def test_too_few_seeds_are_refused(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "examples.wear_campaign", "--seeds", "1", "-o", str(tmp_path / "out")]
     result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)

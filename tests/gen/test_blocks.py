@@ -146,6 +146,7 @@ def test_a_rate_beyond_the_samples_a_clock_is_refused() -> None:
         from_text(slow, Path("slow.toml"))
 
 
+@pytest.mark.slow
 def test_several_samples_are_refused_on_a_board() -> None:
     message = (
         "audio.toml: hardware.samples_per_clock must be 1 on a board, whose serial line never brings several samples a "

@@ -25,6 +25,7 @@ def graphs(realization: str) -> list[Graph]:
     return [stage.graph for stage in example_design("flange_wear_bench.toml", realization=realization).datapath.stages]
 
 
+@pytest.mark.sweep(15)
 @pytest.mark.parametrize("channels", [2, 3, 5, 8, 16, 17, 64])
 @pytest.mark.parametrize("realization", REALIZATIONS)
 def test_every_value_is_there_before_it_is_used(realization: str, channels: int) -> None:

@@ -63,7 +63,7 @@ def test_any_pace(idle_and_stall: tuple[float, float], tmp_path: Path) -> None:
         assert result.cycles <= 303
 
 
-@pytest.mark.sweep(4)
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("what", BROKEN)
 def test_a_broken_core_is_found(what: str, tmp_path: Path) -> None:
     break_it, message = BROKEN[what]

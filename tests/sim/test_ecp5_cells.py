@@ -125,6 +125,7 @@ def netlist(tmp_path_factory: pytest.TempPathFactory) -> Netlist:
     return synthesize(source, "cells", find_board("ulx3s_85f"), folder)
 
 
+@pytest.mark.slow
 def test_models_do_what_was_synthesized(netlist: Netlist, tmp_path: Path) -> None:
     text = netlist.path.read_text(encoding="utf-8")
     assert netlist.cells["MULT18X18D"] == len(PRODUCTS)

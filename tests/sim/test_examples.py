@@ -149,6 +149,7 @@ def test_enough_samples_under_different_handshakes(run_of: Callable[[str, str], 
     assert len({evidence.seed for evidence in runs}) == len(runs)
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(1)
 @pytest.mark.parametrize("example", ALL)
 def test_icarus_agrees(example: str, tmp_path: Path) -> None:

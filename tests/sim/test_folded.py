@@ -62,6 +62,7 @@ def check(made: CoreDesign, simulator: str, tmp_path: Path) -> None:
     assert evidence.run.samples == 60
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(1)
 @pytest.mark.parametrize("architecture", ["folded", "serial"])
 def test_samples_come_at_the_rate_that_is_stated(architecture: str, tmp_path: Path) -> None:

@@ -47,6 +47,7 @@ def run(made: CoreDesign, board: str, folder: Path, *, samples: int, simulator: 
     return simulate(made, short, folder, simulator=simulator, seed=5, idle=0.1, stall=0.1, gates=find_board(board))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("board", "architecture", "simulator", "kinds"),
     [
@@ -146,6 +147,7 @@ WRONG = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(1)
 @pytest.mark.parametrize("break_it", WRONG.values(), ids=WRONG)
 def test_a_wrong_bit_in_the_netlist_is_found(break_it: Break, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -60,6 +60,7 @@ def test_worst_cases_stay_within_the_proof(simulator: str, scenario: str, bits: 
     assert made.datapath.output.decode(np.array(exact)).tolist() == evidence.run.hardware.tolist()
 
 
+@pytest.mark.slow
 def test_a_short_run_in_icarus(tmp_path: Path) -> None:
     made = audio("df1_ef2")
     (trace,) = traces_for(made, "worst_case_errors", seed=2)
@@ -69,6 +70,7 @@ def test_a_short_run_in_icarus(tmp_path: Path) -> None:
     assert evidence.run.samples == 60
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("realization", [pytest.param("df1", marks=pytest.mark.slow), "df1_ef2"])
 def test_the_text_is_clean(realization: str, tmp_path: Path) -> None:
     made = audio(realization)

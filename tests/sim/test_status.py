@@ -68,7 +68,7 @@ def test_judging_the_range_takes_clocks_that_count(tmp_path: Path) -> None:
             design_core(replace(made.spec, hardware=hardware))
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("architecture", ["parallel", "folded", "serial"])
 def test_every_flag_is_seen_and_right(architecture: str, tmp_path: Path) -> None:
     made = made_in(tmp_path, architecture)
@@ -87,6 +87,7 @@ def test_every_flag_is_seen_and_right(architecture: str, tmp_path: Path) -> None
     assert simulate(made, [trace], tmp_path, simulator="icarus").run.mismatches == 0
 
 
+@pytest.mark.slow
 def test_a_wrong_flag_is_noticed(tmp_path: Path) -> None:
     made = made_in(tmp_path, "parallel")
     datapath = made.datapath
@@ -113,7 +114,7 @@ def worn(architecture: str, channels: int, initial: tuple[str, ...], *, signed: 
     )
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("architecture", ["parallel", "folded", pytest.param("serial", marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
     ("channels", "initial"), [(1, ("1.5",)), (3, ("1.5",)), (3, ("1.5", "2", "0.5"))], ids=["1", "3", "3-different"]
@@ -129,6 +130,7 @@ def test_wear(architecture: str, channels: int, initial: tuple[str, ...], tmp_pa
     assert simulate(made, traces, tmp_path, simulator="icarus").run.mismatches == 0
 
 
+@pytest.mark.slow
 def test_limits_of_another_channel_are_noticed(tmp_path: Path) -> None:
     made = worn("parallel", 3, ("1.5", "2", "0.5"))
     datapath = made.datapath

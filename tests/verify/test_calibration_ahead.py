@@ -212,6 +212,7 @@ WRONG: list[tuple[str, Callable[[Any], None], str]] = [
 ]
 
 
+@pytest.mark.sweep(7)
 @pytest.mark.parametrize(("change", "sentence"), [pytest.param(*case, id=subject) for subject, *case in WRONG])
 def test_what_is_wrong_is_rejected(change: Callable[[Any], None], sentence: str) -> None:
     tree = copy.deepcopy(TREE)

@@ -65,6 +65,7 @@ def test_examples_in_every_realization(name: str, realization: str) -> None:
     proven(design.quantized, design.spec.max_error)
 
 
+@pytest.mark.slow
 def test_the_locomotive() -> None:
     steps = []
     read = Certificate.model_validate(tree_of(LOCOMOTIVE))

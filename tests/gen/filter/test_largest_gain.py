@@ -75,6 +75,7 @@ BROKEN = [
 ]
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(("right", "wrong"), [pytest.param(*case, id=subject) for subject, *case in BROKEN])
 def test_a_bound_that_does_not_hold_is_seen(right: str, wrong: str) -> None:
     module = broken(largest_gain, right, wrong)

@@ -83,6 +83,7 @@ def test_a_transient_ends_when_it_is_said_to() -> None:
     assert difference[: length // 8].max() > 100 * most
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("realization", ["df1_ef2", "df2t", "delta", "normal"])
 def test_a_transient_lasts_as_long_as_the_states_are_remembered(realization: str) -> None:
     """Until the old states have faded, and then for as many samples as a section has states; but hardly longer."""

@@ -112,6 +112,7 @@ def test_gates_are_told_with_what_does_not_fit(tmp_path: Path) -> None:
     assert summarise(evidence())["gates"] is None
 
 
+@pytest.mark.sweep(1)
 def test_file_holds_the_summary(built: tuple[str, Path, dict[str, Any]]) -> None:
     _, directory, summary = built
     assert json.loads((directory / "report.json").read_text(encoding="utf-8")) == summary

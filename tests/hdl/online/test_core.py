@@ -64,6 +64,7 @@ def test_results_are_those_of_the_graph(realization: str, pace: Pace) -> None:
     check(audio(realization), 40, pace)
 
 
+@pytest.mark.slow
 def test_a_filter_that_starts_from_zero() -> None:
     check(audio("df1_ef1", "zero"), 60, Pace())
 

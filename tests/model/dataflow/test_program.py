@@ -72,6 +72,7 @@ def test_a_wrong_constant_is_noticed() -> None:
     assert run(replace(made, instructions=tuple(wrong)), datapath, codes) != datapath.compute_exact(codes)
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("realization", FOLDABLE)
 def test_what_is_read_was_stored_long_enough_before(realization: str) -> None:
     made = program(example_design("flange_wear_locomotive.toml", realization=realization).datapath, 15)

@@ -49,6 +49,7 @@ def port() -> str:
     return to_verilog(to_rtlil(ReloadPort(6, design=0x0BADCAFE), "port"))
 
 
+@pytest.mark.slow
 def test_a_manager_of_others_loads_sets(tmp_path: Path) -> None:
     assert results(tmp_path, port()) == (1, 0)
 

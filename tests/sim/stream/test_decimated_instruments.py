@@ -152,6 +152,7 @@ def test_results_come_at_the_rate_that_is_stated(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(1)
 @pytest.mark.parametrize("architecture", ["folded", "parallel"])
 def test_tools_read_the_text_without_a_warning(architecture: str, tmp_path: Path) -> None:

@@ -107,6 +107,7 @@ def fetched(board: Board, count: int) -> tuple[list[int], list[int]]:
     return codes[:count], status[:count]
 
 
+@pytest.mark.slow
 def test_results_are_those_of_the_integer_model(made: sosmith.Design, netlist: Netlist, place: Path) -> None:
     codes = measured(made.core)
     assert netlist.schedule is not None

@@ -100,6 +100,7 @@ def test_another_core_is_recognized(place: Path) -> None:
         check_files(about, place / "gauge")
 
 
+@pytest.mark.slow
 def test_another_core_of_the_same_name_is_built_in_the_folder_of_one_that_runs(place: Path) -> None:
     first = filter_design()
     second = sosmith.design({**FILTER, "filter": {**FILTER["filter"], "cutoff": 30.0}})

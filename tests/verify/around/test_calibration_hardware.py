@@ -30,7 +30,7 @@ ENTERS = (
 )
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("case", CASES)
 def test_a_decimator_behind_a_calibration_is_proven(case: Instrument) -> None:
     _, certificate = designed(case)
@@ -46,6 +46,7 @@ def test_every_edit_is_rejected(case: Instrument) -> None:
     assert accepted(case) == set()
 
 
+@pytest.mark.slow
 def test_sentences() -> None:
     """The first register or port that is wrong is named."""
     text = written(CASES[0])
@@ -91,6 +92,7 @@ def test_sentences() -> None:
     )
 
 
+@pytest.mark.slow
 def test_digits_that_are_wrong_are_rejected() -> None:
     """A result of two words leaves the calibration in two ports, the lower digit whole and below the other."""
     text, (_, certificate) = written(CASES[3]), designed(CASES[3])
@@ -136,7 +138,7 @@ BROKEN = [
 ]
 
 
-@pytest.mark.sweep(3)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(("right", "wrong"), [pytest.param(*case, id=subject) for subject, *case in BROKEN])
 def test_hardware_that_is_wrong_is_rejected(right: str, wrong: str, monkeypatch: pytest.MonkeyPatch) -> None:
     written(CASES[0])  # what is right, before anything is broken

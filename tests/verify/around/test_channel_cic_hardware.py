@@ -47,6 +47,7 @@ def test_a_decimator_of_several_channels_is_proven(case: Case | Instrument) -> N
     assert verdict.channels == case.channels
 
 
+@pytest.mark.slow
 def test_it_is_proven_with_its_files(tmp_path: Path) -> None:
     generate(design_core(from_text(SMALL.text, tmp_path / "plain.toml")), tmp_path)
     proof = Saved.load(tmp_path / "plain.certificate.json").verify(files=tmp_path)
@@ -55,6 +56,7 @@ def test_it_is_proven_with_its_files(tmp_path: Path) -> None:
     assert proof.decimator.channels == 2
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("memory", ["control", "states"])
 def test_a_word_that_is_written_beside_another_one_is_found(memory: str) -> None:
     old = rf"if \((\w+)\)\n *({memory}\[.*\]) <= (.*);"
@@ -106,7 +108,7 @@ BROKEN_AROUND = [
 ROUNDED = Case(signed=False, output_bits=9, cutoff=20, error=0.02, hold=False, architecture="folded", channels=2)
 
 
-@pytest.mark.sweep(3)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [
@@ -120,7 +122,7 @@ def test_hardware_that_is_wrong_is_rejected(right: str, wrong: str, monkeypatch:
     check_rejected_as_made(ROUNDED)
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(("right", "wrong"), [pytest.param(*case, id=subject) for subject, *case in BROKEN_AROUND])
 def test_wires_that_are_wrong_are_rejected(right: str, wrong: str, monkeypatch: pytest.MonkeyPatch) -> None:
     written(SMALL)  # what is right, before anything is broken
@@ -128,6 +130,7 @@ def test_wires_that_are_wrong_are_rejected(right: str, wrong: str, monkeypatch: 
     check_rejected_as_made(SMALL)
 
 
+@pytest.mark.slow
 def test_sentences() -> None:
     """The first register, word or port that is wrong is named."""
     text = written(SMALL)

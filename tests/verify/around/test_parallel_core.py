@@ -31,7 +31,7 @@ CASES = [
 ]
 
 
-@pytest.mark.sweep(4)
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("case", CASES)
 def test_a_core_beside_a_decimator_is_proven(case: Case | Instrument) -> None:
     _, certificate = designed(case)
@@ -69,7 +69,7 @@ BROKEN = [
 ]
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("case", "where", "right", "wrong"), [pytest.param(case, *edit, id=subject) for case, subject, *edit in BROKEN]
 )
@@ -128,6 +128,7 @@ def sweep(case: Case | Instrument, count: int, seed: int, clocks: int) -> None:
     assert found["rejected"] > count // 2
 
 
+@pytest.mark.slow
 def test_twenty_edits() -> None:
     sweep(PLAIN, 20, seed=1, clocks=300)
 

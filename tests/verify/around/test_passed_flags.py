@@ -13,6 +13,7 @@ ENTERING = "i_data_24"
 ALL = f"{{ 5'h00, {WORD}[10:8] }}"
 
 
+@pytest.mark.sweep(4)
 @pytest.mark.parametrize(
     ("wrong", "sentence"),
     [

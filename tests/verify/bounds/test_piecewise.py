@@ -29,6 +29,7 @@ NUMERATORS = (
 )
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize("name", DENOMINATORS)
 def test_sums_agree_with_an_approximate_inverse(name: str) -> None:
     made = Pieces(DENOMINATORS[name])
@@ -76,6 +77,7 @@ def test_signs_close_to_zero_come_from_the_long_integers(monkeypatch: pytest.Mon
     assert Pieces(SLOW).norm(fmpq_poly([1, -1])) == before
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize("name", DENOMINATORS)
 def test_a_rough_sum_is_above_the_close_one_by_little(name: str) -> None:
     for numerator in NUMERATORS:

@@ -23,11 +23,13 @@ def accept(core: Made) -> None:
     assert found.states == sum(len(stage.graph.delays) for stage in core.design.datapath.stages) > 0
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize("realization", REALIZATIONS)
 def test_every_realization(realization: str) -> None:
     accept(small(ODD if realization == "lattice_wdf" else PLAIN, realization, lanes=2))
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("spec", [STEADY, STEADY_INSTRUMENT, INSTRUMENT])
 def test_starts_and_a_calibration(spec: str) -> None:
     accept(small(spec, lanes=4))
@@ -37,6 +39,7 @@ def test_an_output_with_more_bits_than_the_input() -> None:
     accept(small(WIDE, "df1", lanes=2))
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("lanes", [2, 4, pytest.param(16, marks=pytest.mark.slow)])
 def test_an_example(lanes: int) -> None:
     accept(made(designed(lanes, pipeline="plain"), lanes=lanes))
@@ -49,6 +52,7 @@ def test_many_lanes(realization: str, lanes: int) -> None:
     accept(small(ODD if realization == "lattice_wdf" else PLAIN, realization, lanes=lanes))
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("bits", "realization", "lanes"), [(12, "df1_ef1", 2), (10, "state_space", 4), (13, "df2t", 16), (7, "normal", 2)]
 )
@@ -168,6 +172,7 @@ def test_a_second_sample_moves_whether_another_one_comes_or_not() -> None:
     assert re.fullmatch(sentence, rejection(core, waits)), rejection(core, waits)
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(1)
 @pytest.mark.parametrize(("bits", "lanes", "count"), [(8, 2, 40), (12, 2, 20), (10, 2, 20), (12, 16, 2)], ids=str)
 def test_edits(bits: int, lanes: int, count: int) -> None:

@@ -24,6 +24,7 @@ def test_an_example(lanes: int) -> None:
     accept(made(designed(lanes), lanes=lanes, look_ahead=True))
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("spec", "lanes"),

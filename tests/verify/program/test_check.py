@@ -51,6 +51,7 @@ def test_every_realization(spec: str, realization: str, architecture: str) -> No
     assert core.check().instructions == len(core.program.instructions)
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("architecture", ["folded", "serial"])
 def test_channels_have_one_program(architecture: str) -> None:
     assert (
@@ -58,6 +59,7 @@ def test_channels_have_one_program(architecture: str) -> None:
     )
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(("realization", "start"), [("delta", "zero"), ("df2t", "steady")])
 def test_a_state_that_is_always_zero(realization: str, start: str) -> None:
     """As that of a section whose rounded poles cancel its zeros: what it takes over is like no node but a zero."""
@@ -69,6 +71,7 @@ def test_a_state_that_is_always_zero(realization: str, start: str) -> None:
     assert core.check().instructions == len(core.program.instructions)
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("realization", ["delta", "df2t"])
 def test_a_slow_filter(realization: str) -> None:
     """Its last states are 0 for a long time, and cannot be told apart until then."""
@@ -83,6 +86,7 @@ def slow_audio(order: int, cutoff: str, architecture: str) -> Made:
     return made(design_core(specified(text)), architecture)
 
 
+@pytest.mark.slow
 def test_sections_that_look_alike_for_a_long_time() -> None:
     """What the graph says is the floor of a state is held by that one, not by one that is the same in the samples."""
     core = slow_audio(10, "4.8", "folded")
@@ -105,6 +109,7 @@ NOTHING = re.sub(
 ).replace('"faithful"', "0.5")
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("start", ["zero", "steady"])
 @pytest.mark.parametrize("realization", ["df1", "df1_ef1"])
 def test_a_section_that_does_nothing(realization: str, start: str) -> None:
