@@ -238,6 +238,7 @@ PASSING = ("scenario", "notes", "wall_seconds", "cycles_per_second")
 """Keys of a report that differ between two runs on the same codes: a file may have been measured."""
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(2)
 @pytest.mark.parametrize(
     ("spec", "scenario"), [("demo", "wear_ramp"), pytest.param("plain", "noise", marks=pytest.mark.slow)]

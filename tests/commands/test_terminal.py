@@ -1,6 +1,7 @@
 """What only a process or a terminal shows: progress, signals, the other end of a pipe."""
 
 import contextlib
+import fcntl
 import io
 import json
 import os
@@ -362,6 +363,21 @@ def test_a_signal_in_the_middle_of_the_simulation(
     assert not list((tmp_path / "out").glob(".sosmith-*"))
 
 
+def test_a_folder_in_use_is_refused(sosmith: Command) -> None:
+    Path("plain.toml").write_text(QUICK, encoding="utf-8")
+    Path("out").mkdir()
+    handle = os.open("out", os.O_RDONLY)
+    fcntl.flock(handle, fcntl.LOCK_EX)
+    outcome = sosmith("simulate", "plain.toml", "--trace", "noise", "--seconds", "0.1", "-o", "out")
+    os.close(handle)
+    assert outcome.status == 2
+    assert outcome.messages == [
+        "sosmith: error: out: the output folder must be free, not in use by another run; choose one with -o"
+    ]
+    assert list(Path("out").iterdir()) == []
+
+
+@pytest.mark.slow
 def test_two_runs_in_one_folder_at_once(process: Start, tmp_path: Path) -> None:
     """The second is refused at once, and the first, held up meanwhile, is none the worse for it."""
     (tmp_path / "plain.toml").write_text(QUICK, encoding="utf-8")
@@ -381,14 +397,25 @@ def test_two_runs_in_one_folder_at_once(process: Start, tmp_path: Path) -> None:
     assert "passed" in output
 
 
-def test_from_another_folder_through_the_installed_command(tmp_path: Path) -> None:
+SIMULATED = ("simulate", "--simulator", "icarus", "--seconds", "0.1", "--waves")
+
+
+@pytest.mark.parametrize(
+    ("command", "shown", "written"),
+    [
+        (("generate",), "plain.sv", "plain.sv"),
+        pytest.param(SIMULATED, "passed", "report.html", marks=pytest.mark.slow),
+    ],
+)
+def test_from_another_folder_through_the_installed_command(
+    command: tuple[str, ...], shown: str, written: str, tmp_path: Path
+) -> None:
     spec = tmp_path / "a [b] folder é" / "my spec.toml"
     spec.parent.mkdir()
     spec.write_text(QUICK, encoding="utf-8")
     (tmp_path / "elsewhere").mkdir()
-    command = Path(sys.executable).with_name("sosmith")
     result = subprocess.run(
-        [command, "simulate", spec, "--simulator", "icarus", "--seconds", "0.1", "--waves"],
+        [Path(sys.executable).with_name("sosmith"), command[0], spec, *command[1:]],
         cwd=tmp_path / "elsewhere",
         capture_output=True,
         text=True,
@@ -396,9 +423,8 @@ def test_from_another_folder_through_the_installed_command(tmp_path: Path) -> No
         env=os.environ | {"PYTHONIOENCODING": "ascii"},
     )
     assert result.returncode == 0
-    assert "passed" in result.stdout
-    folder = tmp_path / "elsewhere" / "build" / "plain"
-    assert (folder / "report.html").exists()
+    assert shown in result.stdout
+    assert (tmp_path / "elsewhere" / "build" / "plain" / written).exists()
     assert sorted(path.name for path in spec.parent.iterdir()) == ["my spec.toml"]
 
 

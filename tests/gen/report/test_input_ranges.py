@@ -46,6 +46,7 @@ def test_a_tone_of_full_scale_passes_without_a_word(design: sosmith.Design, tmp_
     report = _report(design, {"x": 0.999 * TONE}, tmp_path)
     assert (report.passed, report.summary["notes"], report.summary["inputs"][0]["at_end"]) == (True, [], 0)
     assert _report(design, {"x": TONE}, tmp_path).passed  # 1 is the end of the range, and in it
+    assert _report(design, "worst_case", tmp_path).summary["notes"] == []
 
 
 def test_codes_at_the_ends_are_told_with_their_share(design: sosmith.Design, tmp_path: Path) -> None:
@@ -59,4 +60,3 @@ def test_codes_at_the_ends_are_told_with_their_share(design: sosmith.Design, tmp
     assert note.startswith(f"{100 * share:.3g} % of the codes of x are at an end of its range: ")
     assert report.passed  # whether it was measured so, nobody knows
     assert note in (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert _report(design, "worst_case", tmp_path).summary["notes"] == []
