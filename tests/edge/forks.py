@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import mmap
 import os
 import random
@@ -16,6 +17,9 @@ from pathlib import Path
 
 PATIENCE = 300.0
 """Seconds after which a child is taken to hang, on however busy a machine."""
+
+_ROOM = 1 << 20
+"""Bytes of what a child says."""
 
 GONE = 30.0
 """Seconds that processes of a killed child have to end."""
@@ -58,7 +62,7 @@ class Ended:
     peak: float
 
 
-def forked(act: Callable[[], object], folder: Path, *, kill_after: float | None = None) -> Ended:
+def forked(act: Callable[[], object], *, kill_after: float | None = None) -> Ended:
     """Let a child do something, in a session of its own; kill it after so many seconds, or if it hangs.
 
     An exception ends it with status 70, after its traceback, a `SystemExit` as it ends any process. What it has
@@ -69,11 +73,14 @@ def forked(act: Callable[[], object], folder: Path, *, kill_after: float | None 
     AssertionError
         If something that it has started goes on.
     """
-    told = folder / "said.txt"
+    reader, writer = os.pipe()
+    fcntl.fcntl(writer, fcntl.F_SETPIPE_SZ, _ROOM)
+    os.set_blocking(writer, False)  # what is too much is lost, and nobody waits
     begun = time.monotonic()
     pid = os.fork()
     if not pid:
-        _run(act, told)
+        _run(act, writer)
+    os.close(writer)
     ended = _waited_for(pid, begun + (PATIENCE if kill_after is None else kill_after))
     seconds = time.monotonic() - begun
     end = time.monotonic() + GONE
@@ -82,21 +89,20 @@ def forked(act: Callable[[], object], folder: Path, *, kill_after: float | None 
             os.killpg(pid, signal.SIGKILL)
             raise AssertionError("what a killed process has started must end with it")
         time.sleep(0.02)
-    said = told.read_text(encoding="utf-8", errors="replace") if told.exists() else ""
-    told.unlink(missing_ok=True)
-    return Ended(ended[0], said, seconds, ended[1] / 1024)
+    with os.fdopen(reader, "rb") as said:
+        return Ended(ended[0], said.read().decode(errors="replace"), seconds, ended[1] / 1024)
 
 
-def _run(act: Callable[[], object], told: Path) -> None:
+def _run(act: Callable[[], object], told: int) -> None:
     """Be the child."""
     status = 70
     try:
         os.setsid()
-        handle = os.open(told, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_APPEND, 0o600)
         for number in (1, 2):
-            os.dup2(handle, number)
+            os.dup2(told, number)
+        os.close(told)
         sys.stdout = os.fdopen(os.dup(1), "w", encoding="utf-8")
-        sys.stderr = os.fdopen(os.dup(2), "w", encoding="utf-8", buffering=1)
+        sys.stderr = sys.__stderr__ = os.fdopen(os.dup(2), "w", encoding="utf-8", buffering=1)
         act()
         status = 0
     except SystemExit as left:

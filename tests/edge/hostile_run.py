@@ -100,6 +100,12 @@ def _wrong_rows(result: Result, record: Path) -> Iterator[str]:
         yield "columns of the same name"
     if "board" not in header:  # of `stream`
         return
+    run_of, utc = [(row[header.index("run")], row[header.index("session")]) for row in rows], header.index("utc")
+    if any(
+        one == other and earlier[utc] > later[utc]
+        for one, other, earlier, later in zip(run_of, run_of[1:], rows, rows[1:], strict=False)
+    ):
+        yield "times of a session that go back"
     code = next(n for n, name in enumerate(header) if name.endswith("_code"))
     shown = [line.split("code=")[1].split("i")[0] for line in result.stdout.splitlines() if "code=" in line]
     if [row[code] for row in rows] != shown:

@@ -35,7 +35,7 @@ def killed(writer: Writer, seed: int, longest: float) -> Killed:
         writer.prepare(folder)
         after = moment(random.Random(seed), longest)
         try:
-            ended = forked(lambda: writer.write(folder, done), folder, kill_after=after)
+            ended = forked(lambda: writer.write(folder, done), kill_after=after)
             findings = tuple(writer.faults(folder, done))
         except Exception as error:
             return Killed(at_work=True, findings=(f"{type(error).__name__}: {error}",))
@@ -51,6 +51,6 @@ def duration(writer: Writer) -> float:
     with tempfile.TemporaryDirectory() as scratch:
         folder, done = Path(scratch), Ledger()
         writer.prepare(folder)
-        ended = forked(lambda: writer.write(folder, done), folder)
+        ended = forked(lambda: writer.write(folder, done))
         assert ended.status == 0, ended.said
         return ended.seconds

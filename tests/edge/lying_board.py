@@ -38,19 +38,22 @@ OTHERS = (None, [], {}, [[]], {"a": 1})
 
 
 class Clock:
-    """Time that passes while somebody waits for it, to an end."""
+    """Time that passes while somebody waits for it, to an end; now and then somebody sets the clock."""
 
-    def __init__(self, end: float) -> None:
-        self.now, self._end = 0.0, end
+    def __init__(self, end: float, rng: random.Random) -> None:
+        self.now, self._end, self._rng = 0.0, end, rng
+        self._set = 1e9
 
     def time(self) -> float:
-        return 1e9 + self.now
+        return self._set + self.now
 
     def monotonic(self) -> float:
         return self.now
 
     def sleep(self, seconds: float, /) -> None:
         self.now += seconds
+        if self._rng.random() < 0.05:
+            self._set += self._rng.choice((-9e8, -3600.0, -0.5, 3600.0))
         if self.now > self._end:
             raise EnoughError("the test must end, not go on")
 
@@ -233,7 +236,7 @@ class LyingPort:
 
     def __post_init__(self) -> None:
         self._rng = random.Random(self.seed)
-        self.clock = Clock(end=20.0)
+        self.clock = Clock(20.0, random.Random(self.seed))
         self.measures = self.seed % 3 != 0
         self.honest = measuring_identity(self._rng.choice((1, 3))) if self.measures else fed_identity()
         self._lies_about_itself = self._rng.random() < 0.3

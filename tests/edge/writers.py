@@ -111,7 +111,7 @@ class WritesParquet:
 
     def faults(self, folder: Path, done: Ledger) -> Iterator[str]:
         """Complete it, in a child: threads of pyarrow must not be forked."""
-        ended = forked(lambda: self._look(folder, done), folder)
+        ended = forked(lambda: self._look(folder, done))
         if ended.status:
             yield ended.said.strip().rpartition("\n")[2]
 
@@ -312,7 +312,7 @@ class RunsCommand:
     def faults(self, folder: Path, done: Ledger) -> Iterator[str]:
         """Hold what is left against a run to its end."""
         left = {name: self._read(folder, name) for name in self._same}
-        ended = forked(lambda: self.write(folder, done), folder)
+        ended = forked(lambda: self.write(folder, done))
         if ended.status:
             yield f"another run ends with status {ended.status}: {ended.said[-300:]}"
             return

@@ -1,5 +1,7 @@
 """Watching a board: samples as they are due, and sessions that go on after the board was unplugged."""
 
+import math
+import random
 from collections.abc import Callable, Iterator
 from itertools import groupby, islice, pairwise
 from pathlib import Path
@@ -13,6 +15,7 @@ from tests.interface.small import filter_design
 
 import sosmith
 from sosmith.host.board import Board
+from sosmith.host.clock import TimeBase
 from sosmith.host.monitor import RETRY, TURN, Connected, Event, Idle, Lost, Received, watch
 from sosmith.model.errors import ToolError
 from sosmith.model.link.device import Device
@@ -327,3 +330,20 @@ def test_a_port_that_is_unplugged_and_comes_back(times: int, tmp_path: Path) -> 
     assert sum(len(event.results.codes) for event in received(told)) == len(CODES)
     assert received(told)[-1].session == times + 1
     _sessions_are_those_of_the_model(received(told))
+
+
+@pytest.mark.parametrize("rate", [10.0, 100.0, 5000.0])
+def test_times_of_a_session_never_go_back_however_late_results_come(rate: float) -> None:
+    """Results come up to half a turn after they were measured, by chance; times are right to a tenth of a second."""
+    clock, rng, told, first = Time(), random.Random(1), -math.inf, 0
+    base = TimeBase(clock, rate)
+    for _ in range(300):
+        clock.sleep(rng.uniform(0.0, TURN) + 1 / rate)
+        measured = int((clock.now - rng.uniform(0.0, TURN / 2)) * rate)
+        if measured < first:
+            continue
+        base.came(measured, clock.monotonic())
+        begins, ends = (base.start + n / rate for n in (first, measured))
+        assert begins > told
+        told, first = ends, measured + 1
+        assert told == pytest.approx(clock.time(), abs=0.1 + 1 / rate)

@@ -78,9 +78,11 @@ class TimeBase:
 
     def came(self, sample: int, moment: float) -> None:
         """Note that the newest result there was came at a moment of the monotonic clock."""
-        latest = moment - sample / self._rate
-        if self._start is None or latest < self._start or latest - self._start > 1 / self._rate + SLACK:
+        latest, period = moment - sample / self._rate, 1 / self._rate
+        if self._start is None or latest - self._start > period + SLACK:
             self._start = latest
+        elif latest < self._start:  # by so little at once that every sample comes out behind the one before
+            self._start = max(latest, self._start - period / 2)
 
 
 def utc_text(seconds: float, digits: str = "microseconds") -> str:

@@ -97,9 +97,10 @@ class Loopback:
     ) -> None:
         from websockets.sync.server import ServerConnection, serve
 
-        def create(*given: Any, **options: Any) -> ServerConnection:
-            self._check_free()
-            return ServerConnection(*given, **options)
+        class Limited(ServerConnection):
+            def __init__(connection, *given: Any, **options: Any) -> None:  # noqa: N805
+                self._check_free()
+                super().__init__(*given, **options)
 
         self._pages, self._talk = pages, talk
         self._lock, self._threads = threading.Lock(), set[threading.Thread]()
@@ -116,7 +117,7 @@ class Loopback:
                 max_size=max_message,
                 open_timeout=OPEN_TIMEOUT,
                 close_timeout=1,
-                create_connection=create,
+                create_connection=Limited,
                 server_header=None,
                 logger=silent,
             )
