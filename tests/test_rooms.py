@@ -23,10 +23,6 @@ INTERFACE = (
 )
 """What commands import."""
 PAST_THE_INTERFACE = {
-    "instrument/spectrum.py": 3,
-    "instrument/vehicle.py": 5,
-    "tables/spectrum.py": 5,
-    "tables/vehicle.py": 3,
     "verify.py": 1,
 }
 """Imports of each command that pass the interface by."""
