@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from sosmith import SosmithError, Specification, SpecificationError
-from sosmith.model.text_files import write_files
+from sosmith.interface.files import write_files
 from sosmith.studio.edits import changed
 from sosmith.studio.lane import Lane, warm_up
 
