@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 from sosmith.gen.core import polynomial_of
+from sosmith.gen.facts.table import Table, View
 from sosmith.gen.specification.specification import load
 from sosmith.instrument.spectrum.filter_table import filter_table, replace_filter
 from sosmith.instrument.spectrum.plot import Curve, spectrum_plot
 from sosmith.instrument.spectrum.prediction import Content, told_apart
 from sosmith.instrument.spectrum.proposal import Proposal, propose
-from sosmith.instrument.spectrum.report import provenance
+from sosmith.instrument.spectrum.report import proposal_json, provenance, signal_json
 from sosmith.instrument.spectrum.settings import SpectrumSettings, Wish
 from sosmith.instrument.spectrum.spectra import Spectrum, slow_rms, spectrum
+from sosmith.instrument.spectrum.tables import proposal_tables, signals_table
 from sosmith.instrument.spectrum.trial import Trial, try_filter
 from sosmith.model.arrays import Values
 from sosmith.model.errors import ShortfallError, SpecificationError
@@ -35,11 +38,13 @@ class SignalSpectra:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Survey:
+class Survey(View):
     """Spectra of traces, and the filter proposed from them.
 
     Attributes
     ----------
+    settings : SpectrumSettings
+        How the spectra were estimated.
     signals : list of SignalSpectra
         Every signal of every trace.
     proposal : Proposal or None
@@ -54,6 +59,7 @@ class Survey:
         The proposal as TOML: the table ``[filter]``, or a whole specification with it.
     """
 
+    settings: SpectrumSettings
     signals: list[SignalSpectra]
     proposal: Proposal | None
     trials: list[Trial | None]
@@ -69,6 +75,24 @@ class Survey:
             for key, s in one.spectra.items()
         ]
         return spectrum_plot(curves, self.proposal, file_format)
+
+    def tables(self) -> list[Table]:
+        """Return the spectra and, if there is a proposal, the filter and its remaining error."""
+        names, spectra = [one.name for one in self.signals], [one.spectra for one in self.signals]
+        units = [one.signal.unit for one in self.signals]
+        measured = signals_table(names, units, spectra)
+        if self.proposal is None:
+            return [measured]
+        return [measured, *proposal_tables(self.proposal, units[0], names, spectra, self.trials)]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return settings, signals and proposal in JSON types."""
+        signals = [
+            signal_json(one.name, one.file, one.signal.unit, one.spectra, trial)
+            for one, trial in zip(self.signals, self.trials, strict=True)
+        ]
+        proposal = None if self.proposal is None else proposal_json(self.proposal)
+        return {"settings": asdict(self.settings), "signals": signals, "proposal": proposal}
 
 
 def survey(
@@ -132,6 +156,7 @@ def survey(
         if into is not None:
             table = replace_filter(_text_of(into), table, str(into))
     return Survey(
+        settings=settings,
         signals=signals,
         proposal=proposal,
         trials=[None if proposal is None else _trial(one, proposal) for one in signals],

@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from sosmith.terminal import JSON_OPTION, print_json, show_progress
-
-if TYPE_CHECKING:
-    from sosmith.interface.certificate import Proof
 
 _NOT_ALL = 4
 """Exit status if nothing is wrong, but a part of what was asked for is not proven."""
@@ -91,50 +87,10 @@ def verify(
         except ShortfallError as error:
             raise ShortfallError(f"{certificate}: {error}") from None
     if as_json:
-        print_json(
-            {
-                "name": read.name,
-                "proven": not proof.missing,
-                "scope": {
-                    name: {"state": part.state.value, "asked": part.asked, "why": part.why}
-                    for name, part in proof.scope.items()
-                },
-                "error_bound": proof.bound,
-                "error_parts": proof.budget,
-                "error_unit": proof.bound.unit,
-                "max_error": float(read.entries.max_error),
-                "nodes": proof.nodes,
-                "ranges_from_peak_gains": proof.ranges,
-                "specification": None
-                if proof.agreement is None
-                else {
-                    "core": proof.agreement.core,
-                    "filter_distance": None if proof.agreement.distance is None else float(proof.agreement.distance),
-                    "calibration_from_measurements": proof.agreement.fitted,
-                },
-                "files_compared": proof.files,
-                "program_instructions": None if proof.program is None else proof.program.instructions,
-                **_calibration(proof),
-                "hardware_registers": None if proof.hardware is None else proof.hardware.registers,
-                "decimator_registers": None if proof.decimator is None else proof.decimator.registers,
-                "files_rebuilt": proof.rebuilt,
-            }
-        )
+        print_json({"name": read.name, **proof.as_dict()})
     else:
         from sosmith.commands.tables.certificate import print_proof
 
         print_proof(read.entries, proof)
     if proof.missing and not partial:
         click.get_current_context().exit(_NOT_ALL)
-
-
-def _calibration(proof: Proof) -> dict[str, int]:
-    """Return what the proof of a calibration before a decimator is about."""
-    from sosmith.verify.program.check import ProgramVerdict
-
-    found = proof.calibration
-    if found is None:
-        return {}
-    if isinstance(found, ProgramVerdict):
-        return {"calibration_instructions": found.instructions}
-    return {"calibration_registers": found.registers}

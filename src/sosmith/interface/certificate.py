@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from os import PathLike, fspath
 from pathlib import Path
+from typing import Any
 
 from sosmith.gen.specification.specification import Specification, from_text, load
 from sosmith.interface.quantity import Quantity
@@ -61,6 +62,8 @@ class Proof:
         Bound on the difference between hardware and exact result, for all inputs in range.
     budget : dict of str to Quantity
         Parts of the bound, which add up to it.
+    allowed : Quantity
+        What the specification allows.
     nodes : int
         Number of operations whose range was checked.
     ranges : int
@@ -69,6 +72,7 @@ class Proof:
 
     bound: Quantity
     budget: dict[str, Quantity]
+    allowed: Quantity
     nodes: int
     ranges: int
     agreement: Agreement | None = None
@@ -94,6 +98,45 @@ class Proof:
     def missing(self) -> dict[str, Part]:
         """The parts that were asked for and are not proven as a whole; empty if everything is."""
         return {name: part for name, part in self.scope.items() if part.is_missing}
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return all of it in JSON types."""
+        agreement, distance = self.agreement, None if self.agreement is None else self.agreement.distance
+        return {
+            "proven": not self.missing,
+            "scope": {
+                name: {"state": part.state.value, "asked": part.asked, "why": part.why}
+                for name, part in self.scope.items()
+            },
+            "error_bound": self.bound,
+            "error_parts": self.budget,
+            "error_unit": self.bound.unit,
+            "max_error": self.allowed,
+            "nodes": self.nodes,
+            "ranges_from_peak_gains": self.ranges,
+            "specification": None
+            if agreement is None
+            else {
+                "core": agreement.core,
+                "filter_distance": None if distance is None else float(distance),
+                "calibration_from_measurements": agreement.fitted,
+            },
+            "files_compared": self.files,
+            "program_instructions": None if self.program is None else self.program.instructions,
+            **_size("calibration", self.calibration),
+            "hardware_registers": None if self.hardware is None else self.hardware.registers,
+            "decimator_registers": None if self.decimator is None else self.decimator.registers,
+            "files_rebuilt": self.rebuilt,
+        }
+
+
+def _size(name: str, verdict: ProgramVerdict | HardwareVerdict | None) -> dict[str, int]:
+    """Return what a proof is about: instructions or registers."""
+    if verdict is None:
+        return {}
+    if isinstance(verdict, ProgramVerdict):
+        return {f"{name}_instructions": verdict.instructions}
+    return {f"{name}_registers": verdict.registers}
 
 
 @dataclass(frozen=True)
@@ -222,6 +265,7 @@ class Certificate:
         return Proof(
             bound=Quantity(float(verdict.bound * lsb), unit),
             budget={part: Quantity(float(value * lsb), unit) for part, value in verdict.budget.items()},
+            allowed=Quantity(float(self.entries.max_error), unit),
             nodes=verdict.nodes,
             ranges=verdict.ranges,
             agreement=found.agreement,

@@ -18,6 +18,7 @@ from sosmith.gen.specification.verilog_names import identifier_from
 from sosmith.instrument.calibration.acceptance import DEFAULT_RANGES
 from sosmith.instrument.calibration.acceptance import METHODS as FIT_METHODS
 from sosmith.instrument.scenarios.summaries import SUMMARIES, check_scenario, fitting
+from sosmith.instrument.spectrum.settings import COVERAGE, DETRENDS, PASSBAND_LOSS, TOLERANCE, WINDOWS
 from sosmith.instrument.vehicle.choices import LEVELS, MODELS, TRACK_NAMES
 from sosmith.instrument.wear.record_columns import CLEARANCES, TIMES
 from sosmith.model.suggestion import did_you_mean
@@ -27,12 +28,15 @@ __all__ = [
     "BUILDABLE",
     "CLEARANCES",
     "CORES",
+    "COVERAGE",
     "DEFAULT_RANGES",
+    "DETRENDS",
     "ERROR_FEEDBACK",
     "FIT_METHODS",
     "LEVELS",
     "MODELLED",
     "MODELS",
+    "PASSBAND_LOSS",
     "PROJECTS",
     "REALIZATIONS",
     "REQUIRED_R",
@@ -40,7 +44,9 @@ __all__ = [
     "SIMULATORS",
     "SYNTHESIZED",
     "TIMES",
+    "TOLERANCE",
     "TRACK_NAMES",
+    "WINDOWS",
     "board_named",
     "check_date",
     "check_scenario",

@@ -10,7 +10,7 @@ from typing import Any
 
 from sosmith import SosmithError, Specification, SpecificationError
 from sosmith.host.loopback import MessageError
-from sosmith.model.text_files import write_file, write_files
+from sosmith.interface.files import write_file, write_files
 from sosmith.studio.edits import changed
 from sosmith.studio.lane import Lane, warm_up
 

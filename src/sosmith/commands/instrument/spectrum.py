@@ -2,25 +2,13 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import asdict
 from pathlib import Path
 
 import click
 
-from sosmith.commands.options import OneOf
-from sosmith.instrument.spectrum.settings import (
-    COVERAGE,
-    DETRENDS,
-    PASSBAND_LOSS,
-    TOLERANCE,
-    WINDOWS,
-    SpectrumSettings,
-    Wish,
-)
-from sosmith.interface.choices import picture_format
+from sosmith.commands.options import OneOf, print_tables
+from sosmith.interface.choices import COVERAGE, DETRENDS, PASSBAND_LOSS, TOLERANCE, WINDOWS, picture_format
 from sosmith.interface.files import write_file
-from sosmith.model.errors import SpecificationError
 from sosmith.output_paths import output_option, plot_option
 from sosmith.terminal import JSON_OPTION, note, print_json, show_progress
 
@@ -119,26 +107,30 @@ def spectrum_command(
     output: Path | None,
 ) -> None:
     """Carry out `sosmith spectrum`."""
-    settings = SpectrumSettings(window=window, segment=segment, overlap=overlap, detrend=detrend, confidence=confidence)
-    edge = _pass_edge(passband, time_constant)
-    wish = Wish(tolerance=tolerance, coverage=coverage, passband=edge, passband_loss=passband_loss)
     picture = plot if plot is not None or output is None else output.with_suffix(".svg")
     file_format = "" if picture is None else picture_format(picture)
     with show_progress() as step:
-        from sosmith.instrument.spectrum.report import proposal_json, signal_json
-        from sosmith.instrument.spectrum.survey import survey
+        from sosmith.interface.instrument.spectrum import survey
 
         made = survey(
             traces,
-            settings,
-            wish,
             columns=columns,
             truth=truth,
             channels=channels,
             calibration=calibration,
+            motion=motion,
+            tolerance=tolerance,
+            coverage=coverage,
+            passband=passband,
+            time_constant=time_constant,
+            passband_loss=passband_loss,
+            window=window,
+            segment=segment,
+            overlap=overlap,
+            detrend=detrend,
+            confidence=confidence,
             into=into,
             output=output,
-            motion=motion,
             progress=step,
         )
         drawn = None
@@ -146,18 +138,9 @@ def spectrum_command(
             step("drawing")
             drawn = made.plot(file_format)
     if as_json:
-        entries = [
-            signal_json(one.name, one.file, one.signal.unit, one.spectra, trial)
-            for one, trial in zip(made.signals, made.trials, strict=True)
-        ]
-        proposed = None if made.proposal is None else proposal_json(made.proposal)
-        print_json({"settings": asdict(settings), "signals": entries, "proposal": proposed})
+        print_json(made.as_dict())
     else:
-        from sosmith.commands.tables.spectrum import print_proposal, print_signals
-
-        print_signals(made.signals)
-        if made.proposal is not None:
-            print_proposal(made.proposal, made.signals, made.trials)
+        print_tables(made.tables())
     if made.table is not None:
         _hand_over(made.table, output, as_json=as_json)
     if picture is not None and drawn is not None:
@@ -173,16 +156,6 @@ def _hand_over(table: str, output: Path | None, *, as_json: bool) -> None:
         _write(output, table.encode())
     elif not as_json:
         click.echo(table, nl=False)
-
-
-def _pass_edge(passband: float | None, time_constant: float | None) -> float | None:
-    if time_constant is None:
-        return passband
-    if passband is not None:
-        raise SpecificationError("the passband edge must be given by one of --passband and --time-constant, not both")
-    if not 0 < time_constant < math.inf:
-        raise SpecificationError(f"time-constant must be a positive number of seconds, not {time_constant:g}")
-    return float(f"{1 / (2 * math.pi * time_constant):.5g}")  # as many digits as the other numbers of the proposal
 
 
 def _write(path: Path, content: bytes) -> None:

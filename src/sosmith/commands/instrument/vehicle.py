@@ -4,18 +4,14 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
-from sosmith.commands.options import OneOf
+from sosmith.commands.options import OneOf, print_tables
 from sosmith.interface.choices import LEVELS, MODELS, TRACK_NAMES, picture_format
 from sosmith.interface.files import write_file
 from sosmith.output_paths import OutputFile, output_option, plot_option
 from sosmith.terminal import JSON_OPTION, note, print_json, show_progress
-
-if TYPE_CHECKING:
-    from sosmith.instrument.vehicle.vehicle_report import VehicleRun
 
 
 @click.command("vehicle")
@@ -82,23 +78,18 @@ def vehicle(
         sosmith vehicle my_vehicle.toml --track tangent --irregularities low -o motion.csv
     """
     file_format = "" if plot is None else picture_format(plot)
-    from sosmith.instrument.vehicle.parameters import built_in, built_in_text, load
+    from sosmith.interface.instrument.vehicle import Ride
 
     if write_parameters is not None:
-        write_file(write_parameters, built_in_text())
+        write_file(write_parameters, Ride.parameters())
         note(f"wrote {write_parameters}")
         return
-    given = built_in() if parameters is None else load(parameters)
-    from sosmith.instrument.paper.figures import read_paper_figures
-    from sosmith.instrument.paper.vehicle_comparison import comparison_json, run_comparison
-    from sosmith.instrument.vehicle.vehicle_report import parameters_json, vehicle_csv, vehicle_json, vehicle_run
-
     with show_progress() as step:
         step("running over the track")
         begin = time.process_time()
-        made = vehicle_run(
-            given,
-            track=track,
+        ride = Ride.over(
+            track,
+            parameters=parameters,
             speed=speed,
             sample_rate=sample_rate,
             irregularities=irregularities,
@@ -108,46 +99,17 @@ def vehicle(
         took = time.process_time() - begin
         if output is not None:
             step("writing the motion")
-            write_file(output, vehicle_csv(made.motion))
+            write_file(output, ride.csv())
         if plot is not None:
-            from sosmith.instrument.vehicle.vehicle_plot import linear_beside, vehicle_plot
-
             step("drawing")
-            beside = linear_beside(made)
-            write_file(plot, vehicle_plot(made, file_format, beside))
+            write_file(plot, ride.picture(file_format))
     for path in (output, plot):
         if path is not None:
             note(f"wrote {path}")
-    note(f"{made.motion.distance[-1]:.0f} m of track took {took:.1f} s of processor time")
-    if not made.limits.kept:
-        note(_warning(made))
-    tables = run_comparison(made, read_paper_figures())
+    note(f"{ride.length:.0f} m of track took {took:.1f} s of processor time")
+    if ride.warning:
+        note(ride.warning)
     if as_json:
-        more = {"comparison": comparison_json(tables), "parameters": parameters_json(made.parameters)}
-        print_json(vehicle_json(made) | more)
+        print_json(ride.as_dict())
     else:
-        from sosmith.commands.tables.vehicle import print_details, print_run
-
-        print_run(made)
-        if details:
-            print_details(made, tables)
-
-
-def _warning(made: VehicleRun) -> str:
-    """Describe in one sentence the wheelsets that exceed the limits most."""
-    found, linear = made.limits, made.model == "linear"
-    worst, slips = int(found.beyond_flange.argmax()), int(found.friction_used.argmax())
-    climbs, lifts = int(found.derailment_quotient.argmax()), int(found.load_share.argmin())
-    parts = []
-    if linear and found.beyond_flange[worst] > 0:
-        parts.append(f"wheelset {worst + 1} moves {1e3 * found.beyond_flange[worst]:.1f} mm past the flange")
-    if found.friction_used[slips] > 1:
-        parts.append(
-            f"the creep force of wheelset {slips + 1} is {found.friction_used[slips]:.2f} times the available friction"
-        )
-    if found.derailment_quotient[climbs] >= found.nadal:
-        ratio = found.derailment_quotient[climbs]
-        parts.append(f"wheelset {climbs + 1} climbs the rail, with a Y/Q of {ratio:.2f} against {found.nadal:.2f}")
-    if found.load_share[lifts] <= 0:
-        parts.append(f"a wheel of wheelset {lifts + 1} lifts off the rail")
-    return f"this run exceeds the limits of the {made.model} model: {' and '.join(parts)}"
+        print_tables(ride.tables(details=details))

@@ -15,8 +15,7 @@ def print_proof(certificate: Entries, proof: Proof) -> None:
     console = TableConsole()
     unit = plain(proof.bound.unit)
     ranges = f"{proof.nodes} nodes within their ranges, {proof.ranges} by peak gains: nothing inside overflows"
-    allowed = Quantity(float(certificate.max_error), unit)
-    print_all([budget_table(proof.budget, allowed, float(certificate.output.lsb))])
+    print_all([budget_table(proof.budget, Quantity(proof.allowed, unit), float(certificate.output.lsb))])
     console.print(f"[bold green]proven[/]: {escape(plain(certificate.name))}, {ranges}")
     if proof.agreement is not None:
         console.print(f"[bold green]as specified[/]: {_agreement(proof.agreement)}")
