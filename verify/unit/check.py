@@ -1,9 +1,31 @@
-"""Proves that the unit of a folded or serial core runs its program as `sosmith.verify.program` takes it."""
+"""Proves that the unit of a folded or serial core runs its program, for all inputs, stalls and resets.
+
+`sosmith.verify.program` proves what a program computes, where each instruction does what its name says, one after the
+other. Here it is shown, from the SystemVerilog, that the unit makes just that of a program::
+
+    core.sv --> netlist --> control: all states that it can be in ------------------+
+                   |                                                                v
+                   +--> data: what each register takes over, a form of the others --> in each state what the
+                                                                                      instructions in it ask for
+
+1. After a reset all words are cleared. Then every state is visited that the control can be in, for any source and sink:
+   each instruction is fetched in its turn, a word is read and written when and where the instructions say, each sample
+   is begun, accepted and answered once, and a result stays until it leaves (`sosmith.verify.unit.control`).
+2. In each of these states, what the data registers take over is what the instructions ask for: the word read, the
+   product, the sum modulo the width of the accumulator, the digit that is stored (`sosmith.verify.unit.data`).
+3. A result is limited as the graph says, and its flags are those of its sample (`output` and `order`).
+4. While the sink is ready, the longest way through the states is a number of clocks (`going_on`).
+
+That an instruction reads a word only once the one that writes it has done so is shown with the program. Names of
+registers count: under a wrong name a proof is not found. The source must keep a sample on offer until it is accepted,
+as AXI4-Stream asks.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Hashable
 from dataclasses import dataclass
+from functools import partial
 
 from sosmith.verify.certificate_file import Certificate
 from sosmith.verify.graph import require
@@ -13,11 +35,15 @@ from sosmith.verify.parallel.evaluation import Evaluation
 from sosmith.verify.parallel.forms import Forms
 from sosmith.verify.parallel.netlist import Netlist, flattened
 from sosmith.verify.program.normal_form import Form, constant, plus
-from sosmith.verify.program.text import read_program
+from sosmith.verify.program.text import ProgramText, read_program
+from sosmith.verify.progress import Progress
 from sosmith.verify.reader.source import read_source
-from sosmith.verify.unit.contexts import Contexts, Slice
+from sosmith.verify.unit.contexts import Contexts
 from sosmith.verify.unit.control import DEST, FOLDED, SERIAL, Control, Event, Machine
 from sosmith.verify.unit.data import ADDED, READ, Data, Subject
+from sosmith.verify.unit.going_on import progress
+from sosmith.verify.unit.order import check_order
+from sosmith.verify.unit.output import Output
 from sosmith.verify.unit.ternary import Values
 
 CLOCK = "aclk"
@@ -34,10 +60,13 @@ class UnitVerdict:
         Number of states of its control.
     cases : int
         Number of cases of its data.
+    progress : Progress
+        Within how many clocks it takes samples and gives results.
     """
 
     states: int
     cases: int
+    progress: Progress
 
 
 def check_unit(text: str, certificate: Certificate, *, serial: bool, top: str | None = None) -> UnitVerdict:
@@ -57,10 +86,23 @@ def check_unit(text: str, certificate: Certificate, *, serial: bool, top: str | 
     contexts = Contexts(netlist, control, control.ternary, [ADDED, READ, *split])
     data = Data(netlist, program, control, contexts, stages)
     data.check_nets()
-    cases = _Cases(contexts, data.subjects)
-    control.visit(cases.note)
+    output = Output(netlist, program, control, contexts, stages, certificate)
+    cases = _Cases(contexts, [*data.subjects, *output.subjects])
+    clearing = control.visit(cases.note)
     cases.check()
-    return UnitVerdict(len(control.nodes), cases.count)
+    check_order(control, program, output)
+    ways = progress(control, clearing, partial(_digits, program) if serial else lambda number: 1)
+    return UnitVerdict(len(control.nodes), cases.count, ways)
+
+
+def _digits(program: ProgramText, number: int) -> int:
+    """Return the most clocks that a serial multiplication takes: until nothing but a sign is left of a factor."""
+    instruction = program.instructions[number]
+    left = -1 << program.digit_bits if instruction.multiplies_words else instruction.constant
+    clocks = 1
+    while left not in {-1, 0, 1}:
+        left, clocks = left >> 1, clocks + 1
+    return clocks
 
 
 def _existing(netlist: Netlist, channels: int) -> list[str]:
@@ -112,6 +154,3 @@ class _Cases:
             for key, values in cases.items():
                 assert isinstance(key, tuple)
                 subject.check(key[0], values)
-
-
-__all__ = ["Slice", "UnitVerdict", "check_unit"]

@@ -55,13 +55,9 @@ class Contexts:
         self._reached: dict[str, frozenset[Slice]] = {}
         self._controls: set[str] = set()
 
-    def slices(self, values: Iterable[Expression], opened: str = "") -> list[Slice]:
-        """Return the control bits that expressions read; the net `opened` is no cut."""
-        found: set[Slice] = set()
-        for value in values:
-            for bits in _bits(value):
-                found |= self._of(bits, opened)
-        return sorted(found)
+    def slices(self, values: Iterable[Expression]) -> list[Slice]:
+        """Return the control bits that expressions read."""
+        return sorted({part for value in values for bits in _bits(value) for part in self._of(bits)})
 
     def key(self, slices: Sequence[Slice], values: Values) -> Hashable:
         """Return what control bits are in a state."""
@@ -72,16 +68,26 @@ class Contexts:
         forms: Forms,
         values: Values,
         held: Mapping[str, Form],
-        opened: str = "",
+        opened: str | None = None,
+        fields: Sequence[tuple[int, int, Form]] = (),
+        deep: bool = False,
     ) -> Evaluation:
-        """Return the logic in a state, where some registers and cut nets hold the given forms."""
+        """Return the logic in a state, where some registers and cut nets hold the given forms.
+
+        The net `opened` is no cut. `fields` are the places, widths and words of the input's fields; without them, each
+        of its bits is a variable. `deep` logic reads control registers only, which is for control bits that are not
+        known: control nets that are not would lose what they are made of.
+        """
         widths = self._netlist.widths
 
         def content(name: str) -> Form:
             return held[name] if name in held else forms.variable(name, 0, (1 << widths[name]) - 1)
 
-        def fields(name: str, low: int, width: int) -> Form | None:
+        def part(name: str, low: int, width: int) -> Form | None:
             if name == DATA:
+                for offset, wide, whole in fields:
+                    if offset <= low and low + width <= offset + wide:
+                        return forms.floor(shifted(whole, offset - low))
                 bits = (forms.variable((DATA, low + k), 0, 1) for k in range(width))
                 return _sum((bit, k) for k, bit in enumerate(bits))
             if name in held or not self._is_control(name):
@@ -94,8 +100,8 @@ class Contexts:
         def word(name: str, address: Form) -> Form:
             raise RejectedError(f"words of {name} must be read to a register of their own")
 
-        cuts = (self._cuts | self._controls) - {opened}
-        return Evaluation(self._netlist, forms, content, word=word, cuts=cuts, fields=fields)
+        cuts = (self._cuts | (self._control.cuts if deep else self._controls)) - {opened}
+        return Evaluation(self._netlist, forms, content, word=word, cuts=cuts, fields=part)
 
     def parts(self, name: str) -> list[Part]:
         """Return the registers that hold a word, the lowest bits first.
@@ -131,25 +137,20 @@ class Contexts:
         return _sum(parts)
 
     def _is_control(self, name: str) -> bool:
-        return name in self._controls or name in self._control.registers
+        return name in self._controls or name in self._control.registers or name in self._control.cuts
 
-    def _of(self, bits: Bits, opened: str) -> frozenset[Slice]:
+    def _of(self, bits: Bits) -> frozenset[Slice]:
         name = bits.name
-        if name not in self._cuts - {opened} and name != DATA and self._control.is_control(name):
+        if name in self._cuts or name == DATA:
+            return frozenset()
+        if self._control.is_control(name):
             self._controls.add(name)
             width = self._netlist.widths[name] if bits.width is None else bits.width
             return frozenset({Slice(name, bits.low, width)})
-        if name in self._cuts - {opened} or name not in self._netlist.drivers:
-            return frozenset()
-        if not opened and name in self._reached:
-            return self._reached[name]
-        found: set[Slice] = set()
-        for driver in self._netlist.drivers[name]:
-            for inner in _bits(driver.value):
-                found |= self._of(inner, opened)
-        if not opened:
-            self._reached[name] = frozenset(found)
-        return frozenset(found)
+        if name not in self._reached:
+            values = [driver.value for driver in self._netlist.drivers.get(name, ())]
+            self._reached[name] = frozenset(self.slices(values))
+        return self._reached[name]
 
 
 def unknown(forms: Forms, bits: Slice) -> Form:

@@ -16,8 +16,9 @@ is unknown all the while. Where it decides, as the digits of a factor do in seri
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 from sosmith.verify.graph import RejectedError, require
@@ -399,9 +400,10 @@ class Control:
         early, late = (self.instruction(machine, stage) for stage in (self._stages.early, self._stages.last))
         if not event.advance:
             return None
-        if early is not None and early.is_early:
-            return early
-        return late if late is not None and late.writes and not late.is_early else None
+        writers = [each for each in (early,) if each is not None and each.is_early]
+        writers += [each for each in (late,) if each is not None and each.writes and not each.is_early]
+        require(len(writers) < 2, f"two instructions must not write at a clock, as they do at {machine.position}")
+        return writers[0] if writers else None
 
     def _check_words(self, machine: Machine, values: Values, *, advance: bool) -> None:
         """Check when words are read and written, and where as far as it is the program that says so."""
@@ -452,6 +454,17 @@ class Control:
             require(self._clears[machine.position - 1], f"the unit must not wait {where} while something is added up")
 
 
+def apart(machine: Machine) -> int:
+    """Return how many samples have begun before the last one without being complete."""
+    inside = [number for number in machine.pipe if number is not None]
+    return sum(later > number for number, later in pairwise(inside))
+
+
+def is_inside(machine: Machine) -> bool:
+    """Whether a sample has begun whose result is not complete."""
+    return machine.position > 0 or any(number is not None for number in machine.pipe)
+
+
 def _words(netlist: Netlist) -> list[str]:
     """Return the memories that words are cut into, the lowest bits first."""
     found = [name for name in netlist.memories if name.startswith("words") and name[5:].isdecimal()]
@@ -470,6 +483,3 @@ def _growing(nodes: Sequence[Node]) -> Iterator[tuple[int, Node]]:
     while number < len(nodes):
         yield number, nodes[number]
         number += 1
-
-
-__all__ = ["FOLDED", "SERIAL", "Control", "Event", "Machine", "Mapping", "Stages", "Step"]

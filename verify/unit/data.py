@@ -301,8 +301,7 @@ class Data:
         """Check that the upper bits of an address are the channel, whatever the lower ones."""
         forms = Forms()
         bits = self._program.words.bit_length() - 1
-        self._contexts.slices([address])
-        found = self._contexts.logic(forms, {}, {}).word(address)
+        found = self._contexts.logic(forms, {}, {}, deep=True).word(address)
         upper = forms.floor(shifted(forms.unsigned(found, self._netlist.width(address)), -bits))
         right = same_word(forms, upper, self._channel_form(forms), self._netlist.widths["channel"])
         require(right, f"{memory} must be used for the channel of the sample, not for another one")

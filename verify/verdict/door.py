@@ -22,6 +22,7 @@ from sosmith.verify.reader.source import read_source
 from sosmith.verify.specified.calibration_fit import Refit, check_fit
 from sosmith.verify.specified.stated_specification import Agreement, check_specification
 from sosmith.verify.specified.words import words_of
+from sosmith.verify.unit.check import UnitVerdict, check_unit
 from sosmith.verify.verdict.generated_files import (
     about_of,
     check_files,
@@ -185,6 +186,7 @@ def _hardware_proven(
         return Proofs(calibration=_ahead(certificate, item, text, progress)), decimator
     program: ProgramVerdict | None = None
     hardware: HardwareVerdict | None = None
+    unit: UnitVerdict | None = None
     if item.architecture in {"folded", "serial"}:
         progress("program", 0, 0)
         behind = None if certificate.decimation is None else f"{certificate.name}_behind"
@@ -194,6 +196,9 @@ def _hardware_proven(
             calibrated=_calibrated(certificate, item) if behind is None else None,
             top=behind,
         )
+        if certificate.decimation is None:
+            progress("unit", 0, 0)
+            unit = check_unit(text, certificate, serial=item.architecture == "serial")
     elif item.architecture == "parallel":
         progress("hardware", 0, 0)
         hardware = (
@@ -201,7 +206,7 @@ def _hardware_proven(
             if certificate.decimation is None
             else check_behind(text, certificate, item.channels)
         )
-    return Proofs(program, hardware, _ahead(certificate, item, text, progress)), decimator
+    return Proofs(program, hardware, _ahead(certificate, item, text, progress), unit), decimator
 
 
 def _ahead(

@@ -10,6 +10,7 @@ from sosmith.verify.certificate_file import Certificate, ItemEntry
 from sosmith.verify.parallel.check import HardwareVerdict
 from sosmith.verify.program.check import ProgramVerdict
 from sosmith.verify.specified.stated_specification import Agreement
+from sosmith.verify.unit.check import UnitVerdict
 
 
 class State(Enum):
@@ -43,6 +44,7 @@ class Proofs:
     calibration: ProgramVerdict | HardwareVerdict | None = None
     unheld: tuple[str, ...] = ()
     """Fields of the manifest that nothing was held against."""
+    unit: UnitVerdict | None = None
 
 
 def scope_of(
@@ -119,21 +121,8 @@ def _hardware(item: ItemEntry | None, proofs: Proofs | None, *, is_decimated: bo
     parts["liveness"] = _liveness(proofs, is_decimated=is_decimated)
     none = Part(State.PROVEN, "there is none in this architecture", asked=False)
     parts["program"] = Part(State.PROVEN, "its instructions compute the graph") if programs else none
-    parts["unit"] = (
-        Part(State.NOT_READ, "the unit that runs the program is not proven: counter, memories, adder")
-        if programs
-        else none
-    )
-    parts["hardware"] = (
-        Part(State.PROVEN, "its registers hold the graph's nodes for all inputs, stalls and resets")
-        if not programs
-        else Part(State.PARTIAL, "only its program is proven, not the unit that runs it")
-    )
-    parts["flags"] = (
-        Part(State.NOT_READ, "what the unit makes of its flags is not proven")
-        if programs
-        else Part(State.PARTIAL, "all but outside_calibration, wear_warning and wear_critical")
-    )
+    parts["unit"], parts["hardware"] = _unit(proofs) if programs else (none, _REGISTERS)
+    parts["flags"] = _flags(proofs, is_decimated=is_decimated)
     return {name: parts[name] for name in _OF_FILES}
 
 
@@ -141,9 +130,30 @@ def _liveness(proofs: Proofs, *, is_decimated: bool) -> Part:
     """Whether a sample is always taken, and its result always leaves."""
     if is_decimated:
         return Part(State.NOT_READ, "when a decimator takes a sample and hands its result on is not proven")
-    if proofs.hardware is None:
+    found = proofs.hardware or proofs.unit
+    if found is None:
         return Part(State.NOT_READ, "that a sample is ever taken and its result ever leaves, and when, is not proven")
-    return Part(State.PROVEN, str(proofs.hardware.progress))
+    return Part(State.PROVEN, str(found.progress))
+
+
+_REGISTERS = Part(State.PROVEN, "its registers hold the graph's nodes for all inputs, stalls and resets")
+
+
+def _unit(proofs: Proofs) -> tuple[Part, Part]:
+    """Return what is proven of the unit that runs a program, and of the whole."""
+    if proofs.unit is None:
+        why = "the unit that runs the program is not proven: counter, memories, adder"
+        return Part(State.NOT_READ, why), Part(State.PARTIAL, "only its program is proven, not the unit that runs it")
+    why = f"it runs the program in each of its {proofs.unit.states} states, for all words, inputs, stalls and resets"
+    return Part(State.PROVEN, why), Part(State.PROVEN, "its unit runs the program, which computes the graph")
+
+
+def _flags(proofs: Proofs, *, is_decimated: bool) -> Part:
+    if proofs.unit is None and proofs.hardware is None:
+        return Part(State.NOT_READ, "what the unit makes of its flags is not proven")
+    if is_decimated or proofs.unit is None:
+        return Part(State.PARTIAL, "all but outside_calibration, wear_warning and wear_critical")
+    return Part(State.PROVEN, "each is judged by the codes that the certificate states, and leaves with its sample")
 
 
 def _manifest(item: ItemEntry | None, proofs: Proofs) -> Part:
