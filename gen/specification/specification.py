@@ -18,8 +18,8 @@ from sosmith.gen.specification.uncertainty import CoefficientsSpec, UncertaintyS
 from sosmith.gen.specification.values import UnfitError
 from sosmith.gen.specification.wear_limits import WearSpec
 from sosmith.model.errors import SpecificationError
-from sosmith.model.port import Port
 from sosmith.model.foreign_files import read_text
+from sosmith.model.port import Port
 from sosmith.model.tables.toml_file import parse_toml
 
 if TYPE_CHECKING:

@@ -153,9 +153,7 @@ def _rows(
                 continue
             if len(cells) != len(header):
                 expected = "1 cell" if len(header) == 1 else f"{len(header)} cells"
-                raise SpecificationError(
-                    f"{path}, line {reader.line_num}: row must have {expected}, not {len(cells)}"
-                )
+                raise SpecificationError(f"{path}, line {reader.line_num}: row must have {expected}, not {len(cells)}")
             line = reader.line_num
             yield header, line, [_number(path, line, *each, readers) for each in zip(header, cells, strict=True)]
     except csv.Error as error:
