@@ -22,7 +22,7 @@ MAX_LINES = 1 << 24
 """Most lines of a file that is read line by line: 10 million samples of a channel, or a million of each of 16."""
 
 MAX_JSON = 1 << 26
-"""Most bytes of a JSON file: that of a report with its curves has some hundred thousand, a large certificate millions."""
+"""Most bytes of a JSON file: a report has some hundred thousand, a large certificate some millions."""
 
 _PIECE = 1 << 20
 

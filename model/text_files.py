@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import stat
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -46,8 +46,8 @@ def write_files(directory: Path, texts: Mapping[str, str]) -> list[Path]:
     return write_contents(directory, {name: text.encode() for name, text in texts.items()})
 
 
-def write_contents(directory: Path, contents: Mapping[str, bytes]) -> list[Path]:
-    """Write `contents` (bytes) as `write_files` writes texts.
+def write_contents(directory: Path, contents: Mapping[str, bytes | Iterable[str]]) -> list[Path]:
+    """Write `contents`, each bytes or the pieces of a text, as `write_files` writes texts.
 
     Only regular files are replaced, and links to them followed: see `check_file`.
     """
@@ -65,7 +65,7 @@ def write_contents(directory: Path, contents: Mapping[str, bytes]) -> list[Path]
             # Unlike tempfile.mkstemp, a file created in a scratch folder has the permissions of the user's umask.
             with tempfile.TemporaryDirectory(prefix=".sosmith-", dir=directory) as scratch:
                 for name in own:
-                    (Path(scratch) / name).write_bytes(contents[name])
+                    _write(Path(scratch) / name, contents[name])
                 for name in own:
                     (Path(scratch) / name).replace(directory / name)
         for path in paths:
@@ -78,6 +78,19 @@ def write_contents(directory: Path, contents: Mapping[str, bytes]) -> list[Path]
                 folder.rmdir()
         raise _failure(directory, error) from None
     return paths
+
+
+def write_pieces(path: Path, pieces: Iterable[str]) -> None:
+    """Write a text as `write_files` does, piece by piece, so that it need not be in memory as a whole."""
+    write_contents(path.parent, {path.name: pieces})
+
+
+def _write(path: Path, content: bytes | Iterable[str]) -> None:
+    if isinstance(content, bytes):
+        path.write_bytes(content)
+        return
+    with path.open("w", encoding="utf-8", newline="") as file:
+        file.writelines(content)
 
 
 def write_file(path: Path, content: str | bytes) -> Path:

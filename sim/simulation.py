@@ -28,8 +28,9 @@ from sosmith.gen.report.run import Run, run_of
 from sosmith.gen.specification.choices import ERROR_FEEDBACK
 from sosmith.gen.word_lengths.other_realization import with_realization
 from sosmith.gen.word_lengths.quantized import Quantized
-from sosmith.model.arrays import Codes
+from sosmith.model.arrays import Codes, side_by_side
 from sosmith.model.errors import SpecificationError
+from sosmith.model.reference.accuracy import error_statistics
 from sosmith.model.text_files import write_contents, write_files
 from sosmith.model.traces.trace import Trace
 from sosmith.sim.cosimulate import CosimulationResult, cosimulate, first_copies
@@ -92,7 +93,7 @@ def simulate(
             design, directory, lambda step: progress(f"generating {step}", 0, 0), facts=facts, claims=claims
         )
         source, build_dir, netlist = directory / f"{design.datapath.name}.sv", directory / "simulation", None
-        codes = np.stack([trace.codes for trace in traces], axis=1)
+        codes = side_by_side([trace.codes for trace in traces])
         sent = whole_beats(codes, facts.interface.inputs)
         if hardware is not None:
             result = first_copies(
@@ -189,9 +190,8 @@ def _alternatives(quantized: Quantized, run: Run) -> list[Alternative]:
         if realization == quantized.realization:
             continue
         other = with_realization(quantized, realization).datapath
-        values = other.output.decode(other.compute(run.codes))
-        error = values - run.golden.reshape(values.shape)
-        rows.append(
-            Alternative(name=realization, max_abs=float(np.abs(error).max()), rms=float(np.sqrt(np.mean(error**2))))
-        )
+        error = other.output.decode(other.compute(run.codes))
+        error -= run.golden.reshape(error.shape)
+        found = error_statistics(error)
+        rows.append(Alternative(name=realization, max_abs=found.max_abs, rms=found.rms))
     return rows

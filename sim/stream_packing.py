@@ -7,6 +7,7 @@ import numpy.typing as npt
 
 from sosmith.gen.output.core_facts import StreamFacts
 from sosmith.gen.output.vectors import words
+from sosmith.hdl.plan.streams import Field
 from sosmith.model.arrays import Codes
 from sosmith.model.dataflow.status import STATUS_BITS
 from sosmith.model.errors import ShortfallError
@@ -18,8 +19,13 @@ Order = npt.NDArray[np.int64]
 _BLOCK = 8  # samples per channel in each block; blocks in turn alternate with shuffled ones
 
 
+_TAKEN = 1 << 18  # samples that are unpacked at a time
+
+
 def random_order(samples: int, channels: int, seed: int) -> Order:
     """Draw an order in which blocks with the channels in turn alternate with shuffled blocks."""
+    if channels == 1:
+        return np.zeros(samples, dtype=np.int64)
     rng = np.random.default_rng(seed)
     blocks = []
     for start in range(0, samples, _BLOCK):
@@ -46,7 +52,8 @@ def pack(codes: Codes, order: Order, stream: StreamFacts) -> Beats:
     stream : StreamFacts
         The stream, each of whose samples has at most 64 bits. If the last beat is not full, the last sample fills it.
     """
-    packed = _joined(words(codes[_turns(order), order], stream), stream.sample_width, stream.lanes)
+    taken = codes[:, 0] if codes.shape[1] == 1 else codes[_turns(order), order]
+    packed = _joined(words(taken, stream), stream.sample_width, stream.lanes)
     count = len(packed)
     return Beats(order[:count], packed, np.zeros(count, dtype=np.uint64))
 
@@ -67,19 +74,28 @@ def unpack(beats: Beats, order: Order, stream: StreamFacts) -> tuple[Codes, npt.
     shape = (len(order) // channels, channels)
     codes = np.empty((*shape, len(stream.fields)), dtype=np.int64)
     status = np.empty(shape, dtype=np.uint8)
-    for number, field in enumerate(stream.fields):
-        column = (tdata >> np.uint64(field.offset) & np.uint64((1 << field.padded) - 1)).astype(np.int64)
-        if field.port.signed:
-            column = np.where(column >> (field.padded - 1), column - (1 << field.padded), column)
-        wrong = np.flatnonzero((column < field.port.lowest) | (column > field.port.highest))
-        if len(wrong):
-            word = int(tdata[wrong[0]])
-            raise ShortfallError(
-                f"{field.port.name} must be extended to whole bytes, not {word:#x} at sample {wrong[0]}"
-            )
-        codes[_turns(order), order, number] = column
-    status[_turns(order), order] = tuser
+    turns = None if channels == 1 else _turns(order)
+    for start in range(0, len(order), _TAKEN):
+        part = slice(start, start + _TAKEN)
+        place = (part, 0) if turns is None else (turns[part], order[part])
+        for number, field in enumerate(stream.fields):
+            codes[(*place, number)] = _field(tdata[part], field, start)
+        status[place] = tuser[part]
     return codes, status
+
+
+def _field(tdata: npt.NDArray[np.uint64], field: Field, start: int) -> Codes:
+    """Return the codes of a field from bus words, the first of which is that of sample `start`."""
+    column = (tdata >> np.uint64(field.offset) & np.uint64((1 << field.padded) - 1)).astype(np.int64)
+    if field.port.signed:
+        column = np.where(column >> (field.padded - 1), column - (1 << field.padded), column)
+    wrong = np.flatnonzero((column < field.port.lowest) | (column > field.port.highest))
+    if len(wrong):
+        word = int(tdata[wrong[0]])
+        raise ShortfallError(
+            f"{field.port.name} must be extended to whole bytes, not {word:#x} at sample {start + wrong[0]}"
+        )
+    return column
 
 
 def each_once(beats: Beats, copies: int) -> Beats:

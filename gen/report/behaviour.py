@@ -79,7 +79,7 @@ def true_error(evidence: Evidence) -> Any:
     """Hardware minus true value at the readings, shape (readings,); None if there are none."""
     if evidence.run.truth is None:
         return None
-    error, reading = evidence.run.hardware - evidence.run.truth, readings_of(evidence)
+    error, reading = evidence.run.minus(evidence.run.truth), readings_of(evidence)
     counted = error.ravel() if reading is None else error[reading]
     return counted if counted.size else None
 
@@ -98,7 +98,7 @@ def _transient(evidence: Evidence) -> int:
     """Count the samples before the first one that is settled in all channels."""
     if evidence.run.unsettled is None:
         return 0
-    flagged = evidence.run.unsettled.reshape(len(evidence.run.time), -1).any(axis=1)
+    flagged = evidence.run.unsettled.reshape(len(evidence.run), -1).any(axis=1)
     return int(np.argmin(np.append(flagged, False)))
 
 

@@ -20,6 +20,9 @@ STRETCHES = 160
 _SEGMENT = 256
 """Samples of a segment of the spectrum; its lines are half of that."""
 
+_SEGMENTS = 1 << 13
+"""Segments of a spectrum that are taken at a time."""
+
 _DIGITS = 6
 """Significant digits of a drawn value."""
 
@@ -33,7 +36,7 @@ def error_over_time(evidence: Evidence) -> dict[str, Any]:
         ``time``: where each stretch starts, in s; ``low`` and ``high``: its smallest and largest hardware minus exact
         calculation, in the output's unit. All lists have one length, at most `STRETCHES`.
     """
-    error = evidence.run.error.reshape(len(evidence.run.time), -1)
+    error = evidence.run.error.reshape(len(evidence.run), -1)
     edges = np.linspace(0, len(error), min(STRETCHES, len(error)) + 1).astype(int)
     stretches = [error[start:stop] for start, stop in itertools.pairwise(edges)]
     return {
@@ -55,9 +58,23 @@ def error_spectrum(evidence: Evidence) -> dict[str, Any] | None:
     error = evidence.shown.run.error
     if len(error) < 32:
         return None
-    rate = (len(error) - 1) / float(evidence.run.time[-1] - evidence.run.time[0])
-    frequency, power = signal.welch(error, fs=rate, nperseg=min(_SEGMENT, len(error)))
+    rate = (len(error) - 1) / (evidence.run.at(-1) - evidence.run.at(0))
+    frequency, power = _spectrum(error, rate)
     return {"frequency": _rounded(frequency[1:]), "density": _rounded(np.sqrt(power[1:]))}
+
+
+def _spectrum(values: Array, rate: float) -> tuple[Array, Array]:
+    """Return frequencies and power densities by Welch's method, of some thousand segments at a time."""
+    size = min(_SEGMENT, len(values))
+    step = size - size // 2
+    segments = (len(values) - size) // step + 1
+    power: Array = np.zeros(size // 2 + 1)
+    for first in range(0, segments, _SEGMENTS):
+        count = min(_SEGMENTS, segments - first)
+        block = values[first * step : (first + count - 1) * step + size]
+        frequency, found = signal.welch(block, fs=rate, nperseg=size)
+        power += found * (count / segments)
+    return frequency, power
 
 
 def filter_curve(facts: FilterFacts | None) -> dict[str, Any] | None:

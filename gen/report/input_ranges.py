@@ -54,7 +54,7 @@ def input_ranges(traces: Sequence[Trace]) -> tuple[InputRange, ...]:
     """Return the use of each input's range by the traces of all channels, in the order of the inputs."""
     found = []
     for k, port in enumerate(traces[0].ports):
-        codes = np.stack([trace.codes[:, k] for trace in traces])
+        columns = [trace.codes[:, k] for trace in traces]
         low, high = port.decode(np.array([port.lowest, port.highest + 1]))
         found.append(
             InputRange(
@@ -62,8 +62,10 @@ def input_ranges(traces: Sequence[Trace]) -> tuple[InputRange, ...]:
                 unit=port.unit,
                 low=float(low),
                 high=float(high),
-                samples=codes.size,
-                at_end=int(np.count_nonzero((codes == port.lowest) | (codes == port.highest))),
+                samples=sum(map(len, columns)),
+                at_end=sum(
+                    int(np.count_nonzero((codes == port.lowest) | (codes == port.highest))) for codes in columns
+                ),
                 limited=sum(trace.limited[k] for trace in traces if trace.limited),
                 synthetic=traces[0].seed is not None and traces[0].truth is None,
             )

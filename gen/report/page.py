@@ -86,7 +86,7 @@ def _trace_figure(evidence: Evidence, transient: int) -> Figure:
     legend = [("golden", "broad", "exact calculation"), ("hardware", "dashed", "hardware")]
     if evidence.run.truth is not None:
         legend.append(("truth", "broad", "true value"))
-    if evidence.run.unfiltered is not None:
+    if evidence.run.before is not None:
         legend.append(("unfiltered", "", "without the filter"))
     if evidence.facts.settling is not None:
         legend.append(
@@ -130,8 +130,8 @@ def _looks(evidence: Evidence) -> Figure:
     """Legend and caption of the viewer, which has no drawing of its own."""
     known = [("golden", "broad", "exact calculation", True), ("hardware", "", "hardware", True)]
     known.append(("truth", "broad", "true value", evidence.run.truth is not None))
-    known.append(("unfiltered", "", "without the filter", evidence.run.unfiltered is not None))
-    stride = -(-len(evidence.run.time) // MAX_POINTS)
+    known.append(("unfiltered", "", "without the filter", evidence.run.before is not None))
+    stride = -(-len(evidence.run) // MAX_POINTS)
     thinned = "" if stride == 1 else f" Of each {stride} samples, the one with the largest error is held here."
     return Figure(
         drawing="",
@@ -154,7 +154,7 @@ def _error_figure(evidence: Evidence) -> Figure:
         for limit in inside
     ]
     caption = "The curve must stay between the limits."
-    if len(evidence.run.error) > plots.WIDE // 2:
+    if len(evidence.run) > plots.WIDE // 2:
         caption = "Smallest and largest error of each stretch of time; both must stay between the limits."
     if outside:
         names = " and ".join(f"{limit.words} ±{unit.amount(limit.value)}" for limit in outside)
@@ -464,7 +464,7 @@ def _evidence_facts(evidence: Evidence) -> list[tuple[str, str]]:
 
 
 def _run_facts(evidence: Evidence) -> list[tuple[str, str]]:
-    span = float(evidence.run.time[-1] - evidence.run.time[0])
+    span = evidence.run.at(-1) - evidence.run.at(0)
     return [
         ("trace", f"{evidence.run.scenario}, {duration(span)}"),
         ("samples", f"{evidence.run.samples:,}"),

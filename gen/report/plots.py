@@ -36,6 +36,7 @@ from sosmith.gen.filter.response import (
 from sosmith.gen.picture import settled
 from sosmith.gen.quantity import quantity, scale
 from sosmith.gen.report.evidence import Evidence
+from sosmith.model.reference.accuracy import error_statistics, peak
 
 Array = npt.NDArray[np.float64]
 
@@ -160,9 +161,9 @@ def _range_of(values: Array, margin: float) -> tuple[float, float]:
 
 def time_axis(axes: Axes, time: Array) -> tuple[float, str]:
     """Label the time axis and return the factor from seconds to its unit."""
-    factor, unit = scale(float(np.max(np.abs(time))), "s")
+    factor, unit = scale(peak(time), "s")
     axes.set_xlabel(f"time in {unit}")
-    axes.set_xlim(*_range_of(time * factor, margin=0.0))
+    axes.set_xlim(*_range_of(np.array([time.min(), time.max()]) * factor, margin=0.0))
     return factor, unit
 
 
@@ -176,23 +177,21 @@ def trace_figure(evidence: Evidence, transient: int, width: int) -> str:
     def paint(figure: Figure) -> None:
         panels = figure.subplots(1 + compared, 1, sharex=True, squeeze=False, height_ratios=(2, 1)[: 1 + compared])
         axes, lowest = panels[0, 0], panels[-1, 0]
-        factor, _ = time_axis(lowest, evidence.run.time)
-        traces = (evidence.run.unfiltered, evidence.run.truth, evidence.run.golden, evidence.run.hardware)
-        shown = [values for values in traces if values is not None]
-        scaling, unit = scale(max(float(np.max(np.abs(v))) for v in shown), evidence.facts.unit)
-        # dashes along a curve that fills an area would make a pattern that is not in the data
-        real = {"lw": 0.7} if _fills_area(evidence.run.hardware, width) else REAL_LINE
-        layers = (
-            (evidence.run.unfiltered, "unfiltered", {"lw": 0.8}),
-            (evidence.run.truth, "truth", {"lw": 5.0}),
-            (evidence.run.golden, "golden", IDEAL_LINE),
-            (evidence.run.hardware, "hardware", real),
-        )
-        for order, (values, role, line) in enumerate(layers, start=2):
+        time = evidence.run.time
+        factor, _ = time_axis(lowest, time)
+        styles: dict[str, dict[str, Any]] = {"unfiltered": {"lw": 0.8}, "truth": {"lw": 5.0}, "golden": IDEAL_LINE}
+        shown: dict[str, tuple[int, Array, Array]] = {}
+        for order, role in enumerate((*styles, "hardware"), start=2):
+            values = getattr(evidence.run, role)  # one at a time: a run has millions of samples
             if values is not None:
-                thin_time, thin_values = envelope(evidence.run.time, values, width // 2)
-                axes.plot(thin_time * factor, thin_values * scaling, color=COLOUR[role], zorder=order, **line)
-        axes.set_ylim(*_range_of(np.concatenate(shown) * scaling, margin=0.06))
+                shown[role] = (order, *envelope(time, values, width // 2))
+                if role == "hardware":  # dashes along a curve that fills an area would make a pattern of their own
+                    styles[role] = {"lw": 0.7} if _fills_area(values, width) else REAL_LINE
+        extremes = np.concatenate([values for _, _, values in shown.values()])
+        scaling, unit = scale(peak(extremes), evidence.facts.unit)
+        for role, (order, thin_time, thin_values) in shown.items():
+            axes.plot(thin_time * factor, thin_values * scaling, color=COLOUR[role], zorder=order, **styles[role])
+        axes.set_ylim(*_range_of(extremes * scaling, margin=0.06))
         axes.set_ylabel(f"output in {unit}" if unit else "output")
         if evidence.run.truth is not None:
             _paint_true_error(lowest, evidence, transient, factor, width)
@@ -204,21 +203,22 @@ def trace_figure(evidence: Evidence, transient: int, width: int) -> str:
 
 def _paint_true_error(axes: Axes, evidence: Evidence, transient: int, factor: float, width: int) -> None:
     assert evidence.run.truth is not None  # the caller has seen it
-    error = evidence.run.hardware - evidence.run.truth
+    error = evidence.run.minus(evidence.run.truth)
     settled = error[transient:] if transient < len(error) else error
-    scaling, unit = scale(float(np.max(np.abs(settled))) or evidence.facts.lsb, evidence.facts.unit)
-    time, low, high = stretches(evidence.run.time, error * scaling, width)
+    scaling, unit = scale(peak(settled) or evidence.facts.lsb, evidence.facts.unit)
+    error *= scaling
+    time, low, high = stretches(evidence.run.time, error, width)
     axes.fill_between(time * factor, low, high, color=COLOUR["hardware"], lw=0.8)
     axes.axhline(0, color=COLOUR["truth"], lw=1.2)
-    axes.set_ylim(*_range_of(np.append(settled, 0.0) * scaling, margin=0.08))
+    axes.set_ylim(*_range_of(np.array([settled.min(), settled.max(), 0.0]), margin=0.08))
     axes.set_ylabel(f"minus true\nvalue in {unit}" if unit else "minus true\nvalue")
     axes.yaxis.set_major_locator(MaxNLocator(4))
 
 
 def _shade_transient(axes: Axes, evidence: Evidence, transient: int, factor: float) -> None:
     if transient:
-        last = min(transient, len(evidence.run.time) - 1)
-        ends = (float(evidence.run.time[0]) * factor, float(evidence.run.time[last]) * factor)
+        last = min(transient, len(evidence.run) - 1)
+        ends = (evidence.run.at(0) * factor, evidence.run.at(last) * factor)
         axes.axvspan(*ends, facecolor=COLOUR["muted"], alpha=0.14, lw=0)
 
 
@@ -236,15 +236,15 @@ def stretches(time: Array, values: Array, columns: int) -> tuple[Array, Array, A
 
 def _fills_area(values: Array, width: int) -> bool:
     """Whether a trace swings so often that its curve covers an area `width` pixels wide."""
-    _, thin = envelope(np.arange(len(values), dtype=np.float64), values, width)
+    _, thin = envelope(values, values, width)
     travel = float(np.sum(np.abs(np.diff(thin))))
     return travel > width / 10 * float(np.ptp(values))
 
 
 def close_up(evidence: Evidence, samples: int = 60) -> slice:
     """At most `samples` samples around the first of those with the largest error."""
-    count = len(evidence.run.hardware)
-    start = int(np.argmax(np.abs(evidence.run.error))) - samples // 2
+    count = len(evidence.run)
+    start = error_statistics(evidence.run.error).worst - samples // 2
     start = min(max(start, 0), max(count - samples, 0))
     return slice(start, min(start + samples, count))
 
@@ -293,7 +293,7 @@ def error_limits(evidence: Evidence) -> tuple[list[Limit], list[Limit]]:
 
 def _error_peak(evidence: Evidence) -> float:
     """Largest error, at least half a step of the output, so that no axis is empty."""
-    return max(float(np.max(np.abs(evidence.run.error))), evidence.facts.lsb / 2)
+    return max(peak(evidence.run.error), evidence.facts.lsb / 2)
 
 
 def error_figure(evidence: Evidence, width: int) -> str:
@@ -305,7 +305,9 @@ def error_figure(evidence: Evidence, width: int) -> str:
         inside, _outside = error_limits(evidence)
         top = 1.25 * max([_error_peak(evidence), *(limit.value for limit in inside)])
         scaling, unit = scale(top, evidence.facts.unit)
-        time, low, high = stretches(evidence.run.time, evidence.run.error * scaling, width // 4)
+        error = evidence.run.error
+        error *= scaling
+        time, low, high = stretches(evidence.run.time, error, width // 4)
         if low is high:
             axes.plot(time * factor, low, color=COLOUR["hardware"], lw=0.9)
         else:
@@ -317,7 +319,7 @@ def error_figure(evidence: Evidence, width: int) -> str:
             for value in (-limit.value, limit.value):
                 axes.axhline(value * scaling, color=COLOUR[limit.role], ls=limit.dashes, lw=1.6)
         if evidence.run.first_mismatch is not None:
-            axes.axvline(evidence.run.time[evidence.run.first_mismatch] * factor, color=COLOUR["limit"], lw=1.6)
+            axes.axvline(evidence.run.at(evidence.run.first_mismatch) * factor, color=COLOUR["limit"], lw=1.6)
         axes.set_ylabel(f"error in {unit}" if unit else "error")
 
     return draw("error", "Error of the hardware against time", width, 270, paint)
@@ -328,7 +330,8 @@ def histogram_figure(evidence: Evidence) -> str:
 
     def paint(figure: Figure) -> None:
         axes = figure.subplots()
-        steps = evidence.run.error / evidence.facts.lsb
+        steps = evidence.run.error
+        steps /= evidence.facts.lsb
         reach = 1.2 * _error_peak(evidence) / evidence.facts.lsb
         counts, edges = np.histogram(steps, bins=np.linspace(-reach, reach, 52))
         axes.stairs(100 * counts / len(steps), edges, fill=True, color=COLOUR["hardware"])
@@ -388,7 +391,7 @@ def clip(name: str, longest: int) -> str:
 
 def alternatives_figure(evidence: Evidence) -> str:
     """Largest errors of this design and its alternatives, with one LSB and the allowed error marked."""
-    own = float(np.max(np.abs(evidence.run.error)))
+    own = peak(evidence.run.error)
     rows = [(evidence.realization, own, "hardware")]
     rows += [(other.name, other.max_abs, "golden") for other in evidence.rivals]
     marks = [(evidence.facts.lsb, "muted"), (evidence.facts.max_error, "asked")]

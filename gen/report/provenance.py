@@ -90,7 +90,7 @@ def trace_digest(traces: Sequence[Trace]) -> str:
     head = {"inputs": [_port(port) for port in first.ports], "sample_rate": str(first.sample_rate)}
     whole = hashlib.sha256(_digest(head).encode())
     for trace in traces:
-        whole.update(hashlib.sha256(np.ascontiguousarray(trace.codes, dtype="<i8").tobytes()).digest())
+        whole.update(hashlib.sha256(np.ascontiguousarray(trace.codes, dtype="<i8").data).digest())
     return whole.hexdigest()
 
 

@@ -61,20 +61,18 @@ def _notes(evidence: Evidence) -> list[str]:
 
 def _accuracy(evidence: Evidence) -> dict[str, float | None]:
     """Accuracy of each trace by the paper's equation 7, None where there is no truth to measure against."""
-    traces = {
-        "unfiltered": evidence.run.unfiltered,
-        "golden": evidence.run.golden,
-        "hardware": evidence.run.hardware,
-    }
+    traces = ("unfiltered", "golden", "hardware")
     truth, reading = evidence.run.truth, readings_of(evidence)
     if truth is None:
         return dict.fromkeys(traces)
     counted = truth if reading is None else truth[reading]
     if not len(counted) or not counted.all():
         return dict.fromkeys(traces)
-    return {
-        name: None if values is None else accuracy_percent(values, truth, reading) for name, values in traces.items()
-    }
+    accuracy: dict[str, float | None] = {}
+    for name in traces:
+        values = getattr(evidence.run, name)
+        accuracy[name] = None if values is None else accuracy_percent(values, truth, reading)
+    return accuracy
 
 
 def summarise(evidence: Evidence) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
@@ -10,15 +10,17 @@ import numpy as np
 import numpy.typing as npt
 
 from sosmith.gen.core import CoreDesign
-from sosmith.model.arrays import Codes
+from sosmith.model.arrays import Codes, side_by_side
 from sosmith.model.dataflow.status import Flag
 from sosmith.model.traces.trace import Trace
 
 Array = npt.NDArray[np.float64]
+Column = Array | Callable[[], Array]
+"""An array, or what makes a new one each time: there is no room for all that follows from millions of samples."""
 Mask = npt.NDArray[np.bool_]
 _Kind = TypeVar("_Kind", bound=np.generic)
 
-_COLUMNS = ("received", "hardware", "golden", "unfiltered", "truth", "reading", "unsettled")
+_COLUMNS = ("received", "values", "golden", "before", "truth", "reading", "unsettled")
 """The arrays of which a view of one channel keeps a column."""
 
 
@@ -26,25 +28,25 @@ _COLUMNS = ("received", "hardware", "golden", "unfiltered", "truth", "reading", 
 class Run:
     """The results of one run; arrays have the shape (n, channels), those of one channel alone (n,).
 
-    Values are in the unit of the output.
+    Values are in the unit of the output. The properties `time`, `hardware` and `unfiltered` are made anew each time.
 
     Attributes
     ----------
     scenario : str
         Name of the trace.
-    time : ndarray, shape (n,)
+    instants : Column, shape (n,)
         Instants of the results in s, rising.
     codes : int64 array, shape (samples, channels, inputs)
         What went in; behind a decimator, more samples than results.
     received : int64 array
         What came out.
-    hardware : ndarray
+    values : Column
         The values of `received`.
     differs : ndarray of bool, shape (n, channels)
         Where a code or a flag is not that of the integer model; always of all channels.
     golden : ndarray
         The exact chain on the same codes, limited to the range of the output.
-    unfiltered : ndarray or None
+    before : Column or None
         The calibration alone; None without a filter.
     truth : ndarray or None
         True values, where the trace has them.
@@ -59,13 +61,13 @@ class Run:
     """
 
     scenario: str
-    time: Array
+    instants: Column
     codes: Codes
     received: Codes
-    hardware: Array
+    values: Column
     differs: Mask
     golden: Array
-    unfiltered: Array | None = None
+    before: Column | None = None
     truth: Array | None = None
     reading: Mask | None = None
     unsettled: Mask | None = None
@@ -73,23 +75,52 @@ class Run:
     shown_channel: int | None = None
 
     def __post_init__(self) -> None:
-        shape = np.shape(self.hardware)
+        shape = np.shape(self.received if callable(self.values) else self.values)
         if len(shape) not in {1, 2} or min(shape) < 1:
             raise ValueError(f"hardware must have the shape (n,) or (n, channels) with n >= 1, not {shape!r}")
-        if np.shape(self.time) != shape[:1]:
-            raise ValueError(f"time must have the shape {shape[:1]!r}, not {np.shape(self.time)!r}")
+        if not callable(self.instants) and np.shape(self.instants) != shape[:1]:
+            raise ValueError(f"time must have the shape {shape[:1]!r}, not {np.shape(self.instants)!r}")
         for name in _COLUMNS:
             values = getattr(self, name)
-            if values is not None and np.shape(values) != shape:
-                raise ValueError(f"{name} must have the shape {shape!r}, not {np.shape(values)!r}")
-        for name in ("golden", "hardware"):
-            if not np.all(np.isfinite(getattr(self, name))):
-                raise ValueError(f"{name} must be finite, not NaN or infinite")
+            if values is not None and not callable(values) and np.shape(values) != shape:
+                raise ValueError(f"{_TOLD.get(name, name)} must have the shape {shape!r}, not {np.shape(values)!r}")
+        for name in ("golden", "values"):
+            values = getattr(self, name)
+            if not callable(values) and not np.all(np.isfinite(values)):
+                raise ValueError(f"{_TOLD.get(name, name)} must be finite, not NaN or infinite")
+
+    def __len__(self) -> int:
+        """Return the number of instants."""
+        return len(self.golden)
+
+    @property
+    def time(self) -> Array:
+        """Instants of the results in s, shape (n,)."""
+        return _array(self.instants)
+
+    @property
+    def hardware(self) -> Array:
+        """The values of `received`."""
+        return _array(self.values)
+
+    @property
+    def unfiltered(self) -> Array | None:
+        """The calibration alone; None without a filter."""
+        return None if self.before is None else _array(self.before)
 
     @property
     def error(self) -> Array:
-        """Hardware minus golden."""
-        return self.hardware - self.golden
+        """Hardware minus golden, a new array."""
+        return self.minus(self.golden)
+
+    def minus(self, other: Array) -> Array:
+        """Return hardware minus `other`, a new array."""
+        values = self.hardware
+        return np.subtract(values, other, out=values if callable(self.values) else None)
+
+    def at(self, index: int) -> float:
+        """Return an instant in s; a negative index counts from the end."""
+        return float(self.time[index])
 
     @property
     def channels(self) -> int:
@@ -127,8 +158,23 @@ class Run:
         if self.error.ndim == 1:
             return self
         arrays = {name: getattr(self, name) for name in _COLUMNS}
-        columns: dict[str, Any] = {name: None if array is None else array[:, channel] for name, array in arrays.items()}
+        columns: dict[str, Any] = {name: _column(array, channel) for name, array in arrays.items()}
         return replace(self, shown_channel=channel if self.channels > 1 else None, **columns)
+
+
+_TOLD = {"values": "hardware", "before": "unfiltered"}
+"""What messages call the attributes that properties make arrays of."""
+
+
+def _array(column: Column) -> Array:
+    return column() if callable(column) else column
+
+
+def _column(column: Column | None, channel: int) -> Column | None:
+    """Return one channel of an array, or what makes it."""
+    if callable(column):
+        return lambda: column()[:, channel]
+    return None if column is None else column[:, channel]
 
 
 def run_of(
@@ -159,26 +205,28 @@ def run_of(
         If no C compiler is found.
     """
     quantized, datapath = design.quantized, design.datapath
-    codes = np.stack([trace.codes for trace in traces], axis=1)
+    codes = side_by_side([trace.codes for trace in traces])
     expected, flags = datapath.compute_with_status(codes)
     if received is None or status is None:
         received, status = expected, flags
     received, status = received[: len(expected)], status[: len(expected)]  # not what fills a beat
-    exact = quantized.exact(codes)
+    differs = (expected != received) | (flags != status)
+    unsettled = (status >> Flag.SETTLING & 1).astype(np.bool_) if datapath.settles else None
+    del expected, flags, status  # the exact chain takes as much memory
     if datapath.decimator is not None:  # what is told of a sample is told of those that bring a result
         traces = [trace.every(datapath.decimator.factor) for trace in traces]
     run = Run(
         scenario=traces[0].name,
-        time=traces[0].time,
+        instants=lambda: traces[0].time,
         codes=codes,
         received=received,
-        hardware=datapath.output.decode(received),
-        differs=(expected != received) | (flags != status),
-        golden=exact.golden,
-        unfiltered=None if quantized.filter is None else exact.calibrated,
+        values=lambda: datapath.output.decode(received),
+        differs=differs,
+        golden=quantized.exact(codes),
+        before=None if quantized.filter is None else lambda: quantized.unfiltered(codes),
         truth=_stacked([trace.truth for trace in traces]),
         reading=_stacked([trace.reading for trace in traces]),
-        unsettled=(status >> Flag.SETTLING & 1).astype(np.bool_) if datapath.settles else None,
+        unsettled=unsettled,
         cycles=cycles,
     )
     return run.of_channel(0) if len(traces) == 1 else run
@@ -187,4 +235,4 @@ def run_of(
 def _stacked(columns: Sequence[npt.NDArray[_Kind] | None]) -> npt.NDArray[_Kind] | None:
     """Columns of all channels side by side, or None if there are none."""
     present = [column for column in columns if column is not None]
-    return np.stack(present, axis=1) if present else None
+    return side_by_side(present) if present else None

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from sosmith.gen.quantity import scale
 from sosmith.gen.report.evidence import Evidence
 from sosmith.gen.report.plots import Array, close_up, error_limits
+from sosmith.model.reference.accuracy import peak
 
 MAX_POINTS = 16_000
 """Samples that a page holds, at most; of a longer run, of each stretch the one with the largest error."""
@@ -32,11 +33,11 @@ def viewer_data(evidence: Evidence, transient: int) -> dict[str, Any]:
     facts, run = evidence.facts, evidence.run
     index = _chosen(run.error)
     near, (inside, _outside) = close_up(evidence), error_limits(evidence)
-    time, samples = run.time, len(run.time)
-    apart = None if run.truth is None else (run.hardware - run.truth)[min(transient, samples - 1) :]
+    start, end, samples, unfiltered = run.at(0), run.at(-1), len(run), run.unfiltered
+    apart = None if run.truth is None else _shown(run.minus(run.truth)[min(transient, samples - 1) :], facts.unit)
     return {
-        "start": float(time[0]),
-        "step": float(time[-1] - time[0]) / max(samples - 1, 1),
+        "start": start,
+        "step": (end - start) / max(samples - 1, 1),
         "samples": samples,
         "stride": -(-samples // MAX_POINTS),
         "lsb": facts.lsb,
@@ -45,10 +46,10 @@ def viewer_data(evidence: Evidence, transient: int) -> dict[str, Any]:
         "code": packed(run.received[index].astype(np.float64), exact=True),
         "error": packed(run.error[index]),
         "truth": None if run.truth is None else packed(run.truth[index]),
-        "unfiltered": None if run.unfiltered is None else packed(run.unfiltered[index]),
+        "unfiltered": None if unfiltered is None else packed(unfiltered[index]),
         "value": _shown(run.hardware, facts.unit),
         "fine": list(scale(facts.error_bound or facts.lsb, facts.unit)),
-        "true_error": None if apart is None else _shown(apart, facts.unit),
+        "true_error": apart,
         "limits": [[limit.value, limit.role] for limit in inside],
         "focus": [near.start, near.stop - 1],
         "transient": transient,
@@ -85,10 +86,10 @@ def _chosen(error: Array) -> npt.NDArray[np.int64]:
     if stride == 1:
         return np.arange(samples)
     padded = np.full(-(-samples // stride) * stride, -1.0)
-    padded[:samples] = np.abs(error)
+    np.abs(error, out=padded[:samples])
     chosen: npt.NDArray[np.int64] = np.arange(0, samples, stride) + padded.reshape(-1, stride).argmax(axis=1)
     return chosen
 
 
 def _shown(values: Array, unit: str) -> list[Any]:
-    return list(scale(float(np.max(np.abs(values))), unit))
+    return list(scale(peak(values), unit))

@@ -20,11 +20,11 @@ from sosmith.gen.realizations.effective import effective_sections
 from sosmith.gen.realizations.registry import Section
 from sosmith.gen.word_lengths.input_stage import InputStage
 from sosmith.gen.word_lengths.output_stage import output_stage
-from sosmith.model.arrays import Codes
+from sosmith.model.arrays import Codes, Values
 from sosmith.model.dataflow.datapath import Datapath, Stage
 from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
-from sosmith.model.reference.golden import Exact, exact_chain
+from sosmith.model.reference.golden import exact_before_filter, exact_chain
 from sosmith.model.sections.horner import HornerStep
 from sosmith.model.sections.output import Held, OutputStage
 from sosmith.model.sections.start import PassingStage, StartStage
@@ -103,7 +103,11 @@ class Quantized:
         """Samples after a start that are flagged as settling; 0 without the flag."""
         return cast("OutputStage", self.datapath.stages[-1]).settling
 
-    def exact(self, codes: Codes) -> Exact:
+    def unfiltered(self, codes: Codes) -> Values:
+        """Compute what enters the filter, in double precision, at the samples that bring a result."""
+        return exact_before_filter(codes, self.datapath, self.polynomial)
+
+    def exact(self, codes: Codes) -> Values:
         """Compute what the datapath approximates, in double precision; `codes` are (samples, channels, inputs)."""
         sos = None if self.filter is None else self.filter.sos
         return exact_chain(codes, self.datapath, self.polynomial, sos, steady=self.steady)

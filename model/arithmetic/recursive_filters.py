@@ -44,14 +44,16 @@ def lfilter(numerator: npt.ArrayLike, denominator: npt.ArrayLike, values: npt.Ar
     return np.asarray(_recursion()(b, a, x), dtype=np.float64)
 
 
-def sosfilt(sections: npt.ArrayLike, values: npt.ArrayLike) -> Array:
-    """Filter values by a cascade of second-order sections, from rest.
+def sosfilt(sections: npt.ArrayLike, values: npt.ArrayLike, states: Array | None = None) -> Array:
+    """Filter values by a cascade of second-order sections, from rest or from where it was left.
 
     Parameters
     ----------
     sections : array_like, shape (sections, 6)
         b0, b1, b2, 1, a1, a2 of each.
     values : array_like, shape (samples,)
+    states : ndarray, shape (sections, 2), optional
+        Two values of each section, zero at rest; the last ones are left there.
 
     Returns
     -------
@@ -64,7 +66,7 @@ def sosfilt(sections: npt.ArrayLike, values: npt.ArrayLike) -> Array:
     """
     sos = np.array(sections, dtype=np.float64)
     filtered = np.array(values, dtype=np.float64)
-    _cascade()(sos, filtered[np.newaxis], np.zeros((1, len(sos), 2)))
+    _cascade()(sos, filtered[np.newaxis], (np.zeros((len(sos), 2)) if states is None else states)[np.newaxis])
     return filtered
 
 
@@ -86,8 +88,9 @@ def _cascade() -> Callable[[Array, Array, Array], None]:
         return found
     from scipy import signal  # noqa: PLC0415
 
-    def through(sos: Array, rows: Array, at_rest: Array) -> None:
-        rows[:] = signal.sosfilt(sos, rows)
+    def through(sos: Array, rows: Array, states: Array) -> None:
+        rows[:], left = signal.sosfilt(sos, rows, zi=states.swapaxes(0, 1))
+        states[:] = left.swapaxes(0, 1)
 
     return through
 

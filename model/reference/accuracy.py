@@ -10,6 +10,8 @@ import numpy.typing as npt
 
 from sosmith.model.arrays import Values
 
+_BLOCK = 1 << 20
+
 
 @dataclass(frozen=True)
 class ErrorStatistics:
@@ -64,7 +66,9 @@ def accuracy_percent(measured: Values, truth: Values, reading: npt.NDArray[np.bo
         raise ValueError("reading must mark at least one sample, not none")
     if not truth.all():
         raise ValueError("truth must differ from zero at every reading, not be 0")
-    return 100.0 - 100.0 * float(np.mean(np.abs(measured - truth) / np.abs(truth)))
+    share = np.subtract(measured, truth)
+    share /= truth
+    return 100.0 - 100.0 * float(np.mean(np.abs(share, out=share)))
 
 
 def error_statistics(error: Values) -> ErrorStatistics:
@@ -77,14 +81,25 @@ def error_statistics(error: Values) -> ErrorStatistics:
     """
     if not error.size:
         raise ValueError("error must have at least one sample, not none")
-    magnitude = np.abs(error)
-    worst = int(np.argmax(magnitude))
+    flat = error.reshape(-1)
+    worst = max((int(np.argmax(flat)), int(np.argmin(flat))), key=lambda k: (abs(flat[k]), -k))
     return ErrorStatistics(
-        max_abs=float(magnitude.max()),
-        rms=math.sqrt(float(np.mean(error**2))),
+        max_abs=float(abs(flat[worst])),
+        rms=math.sqrt(sum_of_squares(error) / error.size),
         mean=float(np.mean(error)),
         worst=worst,
     )
+
+
+def peak(values: Values) -> float:
+    """Return the largest magnitude of values of any shape, without an array of all magnitudes."""
+    return float(max(np.max(values), -np.min(values)))
+
+
+def sum_of_squares(values: Values) -> float:
+    """Return the sum of the squares of values of any shape, of a block at a time."""
+    flat = values.reshape(-1)
+    return math.fsum(float(np.sum(flat[k : k + _BLOCK] ** 2)) for k in range(0, len(flat), _BLOCK))
 
 
 def sqnr_db(reference: Values, error: Values) -> float | None:
@@ -101,7 +116,7 @@ def sqnr_db(reference: Values, error: Values) -> float | None:
         If the shapes differ.
     """
     _check_same_shape("error", error, reference)
-    signal, noise = float(np.sum(reference**2)), float(np.sum(error**2))
+    signal, noise = sum_of_squares(reference), sum_of_squares(error)
     if signal == 0.0 or noise == 0.0:
         return None
     return 10.0 * (math.log10(signal) - math.log10(noise))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,27 +13,16 @@ from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
 
-
-@dataclass(frozen=True, eq=False)
-class Exact:
-    """What the exact chain makes of the input codes; both arrays have the shape (results, channels).
-
-    Attributes
-    ----------
-    calibrated : ndarray
-        The calibration alone, at the samples that bring a result.
-    golden : ndarray
-        Behind the filter too, limited to the range of the output.
-    """
-
-    calibrated: Values
-    golden: Values
+BLOCK = 1 << 18
+"""Samples that are computed at a time: the steps between codes and results take memory for so many, not for all."""
 
 
 def exact_chain(
     codes: Codes, datapath: Datapath, polynomial: Polynomial | None, sos: Values | None, *, steady: bool
-) -> Exact:
+) -> Values:
     """Compute what the hardware of `datapath` approximates: calibration, decimator and filter from the input codes.
+
+    Returns an array of shape (results, channels), limited to the range of the output.
 
     Parameters
     ----------
@@ -45,11 +34,26 @@ def exact_chain(
         As for `calibrated` and `filtered`.
     """
     factor = 1 if datapath.decimator is None else datapath.decimator.factor
-    channels = [codes[:, k] for k in range(codes.shape[1])]
-    entering = [entering_filter(channel, datapath, polynomial) for channel in channels]
-    golden = [filtered(column, sos, datapath.output, steady=steady) for column in entering]
-    before = [calibrated(channel[::factor], datapath.inputs, polynomial) for channel in channels]
-    return Exact(np.stack(before, axis=1), np.stack(golden, axis=1))
+    golden = np.empty((-(-len(codes) // factor), codes.shape[1]))
+    for k in range(codes.shape[1]):
+        # A decimator's sums reach over all samples; what it leaves is fewer.
+        size = BLOCK if factor == 1 else max(len(codes), 1)
+        filtering = Filtering(sos, datapath.output, steady=steady)
+        for start in range(0, len(codes), size):
+            entering = entering_filter(codes[start : start + size, k], datapath, polynomial)
+            golden[start : start + len(entering), k] = filtering(entering)
+    return golden
+
+
+def exact_before_filter(codes: Codes, datapath: Datapath, polynomial: Polynomial | None) -> Values:
+    """Compute the calibration alone at the samples that bring a result, shape (results, channels)."""
+    codes = codes[:: 1 if datapath.decimator is None else datapath.decimator.factor]
+    values = np.empty(codes.shape[:2])
+    for k in range(codes.shape[1]):
+        for start in range(0, len(codes), BLOCK):
+            block = slice(start, start + BLOCK)
+            values[block, k] = calibrated(codes[block, k], datapath.inputs, polynomial)
+    return values
 
 
 def calibrated(codes: Codes, inputs: Sequence[Port], polynomial: Polynomial | None) -> Values:
@@ -99,12 +103,15 @@ def entering_filter(codes: Codes, datapath: Datapath, polynomial: Polynomial | N
 
 
 def filtered(values: Values, sos: Values | None, output: Port, *, steady: bool = False) -> Values:
-    """Filter `values` and limit the result to the range of `output`.
+    """Filter all `values` at once, as `Filtering` does."""
+    return Filtering(sos, output, steady=steady)(values)
+
+
+class Filtering:
+    """Filters values block by block, and limits the results to the range of the output.
 
     Parameters
     ----------
-    values : float array, shape (samples,)
-        Physical values.
     sos : float array, shape (sections, 6), or None
         Second-order sections of the ideal filter; None for no filter.
     output : Port
@@ -112,9 +119,19 @@ def filtered(values: Values, sos: Values | None, output: Port, *, steady: bool =
     steady : bool
         Whether the filter starts from the steady state of the first value, and not from zero.
     """
-    first = values[0] if steady and sos is not None and len(values) else 0.0
-    result = values if sos is None else sosfilt(sos, values - first)
-    if sos is not None and first:
-        result = result + np.prod(sos[:, :3].sum(axis=1) / sos[:, 3:].sum(axis=1)) * first
-    low, high = output.decode(np.array([output.lowest, output.highest]))
-    return np.clip(result, low, high)
+
+    def __init__(self, sos: Values | None, output: Port, *, steady: bool = False) -> None:
+        self._sos, self._steady = sos, steady
+        self._range = output.decode(np.array([output.lowest, output.highest]))
+        self._states = None if sos is None else np.zeros((len(sos), 2))
+        self._first: float | None = None
+
+    def __call__(self, values: Values) -> Values:
+        """Filter the next physical values, shape (samples,)."""
+        sos = self._sos
+        if self._first is None:
+            self._first = values[0] if self._steady and sos is not None and len(values) else 0.0
+        result = values if sos is None else sosfilt(sos, values - self._first, self._states)
+        if sos is not None and self._first:
+            result = result + np.prod(sos[:, :3].sum(axis=1) / sos[:, 3:].sum(axis=1)) * self._first
+        return np.clip(result, *self._range)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +15,7 @@ from sosmith.model.port import Port
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Trace:
-    """Input codes of a core, one row per sample. All arrays are read-only.
+    """Input codes of a core, one row per sample. All arrays are read-only; those that already are so are not copied.
 
     Attributes
     ----------
@@ -54,7 +55,7 @@ class Trace:
     def __post_init__(self) -> None:
         if self.sample_rate <= 0:
             raise ValueError(f"sample_rate must be positive, not {self.sample_rate}")
-        codes = np.array(self.codes, dtype=np.int64)
+        codes = _own(self.codes, np.int64)
         if codes.ndim != 2 or codes.shape[1] != len(self.ports) or not codes.size:
             raise ValueError(f"codes must be of shape (n, {len(self.ports)}) with n > 0, not {codes.shape}")
         for port, column in zip(self.ports, codes.T, strict=True):
@@ -63,12 +64,12 @@ class Trace:
                 raise ValueError(f"{port.name} must be in {port.lowest}..{port.highest}, not {wrong[0]}")
         self._freeze("codes", codes)
         if self.truth is not None:
-            truth = np.array(self.truth, dtype=np.float64)
+            truth = _own(self.truth, np.float64)
             if truth.shape != codes.shape[:1] or not np.all(np.isfinite(truth)):
                 raise ValueError(f"truth must be {len(codes)} finite numbers, not of shape {truth.shape}")
             self._freeze("truth", truth)
         if self.reading is not None:
-            reading = np.array(self.reading, dtype=np.bool_)
+            reading = _own(self.reading, np.bool_)
             if reading.shape != codes.shape[:1]:
                 raise ValueError(f"reading must be {len(codes)} flags, not of shape {reading.shape}")
             self._freeze("reading", reading)
@@ -84,10 +85,14 @@ class Trace:
     @property
     def time(self) -> Values:
         """Time of each sample in s, shape (n,), from 0."""
-        return np.arange(len(self), dtype=np.float64) / float(self.sample_rate)
+        time = np.arange(len(self), dtype=np.float64)
+        time /= float(self.sample_rate)
+        return time
 
     def delayed(self, samples: int) -> Trace:
         """Return the trace delayed by `samples`, with equal length; the first sample is held until then."""
+        if not samples:
+            return self
         source = np.maximum(np.arange(len(self)) - samples, 0)
         return replace(
             self,
@@ -110,3 +115,10 @@ class Trace:
         """Return the physical values of the codes in the ports' units, shape (n, n_inputs)."""
         decoded = [port.decode(column) for port, column in zip(self.ports, self.codes.T, strict=True)]
         return np.stack(decoded, axis=1)
+
+
+def _own(array: npt.ArrayLike, kind: type[np.generic]) -> npt.NDArray[Any]:
+    """Return a copy that nobody else can change, or the array itself if nobody can."""
+    if isinstance(array, np.ndarray) and array.dtype == kind and not array.flags.writeable:
+        return array
+    return np.array(array, dtype=kind)

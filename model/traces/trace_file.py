@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from array import array
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -10,11 +11,11 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.model.arrays import Codes, Values
+from sosmith.model.arrays import Codes, Kind, Values
 from sosmith.model.errors import SpecificationError
 from sosmith.model.port import Port
-from sosmith.model.tables.csv_table import CsvTable, check_rows, read_csv_table
-from sosmith.model.text_files import write_files
+from sosmith.model.tables.csv_table import CHUNK, CsvTable, check_rows, read_csv_chunks
+from sosmith.model.text_files import write_pieces
 from sosmith.model.traces.trace import Trace
 
 CHANNEL = "channel"
@@ -28,6 +29,10 @@ TIME_TOLERANCE = 0.01
 
 LAST_DIGIT_TOLERANCE = 1e-9
 """Largest deviation of a time stamp from a multiple of its last digit, as a share of it, beside that of doubles."""
+
+
+_WRITTEN = 1 << 14
+"""Rows of a piece of text."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +66,12 @@ class _Columns:
 
 
 def traces_csv(traces: Sequence[Trace]) -> str:
-    """Return the traces of a core's channels as CSV text, the same on every run.
+    """Return the traces of a core's channels as CSV text, as `trace_pieces` makes it."""
+    return "".join(trace_pieces(traces))
+
+
+def trace_pieces(traces: Sequence[Trace]) -> Iterator[str]:
+    """Yield the traces of a core's channels as CSV text, some thousand rows at a time, the same on every run.
 
     Columns: time_s; channel, if there are several; the physical value of each input (voltage_V, temperature_C, or the
     input's name); the code of each input (``<input>_code``); if the traces have them, the true value (clearance_mm for
@@ -82,34 +92,39 @@ def traces_csv(traces: Sequence[Trace]) -> str:
     names = [header.time, *([header.channel] if len(traces) > 1 else []), *header.physical, *header.codes]
     names += [header.truth] if traces[0].truth is not None else []
     names += [header.reading] if traces[0].reading is not None else []
-    rows = [_rows(trace, str(channel) if len(traces) > 1 else None) for channel, trace in enumerate(traces)]
-    lines = [",".join(names), *(line for together in zip(*rows, strict=True) for line in together)]
-    return "\n".join(lines) + "\n"
+    yield ",".join(names) + "\n"
+    for start in range(0, len(traces[0]), _WRITTEN):
+        part = slice(start, start + _WRITTEN)
+        rows = [_rows(trace, part, str(k) if len(traces) > 1 else None) for k, trace in enumerate(traces)]
+        yield "\n".join(line for together in zip(*rows, strict=True) for line in together) + "\n"
 
 
-def _rows(trace: Trace, channel: str | None) -> list[str]:
-    columns = [[repr(value) for value in trace.time.tolist()]]
-    columns += [] if channel is None else [[channel] * len(trace)]
-    columns += [[repr(value) for value in column] for column in trace.values().T.tolist()]
-    columns += [[str(code) for code in column] for column in trace.codes.T.tolist()]
+def _rows(trace: Trace, part: slice, channel: str | None) -> list[str]:
+    codes = trace.codes[part]
+    numbers = np.arange(part.start, part.start + len(codes), dtype=np.float64)
+    columns = [[repr(value) for value in (numbers / float(trace.sample_rate)).tolist()]]
+    columns += [] if channel is None else [[channel] * len(codes)]
+    for port, column in zip(trace.ports, codes.T, strict=True):
+        columns.append([repr(value) for value in port.decode(column).tolist()])
+    columns += [[str(code) for code in column] for column in codes.T.tolist()]
     if trace.truth is not None:
-        columns.append([repr(value) for value in trace.truth.tolist()])
+        columns.append([repr(value) for value in trace.truth[part].tolist()])
     if trace.reading is not None:
-        columns.append(["1" if value else "0" for value in trace.reading.tolist()])
+        columns.append(["1" if value else "0" for value in trace.reading[part].tolist()])
     return list(map(",".join, zip(*columns, strict=True)))
 
 
 def write_traces(path: Path, traces: Sequence[Trace]) -> None:
-    """Write `traces_csv` to `path` atomically.
+    """Write `trace_pieces` to `path` atomically.
 
     Raises
     ------
     SpecificationError
-        As for `traces_csv`; if the file cannot be written.
+        As for `trace_pieces`; if the file cannot be written.
     ToolError
         If the disk is full.
     """
-    write_files(path.parent, {path.name: traces_csv(traces)})
+    write_pieces(path, trace_pieces(traces))
 
 
 def read_traces(path: Path, ports: tuple[Port, ...], sample_rate: Fraction, channels: int = 1) -> tuple[Trace, ...]:
@@ -135,9 +150,15 @@ def read_traces(path: Path, ports: tuple[Port, ...], sample_rate: Fraction, chan
         an integer from 0 to ``channels - 1``; if a channel has no row, or more rows than another.
     """
     columns = _Columns.of(ports)
-    table = read_csv_table(path, columns.all)
-    parts = _by_channel(table, channels) if columns.channel in table else [table]
-    return tuple(_trace(part, columns, ports, sample_rate) for part in parts)
+    found: dict[int, _Gathered] = {}
+    for chunk in read_csv_chunks(path, columns.all):
+        several = columns.channel in chunk
+        parts = _by_channel(chunk, channels) if several else {0: chunk}
+        for channel, part in parts.items():
+            found.setdefault(channel, _Gathered(columns, ports)).take(part)
+    if several:
+        _check_lengths(path, found, channels)
+    return tuple(found[channel].trace(path, sample_rate, several=several) for channel in sorted(found))
 
 
 def rows_of_channel(table: CsvTable, channel: int) -> CsvTable:
@@ -156,86 +177,134 @@ def rows_of_channel(table: CsvTable, channel: int) -> CsvTable:
     return table.take(own)
 
 
-def _by_channel(table: CsvTable, channels: int) -> list[CsvTable]:
+def _by_channel(table: CsvTable, channels: int) -> dict[int, CsvTable]:
     number = table.column(CHANNEL)
     check_rows(
         table,
         (number % 1 != 0) | (number < 0) | (number >= channels),
         lambda k: f"{CHANNEL} must be {_allowed(channels)}, not {number[k]:g}",
     )
-    rows = [np.flatnonzero(number == channel) for channel in range(channels)]
-    shortest = min(range(channels), key=lambda channel: len(rows[channel]))
-    length = len(rows[shortest])
+    return {int(channel): table.take(np.flatnonzero(number == channel)) for channel in np.unique(number)}
+
+
+def _check_lengths(path: Path, found: Mapping[int, _Gathered], channels: int) -> None:
+    """Check that all channels have as many rows."""
+    lengths = [len(found[channel].lines) if channel in found else 0 for channel in range(channels)]
+    length = min(lengths)
+    shortest = lengths.index(length)
     if not length:
-        given = ", ".join(f"{channel:g}" for channel in np.unique(number))
-        raise SpecificationError(f"{table.path} must have rows of channel {shortest}, not only of {given}")
-    beyond = np.isin(np.arange(len(number)), np.concatenate([some[length:] for some in rows]))
-    check_rows(
-        table,
-        beyond,
-        lambda k: f"{CHANNEL} {number[k]:g} must end after row {length}, like channel {shortest}, not continue",
-    )
-    return [table.take(some) for some in rows]
+        given = ", ".join(map(str, sorted(found)))
+        raise SpecificationError(f"{path} must have rows of channel {shortest}, not only of {given}")
+    longer = [channel for channel in range(channels) if lengths[channel] > length]
+    if longer:
+        first = min(longer, key=lambda channel: found[channel].lines[length])
+        raise SpecificationError(
+            f"{path}, line {found[first].lines[length]}: {CHANNEL} {first} must end after row {length}, like channel "
+            f"{shortest}, not continue"
+        )
 
 
 def _allowed(channels: int) -> str:
     return "0, the core's only channel" if channels == 1 else f"an integer from 0 to {channels - 1}"
 
 
-def _trace(table: CsvTable, columns: _Columns, ports: tuple[Port, ...], sample_rate: Fraction) -> Trace:
-    if columns.time in table:
-        _check_time(table, table.column(columns.time), sample_rate)
-    codes = [
-        _read_codes(table, port, physical, code)
-        for port, physical, code in zip(ports, columns.physical, columns.codes, strict=True)
-    ]
-    coded = [code in table for code in columns.codes]
-    limited = [
-        0 if given else port.outside(table.column(physical))
-        for given, port, physical in zip(coded, ports, columns.physical, strict=True)
-    ]
-    return Trace(
-        name=table.path.stem,
-        ports=ports,
-        sample_rate=sample_rate,
-        codes=np.stack(codes, axis=1),
-        truth=table.column(columns.truth) if columns.truth in table else None,
-        reading=_read_flags(table, columns.reading) if columns.reading in table else None,
-        limited=tuple(limited),
-    )
+class _Gathered:
+    """The rows of a channel, chunk by chunk, in as little memory as they take.
+
+    Attributes
+    ----------
+    lines : array of int
+        Line of the file of each row.
+    """
+
+    def __init__(self, columns: _Columns, ports: tuple[Port, ...]) -> None:
+        self.lines = array("I")
+        self._columns, self._ports = columns, ports
+        self._time, self._truth = array("d"), array("d")
+        self._codes, self._reading = array("q"), bytearray()
+        self._limited = [0] * len(ports)
+
+    def take(self, table: CsvTable) -> None:
+        """Check the next rows but for their times, and keep what a trace has of them."""
+        columns, places = self._columns, list(enumerate(zip(self._columns.physical, self._columns.codes, strict=True)))
+        codes = [_read_codes(table, self._ports[k], physical, code) for k, (physical, code) in places]
+        self._codes.frombytes(np.stack(codes, axis=1).tobytes())
+        self.lines.frombytes(table.lines.tobytes())
+        for k, (physical, code) in places:
+            if code not in table:
+                self._limited[k] += self._ports[k].outside(table.column(physical))
+        if columns.time in table:
+            self._time.frombytes(table.column(columns.time).tobytes())
+        if columns.truth in table:
+            self._truth.frombytes(table.column(columns.truth).tobytes())
+        if columns.reading in table:
+            self._reading += _read_flags(table, columns.reading).tobytes()
+
+    def trace(self, path: Path, sample_rate: Fraction, *, several: bool) -> Trace:
+        """Return the trace; `several` tells whether rows of other channels may stand between these."""
+        if self._time:
+            before = "the previous row of this channel" if several else "the previous row"
+            _check_time(path, self.lines, np.frombuffer(self._time), sample_rate, before)
+        return Trace(
+            name=path.stem,
+            ports=self._ports,
+            sample_rate=sample_rate,
+            codes=_read_only(np.frombuffer(self._codes, dtype=np.int64).reshape(-1, len(self._ports))),
+            truth=_read_only(np.frombuffer(self._truth)) if self._truth else None,
+            reading=_read_only(np.frombuffer(self._reading, dtype=np.bool_)) if self._reading else None,
+            limited=tuple(self._limited),
+        )
 
 
-def _check_time(table: CsvTable, time: Values, sample_rate: Fraction) -> None:
+def _read_only(values: npt.NDArray[Kind]) -> npt.NDArray[Kind]:
+    values.setflags(write=False)
+    return values
+
+
+def _check_time(path: Path, lines: Sequence[int], time: Values, sample_rate: Fraction, before: str) -> None:
     period = 1 / float(sample_rate)
-    step = np.concatenate([[period], np.diff(time)])
-    before = "the previous row of this channel" if CHANNEL in table else "the previous row"
-    check_rows(table, step <= 0, lambda k: f"time_s must be above {time[k - 1]}, the value in {before}, not {time[k]}")
     digit = _last_digit(time)
     few = digit > period / 2  # stamps of other instants would pass as rounded ones
     # Instants that were rounded or cut to a digit are whole numbers of it apart, next below or next above a period.
     ratio = period / digit
-    rounded = (step > (np.floor(ratio) - 0.5) * digit) & (step < (np.ceil(ratio) + 0.5) * digit) & (not few)
-    check_rows(
-        table,
-        (np.abs(step - period) > TIME_TOLERANCE * period) & ~rounded,
-        lambda k: f"time_s must be {period:.6g} s after {before}, not {step[k]:.6g} s",
-    )
-    passed, due = time - time[0], np.arange(len(time)) * period
-    check_rows(
-        table,
-        np.abs(passed - due) > TIME_TOLERANCE * due + (0.0 if few else digit),
-        lambda k: f"time_s must be {due[k]:.6g} s after the first row at {1 / period:g} Hz, not {passed[k]:.6g} s",
-    )
+    least, most = (np.floor(ratio) - 0.5) * digit, (np.ceil(ratio) + 0.5) * digit
+
+    def check(bad: npt.NDArray[np.bool_], start: int, what: Callable[[int], str]) -> None:
+        if bad.any():
+            row = start + int(np.argmax(bad))
+            raise SpecificationError(f"{path}, line {lines[row]}: time_s must be {what(row)}")
+
+    for start in range(0, len(time), CHUNK):
+        now = time[start : start + CHUNK]
+        step = np.diff(now, prepend=time[start - 1] if start else now[0] - period)
+        if not start:
+            step[0] = period
+        check(step <= 0, start, lambda k: f"above {time[k - 1]}, the value in {before}, not {time[k]}")
+        rounded = (step > least) & (step < most) & (not few)
+        check(
+            (np.abs(step - period) > TIME_TOLERANCE * period) & ~rounded,
+            start,
+            lambda k: f"{period:.6g} s after {before}, not {time[k] - time[k - 1]:.6g} s",
+        )
+        due = np.arange(start, start + len(now)) * period
+        check(
+            np.abs(now - time[0] - due) > TIME_TOLERANCE * due + (0.0 if few else digit),
+            start,
+            lambda k: f"{k * period:.6g} s after the first row at {1 / period:g} Hz, not {time[k] - time[0]:.6g} s",
+        )
 
 
 def _last_digit(time: Values) -> float:
     """Return the decimal digit that time stamps in s end with, down to a picosecond: 1e-6 for microseconds."""
-    doubles = float(np.spacing(np.abs(time).max()))
-    for places in range(12):
-        digits, tolerance = time * 10.0**places, LAST_DIGIT_TOLERANCE + 2 * doubles * 10.0**places
-        if np.all(np.abs(digits - np.round(digits)) < tolerance):
-            return 10.0**-places
-    return 1e-12
+    doubles = float(np.spacing(max(time.max(), -time.min())))
+    blocks = [time[start : start + CHUNK] for start in range(0, len(time), CHUNK)]
+
+    def ends_there(places: int) -> bool:
+        tolerance = LAST_DIGIT_TOLERANCE + 2 * doubles * 10.0**places
+        scaled = (block * 10.0**places for block in blocks)
+        return all(np.all(np.abs(digits - np.round(digits)) < tolerance) for digits in scaled)
+
+    return next((10.0**-places for places in range(12) if ends_there(places)), 1e-12)
 
 
 def _read_codes(table: CsvTable, port: Port, physical: str, code: str) -> Codes:

@@ -118,7 +118,16 @@ def run_with(**changes: Any) -> Run:
     differs = np.zeros((len(hardware), channels), dtype=bool)
     differs[1500 : 1500 + wrong] = True
     codes = np.zeros((len(hardware), channels, 1), dtype=np.int64)
-    return Run(**({"codes": codes, "received": np.rint(hardware / LSB).astype(np.int64), "differs": differs} | known))
+    arrays = {"codes": codes, "received": np.rint(hardware / LSB).astype(np.int64), "differs": differs}
+    return Run(**_named(arrays | known))
+
+
+_NAMES = {"time": "instants", "hardware": "values", "unfiltered": "before"}
+"""Attributes of a run by the properties that show them."""
+
+
+def _named(changes: dict[str, Any]) -> dict[str, Any]:
+    return {_NAMES.get(name, name): value for name, value in changes.items()}
 
 
 def evidence(**changes: Any) -> Evidence:
@@ -131,7 +140,7 @@ def evidence(**changes: Any) -> Evidence:
         "cycles_per_second": 6005.0,
         "alternatives": (Alternative(name="df1", max_abs=0.4, rms=0.1),),
     }
-    of_run = {each.name for each in fields(Run)} | {"wrong"}
+    of_run = {each.name for each in fields(Run)} | {"wrong", *_NAMES}
     own = {each.name for each in fields(Evidence)}
     parts: dict[str, dict[str, Any]] = {"run": {}, "own": {}, "core": {}}
     for name, value in changes.items():
@@ -141,7 +150,7 @@ def evidence(**changes: Any) -> Evidence:
 
 def changed(made: Evidence, **changes: Any) -> Evidence:
     """Return the same with other samples."""
-    return replace(made, run=replace(made.run, **changes))
+    return replace(made, run=replace(made.run, **_named(changes)))
 
 
 def plain(**changes: Any) -> Evidence:
