@@ -134,9 +134,9 @@ def _lines(path: Path, file: io.BufferedReader) -> Iterator[str]:
         try:
             text = rest + decoder.decode(piece, final=not more)
         except UnicodeDecodeError as error:
-            line = done + rest.count("\n") + error.object.count(b"\n", 0, error.start) + 1
+            at = done + rest.count("\n") + error.object.count(b"\n", 0, error.start) + 1
             raise SpecificationError(
-                f"{path}, line {line}: text must be UTF-8, not contain the byte 0x{error.object[error.start]:02x}"
+                f"{path}, line {at}: text must be UTF-8, not contain the byte 0x{error.object[error.start]:02x}"
             ) from None
         lines = list(io.StringIO(text, newline=""))
         rest = lines.pop() if more and lines else ""

@@ -78,7 +78,7 @@ def rails_of(measurements: Measurements, voltages: Range) -> Rails:
     for side, extreme in enumerate((np.min, np.max)):
         at = inside & (extreme(V[inside], initial=voltages[1 - side]) == V)
         beyond = _beyond(measurements, at, inside & ~at)
-        least = max(BEYOND, CERTAIN / math.sqrt(max(np.count_nonzero(at), 1)))
+        least = max(BEYOND, CERTAIN / math.sqrt(max(int(np.count_nonzero(at)), 1)))
         if beyond is not None and (beyond if side else -beyond) > least:
             ends[side] = float(V[at][0])
             found.append(

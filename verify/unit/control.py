@@ -197,7 +197,7 @@ class Control:
             require(name in netlist.registers, f"the unit must have a register {name}")
         self._dependence = Dependence(netlist, self.cuts)
         moving = [Bits(READY), Bits(VALID), *(write.enable for write in self.writes)]
-        moving += [port.address for port in (*self.writes, *self.reads)]
+        moving += [*(write.address for write in self.writes), *(read.address for read in self.reads)]
         moving += [read.enable for read in self.reads if read.enable is not None]
         self.registers = self._closure(moving, [*self.valid, *self.codes])
         self.ternary = Ternary(netlist, {"instructions": netlist.memories["instructions"].first})

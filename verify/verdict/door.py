@@ -206,7 +206,7 @@ def _hardware_proven(
             if certificate.decimation is None
             else check_behind(text, certificate, item.channels)
         )
-    return Proofs(program, hardware, _ahead(certificate, item, text, progress), unit), decimator
+    return Proofs(program, hardware, _ahead(certificate, item, text, progress), unit=unit), decimator
 
 
 def _ahead(

@@ -32,7 +32,9 @@ def stated(core: Made, spec: str) -> Certificate:
 class Unit:
     """A core with the words of its specification."""
 
-    def __init__(self, spec: str, architecture: str = "folded", channels: int = 1, realization: str = "df1_ef1") -> None:
+    def __init__(
+        self, spec: str, architecture: str = "folded", channels: int = 1, realization: str = "df1_ef1"
+    ) -> None:
         self.core = small(spec, architecture, realization, channels)
         self.certificate = stated(self.core, spec)
         self.text, self.channels, self._serial = self.core.text, channels, architecture == "serial"
