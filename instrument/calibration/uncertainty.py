@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
+from scipy import special
 
 from sosmith.gen.calibration.fit import Fit, Measurements, residuals, root_mean_square, terms_of
 from sosmith.gen.calibration.least_squares import Sums
@@ -107,7 +107,7 @@ def of_polynomial(measurements: Measurements, fit: Fit) -> Uncertainty:
     variance = float(solution.residual_squares) / freedom
     lack = lack_of_fit(residuals(measurements, fit.polynomial), measurements.voltage, measurements.temperature)
     missed = lack.missed if lack.structured else 0.0
-    wide = float(stats.t.ppf((1 + SHARE) / 2, freedom))
+    wide = float(special.stdtrit(freedom, (1 + SHARE) / 2))
 
     def standard_error(V: Values, T: Values) -> Values:
         return np.asarray(np.sqrt(variance * sums.leverage(solution, V, T)))
@@ -142,7 +142,7 @@ def _refitted(measurements: Measurements, fit: Fit, sums: Sums, weights: Values)
         V, T = measurements.voltage[out], measurements.temperature[out]
         variance = float(solution.residual_squares) / freedom
         off[out] = measurements.clearance[out] - solution.polynomial(V, T)
-        wide = float(stats.t.ppf((1 + SHARE) / 2, freedom))
+        wide = float(special.stdtrit(freedom, (1 + SHARE) / 2))
         allowed[out] = wide * np.sqrt(variance * (1.0 + without.leverage(solution, V, T)))
     return CrossValidation(root_mean_square(off), float(np.mean(np.abs(off) <= allowed)), len(off))
 

@@ -13,7 +13,7 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from sosmith.model.arrays import Values
 
@@ -93,10 +93,7 @@ class Budget:
     @cached_property
     def factor(self) -> Values:
         """Coverage factor k for `SHARE`: the quantile of Student's t, or of the normal distribution; shape (n,)."""
-        normal = float(stats.norm.ppf((1 + SHARE) / 2))
-        finite = np.isfinite(self.freedom)
-        student = stats.t.ppf((1 + SHARE) / 2, np.where(finite, self.freedom, 1.0))
-        return np.where(finite, student, normal)
+        return np.asarray(special.stdtrit(self.freedom, (1 + SHARE) / 2))
 
     @cached_property
     def expanded(self) -> Values:

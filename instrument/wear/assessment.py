@@ -9,7 +9,7 @@ from enum import StrEnum
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
+from scipy import special
 
 from sosmith.model.arrays import Values
 from sosmith.model.errors import SpecificationError
@@ -321,6 +321,8 @@ def rate_of(time: Values, clearance: Values, block: float, confidence: float) ->
         raise SpecificationError(
             f"the record must have readings in at least {MIN_BLOCKS} blocks of {block:.4g} days, not in {len(time)}"
         )
+    from scipy import stats  # noqa: PLC0415, half a second that those who show an uncertainty alone do not wait for
+
     slope, intercept, low, high = stats.theilslopes(clearance, time, alpha=confidence)
     deviation = clearance - intercept - slope * time
     deviation = deviation - np.median(deviation)
@@ -447,10 +449,10 @@ def judge(
     now, last_block = float(medians[-1]), int(counts[-1])
     remaining = max(limits.critical_clearance - now, 0.0)
     gone = float(time[-1] - times[-1])
-    off = float(stats.norm.ppf((1 + confidence) / 2)) * rate.scatter
+    off = float(special.ndtri((1 + confidence) / 2)) * rate.scatter
     known = None if uncertainty is None else uncertainty(float(medians[0]), now)
     if known is not None:
-        off = float(stats.t.ppf((1 + confidence) / 2, known.freedom)) * known.standard
+        off = float(special.stdtrit(known.freedom, (1 + confidence) / 2)) * known.standard
         rate = _with_rise(rate, known, float(times[-1] - times[0]), confidence)
     states = [limits.state(value) for value in clearance.tolist()]
     end = states[-last_block:]
@@ -483,7 +485,7 @@ def judge(
 
 def _with_rise(rate: WearRate, known: ClearanceUncertainty, span: float, confidence: float) -> WearRate:
     """Widen the interval of a rate by the uncertainty of the rise over `span` days; independent, so squares add."""
-    of_rise = float(stats.t.ppf((1 + confidence) / 2, known.freedom)) * known.rise / span
+    of_rise = float(special.stdtrit(known.freedom, (1 + confidence) / 2)) * known.rise / span
     return replace(
         rate,
         low=rate.rate - math.hypot(rate.rate - rate.low, of_rise),

@@ -59,6 +59,16 @@ def test_a_design_loads_nothing_that_it_does_not_need() -> None:
     assert ended.stdout.split() == []
 
 
+@pytest.mark.parametrize("words", [("design",), ("design", "--json"), ("combinations",)])
+def test_commands_do_without_statistics(words: tuple[str, ...]) -> None:
+    script = "import sys, sosmith\ntry:\n    sosmith.main()\nexcept SystemExit:\n    pass\n"
+    found = "print(*sorted({'scipy.stats', 'matplotlib'} & sys.modules.keys()), file=sys.stderr)"
+    spec = [str(EXAMPLE)] if words[0] == "design" else []
+    command = [sys.executable, "-c", script + found, words[0], *spec, *words[1:], "-q"]
+    ended = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert ended.stderr.splitlines()[-1] == ""
+
+
 NOTHING = {
     "version": ("--version",),
     "help": ("--help",),
