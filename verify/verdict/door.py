@@ -12,6 +12,7 @@ from pathlib import Path
 
 from sosmith.verify.around.cic import DecimatorVerdict, check_decimator
 from sosmith.verify.around.parallel_core import check_ahead, check_behind
+from sosmith.verify.c_model.check import check_c_model
 from sosmith.verify.certificate_file import Certificate, ItemEntry
 from sosmith.verify.decimation import at_lower_rate, behind_decimator, calibration_alone, module_in
 from sosmith.verify.graph import RejectedError, require
@@ -31,6 +32,7 @@ from sosmith.verify.verdict.generated_files import (
     check_text,
     content_of,
     core_text,
+    unicode_text,
 )
 from sosmith.verify.verdict.item import (
     check_item,
@@ -167,7 +169,9 @@ def _files_proven(
     proofs, decimator = _hardware_proven(certificate, item, text, progress)
     manifest.hold_clocks(proofs.hardware if certificate.decimation is None else None)
     manifest.hold_program(None if proofs.program is None else _program_of(certificate, text))
-    return replace(proofs, unheld=tuple(manifest.open)), decimator
+    progress("C model", 0, 0)
+    model = check_c_model(*(unicode_text(folder / f"{certificate.name}.{end}") for end in "ch"), certificate, item)
+    return replace(proofs, unheld=tuple(manifest.open), model=model), decimator
 
 
 def _program_of(certificate: Certificate, text: str) -> ProgramText:

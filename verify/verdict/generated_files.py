@@ -115,6 +115,20 @@ def core_text(path: Path) -> str:
         raise RejectedError(f"{path} must be ASCII") from None
 
 
+def unicode_text(path: Path) -> str:
+    """Return a text whose comments may have any letters, such as those of a unit.
+
+    Raises
+    ------
+    RejectedError
+        If there is none.
+    """
+    try:
+        return content_of(path).decode("utf-8")
+    except UnicodeDecodeError:
+        raise RejectedError(f"{path} must be UTF-8") from None
+
+
 def check_texts(about: AboutEntry, texts: Mapping[str, str]) -> int:
     """Check that `texts`, by the names of their files, are those written with a certificate; return their number.
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
 
+from sosmith.verify.c_model.check import ModelVerdict
 from sosmith.verify.certificate_file import Certificate, ItemEntry
 from sosmith.verify.parallel.check import HardwareVerdict
 from sosmith.verify.program.check import ProgramVerdict
@@ -45,6 +46,7 @@ class Proofs:
     unheld: tuple[str, ...] = ()
     """Fields of the manifest that nothing was held against."""
     unit: UnitVerdict | None = None
+    model: ModelVerdict | None = None
 
 
 def scope_of(
@@ -107,7 +109,7 @@ def _hardware(item: ItemEntry | None, proofs: Proofs | None, *, is_decimated: bo
     if proofs is None:
         return dict.fromkeys(_OF_FILES, Part(State.NOT_READ, "no files were given", asked=False))
     parts = {
-        "c_model": Part(State.NOT_READ, "its text is held by its SHA-256 alone"),
+        "c_model": _c_model(proofs),
         "rtlil": Part(State.NOT_READ, "its text is held by its SHA-256 alone"),
     }
     parts["manifest"] = _manifest(item, proofs)
@@ -154,6 +156,16 @@ def _flags(proofs: Proofs, *, is_decimated: bool) -> Part:
     if is_decimated or proofs.unit is None:
         return Part(State.PARTIAL, "all but outside_calibration, wear_warning and wear_critical")
     return Part(State.PROVEN, "each is judged by the codes that the certificate states, and leaves with its sample")
+
+
+def _c_model(proofs: Proofs) -> Part:
+    if proofs.model is None:
+        return Part(State.NOT_READ, "its text is held by its SHA-256 alone")
+    return Part(
+        State.PROVEN,
+        f"its statements compute the {proofs.model.nodes} nodes of the graphs and the flags, without overflow; a "
+        "compiler is assumed that rounds down where it shifts negative numbers to the right",
+    )
 
 
 def _manifest(item: ItemEntry | None, proofs: Proofs) -> Part:

@@ -100,7 +100,7 @@ def item(**fields: Any) -> Callable[[Tree], None]:
 def test_what_is_right_is_accepted_and_what_is_missing_is_named(copy: Callable[..., Path]) -> None:
     found = proof(forge(copy(PARALLEL)), spec=True)
     assert found.hardware is not None
-    assert set(found.missing) == {"manifest", "flags", "c_model", "rtlil"}
+    assert set(found.missing) == {"manifest", "flags", "rtlil"}
     assert found.scope["hardware"].state is found.scope["filter"].state is State.PROVEN
 
 
@@ -191,6 +191,14 @@ def test_a_name_is_a_plain_identifier(name: str, copy: Callable[..., Path]) -> N
 
     with pytest.raises(RejectedError):
         proof(forge(folder, renamed))
+
+
+@pytest.mark.parametrize(("name", "old", "new"), [("plain.c", " >> 1", " >> 2"), ("plain.h", "int64_t s[", "int s[")])
+def test_the_c_model_is_read(name: str, old: str, new: str, copy: Callable[..., Path]) -> None:
+    folder = copy(PARALLEL)
+    changed(folder, name, old, new)
+    with pytest.raises(RejectedError, match=r"of the C model must compute|of plain.h must go on with"):
+        proof(forge(folder))
 
 
 def test_an_old_certificate_proves_no_hardware(copy: Callable[..., Path]) -> None:

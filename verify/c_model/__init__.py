@@ -1,0 +1,1 @@
+"""Reads the C model of a core, and proves that it computes the graphs of its certificate."""

@@ -1,0 +1,245 @@
+"""Proves that the C model of a core computes the graphs of its certificate, without overflow or undefined behaviour.
+
+The text is read token by token: whatever is not consumed is refused. The stages are read statement by statement
+(`sosmith.verify.c_model.stages`); what stands around them has to be what is written in `sosmith.verify.c_model.frame`,
+and the expressions of the flags those that follow from the certificate. Assumed are a compiler that rounds down where
+it shifts a negative number to the right, and a caller that hands in codes and channels in their range.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from sosmith.verify.c_model.cursor import Cursor
+from sosmith.verify.c_model.expressions import BITS
+from sosmith.verify.c_model.frame import BEGIN, BLOCK, DECIMATOR, HEADER, RESET, STEP, SUMS, WEAR, filled, ticks
+from sosmith.verify.c_model.stages import Stages
+from sosmith.verify.certificate_file import Certificate, ItemEntry, Operation, PortEntry
+from sosmith.verify.decimation import at_lower_rate
+from sosmith.verify.graph import require
+
+_RAIL, _OUTSIDE, _SATURATED, _SETTLING = 0, 1, 2, 5
+"""Bits of a status."""
+
+_PLAIN = re.compile(r"[A-Za-z_]\w*", re.ASCII)
+_HEADERS = {"stddef", "stdint", "string"}
+
+_SUM_BITS = 62
+"""Bits of a decimator's sums, so that they, and half an LSB more, fit 64 bits with a sign."""
+
+
+@dataclass(frozen=True)
+class ModelVerdict:
+    """What the check of a C model has found: the number of nodes that its statements compute, and of states."""
+
+    nodes: int
+    states: int
+
+
+def check_c_model(source: str, header: str, certificate: Certificate, item: ItemEntry) -> ModelVerdict:
+    """Prove that a C model computes the graphs of a certificate.
+
+    Parameters
+    ----------
+    source, header : str
+        Its two files.
+    certificate : Certificate
+        Its certificate, which `verify` has accepted.
+    item : ItemEntry
+        What it is about.
+
+    Raises
+    ------
+    RejectedError
+        If it computes anything else, or has anything that is not read; the sentence names the line.
+    """
+    return _Model(certificate, item).check(source, header)
+
+
+class _Model:
+    def __init__(self, certificate: Certificate, item: ItemEntry) -> None:
+        self._certificate, self._item = certificate, item
+        self._behind = at_lower_rate(certificate)
+        self._name = certificate.name
+        self._channel = "channel, " if len(item.wear) > 1 else ""
+
+    def check(self, source: str, header: str) -> ModelVerdict:
+        """Read both files."""
+        for name in (port.name for port in (*self._certificate.inputs, *self._behind.inputs)):
+            require(
+                _PLAIN.fullmatch(name) is not None, f"the name of an input must be a plain identifier, not {name!a}"
+            )
+        require(_PLAIN.fullmatch(self._name) is not None, "the name of a core must be a plain identifier")
+        require(self._name not in _HEADERS, f"the name of a core must not be that of a header of C, {self._name}")
+        words = [node for stage in self._behind.stages for node in stage.nodes if node.op is Operation.DELAY]
+        word = self._read_header(Cursor(header, f"{self._name}.h"), max(len(words), 1))
+        cursor = Cursor(source, f"{self._name}.c")
+        cursor.expect(filled(BEGIN, NAME=self._name))
+        stages = Stages("", self._behind.stages, self._behind.inputs, word, len(words))
+        stages.read(cursor, self._name)
+        require(len(stages.owners) == len(words), "each state of the C model must be that of a delay")
+        cursor.expect(filled(RESET, NAME=self._name))
+        if self._item.wear:
+            cursor.expect(self._wear())
+        settles = self._behind.claims.settling is not None
+        full = self._item.calibrated if self._certificate.decimation is None else ()
+        status = self._status(stages, full, settles=settles, wear=True)
+        cursor.expect(self._step(stages, self._parameters(stages.inputs, self._channel), status))
+        cursor.expect(self._block(stages))
+        nodes = self._nodes(stages) + self._read_decimator(cursor, word)
+        cursor.end()
+        return ModelVerdict(nodes, len(words))
+
+    @staticmethod
+    def _nodes(stages: Stages) -> int:
+        return sum(len(stage.nodes) for stage in stages.stages)
+
+    def _parameters(self, inputs: tuple[PortEntry, ...] | list[PortEntry], channel: str = "") -> str:
+        codes = ", ".join(f"int64_t {port.name}_code" for port in inputs)
+        return f"size_t channel, {codes}" if channel else codes
+
+    def _read_header(self, cursor: Cursor, words: int) -> str:
+        """Read the header, and return the type of a state's word."""
+        before, _, after = HEADER.partition("WORD ")
+        fields = {
+            "GUARD": self._name.upper(),
+            "NAME": self._name,
+            "PARAMETERS": self._parameters(self._behind.inputs, self._channel),
+            "WEAR": f"uint8_t {self._name}_wear_flags(size_t channel, int64_t code);" if self._item.wear else "",
+            "DECIMATOR": self._decimator_words(DECIMATOR),
+            "WORDS": words,
+        }
+        cursor.expect(filled(before, **fields))
+        word = cursor.take("|".join(list(BITS)[1:]))
+        cursor.expect(filled(after, **fields))
+        cursor.end()
+        return word
+
+    def _wear(self) -> str:
+        limits = self._item.wear
+        return filled(
+            WEAR,
+            NAME=self._name,
+            COUNT=len(limits),
+            LIMITS=", ".join(f"{{{warning}, {critical}}}" for warning, critical in limits),
+            WHICH="channel" if len(limits) > 1 else 0,
+            UNUSED="" if len(limits) > 1 else "(void)channel;",
+        )
+
+    def _step(self, stages: Stages, parameters: str, status: str) -> str:
+        last = len(stages.stages) - 1
+        return filled(
+            STEP,
+            PREFIX=stages.prefix,
+            NAME=self._name,
+            PARAMETERS=parameters,
+            SET=" ".join(f"w.{port.name}_code = {port.name}_code;" for port in stages.inputs),
+            RUN=" ".join(f"{stages.prefix}stage{index}(state, &w);" for index in range(last + 1)),
+            STATUS=status,
+            RESULT=stages.member((last, stages.stages[last].outputs[0])),
+        )
+
+    def _block(self, stages: Stages) -> str:
+        count, last = len(stages.inputs), len(stages.stages) - 1
+        codes = [f"in[(n * channels + c) * {count} + {index}]" for index in range(count)]
+        arguments = ", ".join(f"{port.name}_code" for port in stages.inputs)
+        members = [f"{port.name}_code" for port in stages.inputs]
+        return filled(
+            BLOCK,
+            NAME=self._name,
+            PARAMETERS=self._parameters(self._behind.inputs, self._channel),
+            ARGUMENTS=self._channel + arguments,
+            CODES=("c, " if self._channel else "") + ", ".join(codes),
+            BEHIND=last,
+            INPUTS=count,
+            TICKS=ticks(
+                list(zip(members, codes, strict=True)),
+                last + 1,
+                stages.member((last, stages.stages[last].outputs[0])),
+            ),
+        )
+
+    def _status(
+        self, stages: Stages, calibrated: tuple[tuple[int, int], ...], *, settles: bool = False, wear: bool = False
+    ) -> str:
+        """Return the expression of the flags."""
+        conditions: dict[int, list[str]] = {_RAIL: [], _OUTSIDE: [], _SATURATED: []}
+        for index, port in enumerate(stages.inputs):
+            code = f"{port.name}_code"
+            conditions[_RAIL] += [f"{code} == {port.lowest}", f"{code} == {port.highest}"]
+            low, high = calibrated[index] if calibrated else (port.lowest, port.highest)
+            conditions[_OUTSIDE] += [f"{code} < {low}"] if low > port.lowest else []
+            conditions[_OUTSIDE] += [f"{code} > {high}"] if high < port.highest else []
+        number = len(stages.stages) - 1
+        last = stages.stages[number]
+        node = last.nodes[last.outputs[0]]
+        if node.op is Operation.CLAMP:
+            before = f"w.{stages.member((number, node.operands[0]))}"
+            conditions[_SATURATED] += [f"{before} < {_literal(node.low)}", f"{before} > {_literal(node.high)}"]
+        terms = [f"({' || '.join(found)}) << {bit}" for bit, found in conditions.items() if found]
+        settling = ""
+        if settles:
+            settling = f"w.{stages.member((number, last.outputs[1]))} < 0"
+            terms.append(f"({settling}) << {_SETTLING}")
+        if wear and self._item.wear:
+            result = stages.member((number, last.outputs[0]))
+            worn = f"{self._name}_wear_flags({'channel' if self._channel else 0}, (int64_t)w.{result})"
+            terms.append(f"({settling} ? 0 : {worn})" if settling else worn)
+        return f"(uint8_t)({' | '.join(terms)})"
+
+    def _read_decimator(self, cursor: Cursor, word: str) -> int:
+        """Read what stands before a decimator, and that; return the number of nodes."""
+        entry = self._certificate.decimation
+        if entry is None:
+            return 0
+        nodes = 0
+        if entry.calibration is not None:
+            stages = Stages("ahead_", entry.calibration.stages, self._certificate.inputs, word, 0)
+            stages.read(cursor, self._name)
+            status = self._status(stages, self._item.calibrated)
+            cursor.expect(self._step(stages, self._parameters(stages.inputs), status))
+            nodes = self._nodes(stages)
+        require(
+            entry.width <= _SUM_BITS,
+            f"a decimator of the C model must have at most {_SUM_BITS} bits, not {entry.width}",
+        )
+        cursor.expect(self._decimator_words(SUMS))
+        return nodes
+
+    def _decimator_words(self, text: str) -> str:
+        """Return a text about a decimator with its words; an empty one without a decimator."""
+        entry = self._certificate.decimation
+        if entry is None:
+            return ""
+        inputs = self._certificate.inputs
+        codes = ", ".join(f"{port.name}_code" for port in inputs)
+        taken, flags = inputs[0], "uint8_t flags;"
+        ahead = entry.calibration is not None
+        return filled(
+            text,
+            NAME=self._name,
+            STAGES=entry.stages,
+            LAST=entry.stages - 1,
+            TAKEN=self._parameters(inputs, self._channel),
+            FIRST=f"{flags} const int64_t code = ahead_step(NULL, {codes}, &flags);"
+            if ahead
+            else f"const int64_t code = {codes}; {flags}",
+            WARM=entry.stages * entry.factor,
+            FACTOR=entry.factor,
+            KEPT="flags" if ahead else "at_rail",
+            SEEN="flags & 0x03" if ahead else f"code == {taken.lowest} || code == {taken.highest}",
+            HALF=1 << entry.dropped >> 1,
+            DROPPED=entry.dropped,
+            CHANNEL=self._channel,
+            MASK="0x03" if ahead else "0x01",
+            PASSED="state->flags" if ahead else "(state->at_rail ? 0x01 : 0)",
+        )
+
+
+def _literal(number: int) -> str:
+    """Write a number that may be wider than 64 bits."""
+    if abs(number) < 1 << 63:
+        return f"INT64_C({number})"
+    high, low = divmod(number, 1 << 62)
+    return f"((__int128)INT64_C({high}) * (INT64_C(1) << 62) + INT64_C({low}))"

@@ -1,0 +1,237 @@
+"""What an expression of a C model computes: its type, the range of its values, and its form.
+
+A form is a polynomial in variables and in what is not polynomial: shifts to the right, remainders, quotients and
+choices of forms. Two equal forms have the same value whatever the variables are. Each operation is checked to stay in
+its type, and each conversion to keep the value, so that C computes with integers as such. A shift of a
+negative value to the right is taken to round down, which C leaves to the compiler.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from sosmith.verify.c_model.cursor import Cursor
+from sosmith.verify.graph import RejectedError
+
+BITS = {"int": 32, "int64_t": 64, "__int128": 128}
+"""Bits of the signed types, which rise in rank."""
+
+Form = tuple[tuple[tuple[object, ...], int], ...]
+"""A polynomial: pairs of a sorted product of atoms and its factor, sorted. Atoms are texts, or tuples of forms."""
+
+
+class Value(NamedTuple):
+    """An expression's type, the range of its values, and its form."""
+
+    type: str
+    low: int
+    high: int
+    form: Form
+
+
+def fits(kind: str, low: int, high: int) -> bool:
+    """Whether a type holds all values of a range."""
+    limit = 1 << (BITS[kind] - 1)
+    return -limit <= low and high < limit
+
+
+def variable(name: str) -> Form:
+    """Return the form of a variable."""
+    return (((name,), 1),)
+
+
+def number(value: int) -> Form:
+    """Return the form of a number."""
+    return (((), value),) if value else ()
+
+
+def total(*terms: tuple[Form, int]) -> Form:
+    """Return the sum of forms times numbers."""
+    sums: dict[tuple[object, ...], int] = {}
+    for form, factor in terms:
+        for atoms, value in form:
+            sums[atoms] = sums.get(atoms, 0) + factor * value
+    return _sorted(sums)
+
+
+def product(a: Form, b: Form) -> Form:
+    """Return the product of two forms."""
+    sums: dict[tuple[object, ...], int] = {}
+    for left, x in a:
+        for right, y in b:
+            atoms = tuple(sorted((*left, *right), key=repr))
+            sums[atoms] = sums.get(atoms, 0) + x * y
+    return _sorted(sums)
+
+
+def _sorted(sums: Mapping[tuple[object, ...], int]) -> Form:
+    return tuple(sorted(((atoms, value) for atoms, value in sums.items() if value), key=repr))
+
+
+def shifted(form: Form, places: int, low: int, high: int) -> Form:
+    """Return the form of a shift to the right that rounds down; beyond the range all places are the sign."""
+    places = min(places, max(low.bit_length(), high.bit_length()))
+    return form if places == 0 else ((((">>", form, places),), 1),)
+
+
+def masked(form: Form, mask: int) -> Form:
+    """Return the form of the lowest bits."""
+    return () if mask == 0 else (((("&", form, mask),), 1),)
+
+
+def quotient(form: Form, divisor: int) -> Form:
+    """Return the form of a division that rounds towards zero."""
+    return form if divisor == 1 else (((("/", form, divisor),), 1),)
+
+
+def choice(mark: str, left: Form, right: Form, then: Form, other: Form) -> Form:
+    """Return the form of ``left mark right ? then : other``."""
+    return (((("?", mark, left, right, then, other),), 1),)
+
+
+class Reader:
+    """Reads expressions.
+
+    Parameters
+    ----------
+    cursor : Cursor
+        Where they stand.
+    names : mapping of str to Value
+        What names mean, members such as ``w->n0_1`` too.
+    """
+
+    def __init__(self, cursor: Cursor, names: Mapping[str, Value]) -> None:
+        self._cursor = cursor
+        self._names = names
+
+    def expression(self) -> Value:
+        """Read an expression.
+
+        Raises
+        ------
+        RejectedError
+            If it is no expression of a model, or may leave its type.
+        """
+        left = self._shift()
+        if self._cursor.next == "&":
+            return self._masked(left)
+        if self._cursor.next not in {"<", ">"}:
+            return left
+        mark = self._cursor.take()
+        right = self._shift()
+        self._cursor.expect("?")
+        then = self.expression()
+        self._cursor.expect(":")
+        other = self.expression()
+        kind = _wider(then.type, other.type)
+        form = choice(mark, left.form, right.form, then.form, other.form)
+        return Value(kind, min(then.low, other.low), max(then.high, other.high), form)
+
+    def _masked(self, left: Value) -> Value:
+        self._cursor.expect("&")
+        mask = self._constant(self._shift(), "a mask")
+        if mask.low + 1 & mask.low or mask.low < 0:
+            raise self._cursor.refused("a mask of the lowest bits")
+        if self._cursor.next in {"<", ">", "&"}:  # which C would take first
+            raise self._cursor.refused("brackets around a remainder")
+        return Value(_wider(left.type, mask.type), 0, mask.low, masked(left.form, mask.low))
+
+    def _shift(self) -> Value:
+        left = self._sum()
+        while self._cursor.next in {"<<", ">>"}:
+            mark = self._cursor.take()
+            places = self._constant(self._sum(), "a number of places").low
+            if not 0 <= places < BITS[left.type]:
+                raise self._cursor.refused("a shift by fewer places than there are")
+            if mark == ">>":
+                form = shifted(left.form, places, left.low, left.high)
+                left = Value(left.type, left.low >> places, left.high >> places, form)
+            elif left.low < 0:
+                raise self._cursor.refused("a shift to the left of what is not negative")
+            else:
+                form = total((left.form, 1 << places))
+                left = self._held(Value(left.type, left.low << places, left.high << places, form))
+        return left
+
+    def _sum(self) -> Value:
+        left = self._product()
+        while self._cursor.next in {"+", "-"}:
+            sign = 1 if self._cursor.take() == "+" else -1
+            right = self._product()
+            ends = sorted((sign * right.low, sign * right.high))
+            form = total((left.form, 1), (right.form, sign))
+            kind = _wider(left.type, right.type)
+            left = self._held(Value(kind, left.low + ends[0], left.high + ends[1], form))
+        return left
+
+    def _product(self) -> Value:
+        left = self._cast()
+        while self._cursor.next in {"*", "/"}:
+            if self._cursor.take() == "*":
+                right = self._cast()
+                ends = [a * b for a in (left.low, left.high) for b in (right.low, right.high)]
+                kind = _wider(left.type, right.type)
+                left = self._held(Value(kind, min(ends), max(ends), product(left.form, right.form)))
+            else:
+                divisor = self._constant(self._cast(), "a divisor")
+                if divisor.low <= 0:
+                    raise self._cursor.refused("a positive divisor")
+                low, high = (_towards_zero(end, divisor.low) for end in (left.low, left.high))
+                kind = _wider(left.type, divisor.type)
+                left = Value(kind, low, high, quotient(left.form, divisor.low))
+        return left
+
+    def _cast(self) -> Value:
+        if self._cursor.next == "(" and self._cursor.ahead(1) in BITS and self._cursor.ahead(2) == ")":
+            self._cursor.expect("(")
+            kind = self._cursor.take()
+            self._cursor.expect(")")
+            return self._held(self._cast()._replace(type=kind))
+        return self._primary()
+
+    def _primary(self) -> Value:
+        if self._cursor.accepts("("):
+            inner = self.expression()
+            self._cursor.expect(")")
+            return inner
+        if self._cursor.accepts("INT64_C"):
+            self._cursor.expect("(")
+            sign = -1 if self._cursor.accepts("-") else 1
+            value = sign * int(self._cursor.take(r"\d{1,19}"))
+            self._cursor.expect(")")
+            if abs(value) >= 1 << 63:
+                raise self._cursor.refused("a constant of 64 bits")
+            return Value("int64_t", value, value, number(value))
+        if self._cursor.next.isdigit():
+            value = int(self._cursor.take(r"\d{1,9}"))
+            return Value("int", value, value, number(value))
+        name = self._cursor.take(r"[A-Za-z_]\w*")
+        if self._cursor.accepts("->"):
+            name += "->" + self._cursor.take(r"\w+")
+            if self._cursor.accepts("["):
+                name += "[" + self._cursor.take(r"\d+") + "]"
+                self._cursor.expect("]")
+        if name not in self._names:
+            raise self._cursor.refused(f"something other than {name!a}, which has no value here")
+        return self._names[name]
+
+    def _constant(self, value: Value, what: str) -> Value:
+        if value.low != value.high:
+            raise self._cursor.refused(f"{what} that is constant")
+        return value
+
+    def _held(self, value: Value) -> Value:
+        if not fits(value.type, value.low, value.high):
+            raise RejectedError(
+                f"{self._cursor.refused('values in their range')}: {value.low}..{value.high} is not in {value.type}"
+            )
+        return value
+
+
+def _wider(a: str, b: str) -> str:
+    return a if BITS[a] >= BITS[b] else b
+
+
+def _towards_zero(value: int, divisor: int) -> int:
+    return value // divisor if value >= 0 else -(-value // divisor)

@@ -1,0 +1,206 @@
+"""What stands around the stages of a C model: token for token, it can only be what is written here.
+
+Why it is right. `step` runs the stages one after the other on one sample. `tick` runs stage k with sample n - k, the
+last stage first: what stage k takes was stored by stage k - 1 at the tick before, with sample n - k, and no other stage
+stores it. `partial_tick` runs those stages alone whose sample is one of 0..samples - 1. `without_status` runs the ticks
+0..samples + behind - 1 in their order, those with all stages four at a time; so each stage works on each sample once,
+in order, and its states, which no other stage has, are those of `step`. A decimator adds modulo 2**64, without a sign;
+its differences are the moving sums, which fit 64 bits with a sign.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+BEGIN = """
+#include "NAME.h"
+
+#include <string.h>
+
+#ifdef __GNUC__
+#define ALWAYS_INLINE inline __attribute__((always_inline))
+#else
+#define ALWAYS_INLINE inline
+#endif
+"""
+
+RESET = "void NAME_reset(NAME_state *state) { memset(state, 0, sizeof *state); }"
+
+WEAR = """
+uint8_t NAME_wear_flags(size_t channel, int64_t code) {
+    static const int64_t limits[COUNT][2] = { LIMITS };
+    const int64_t *const limit = limits[WHICH];
+    UNUSED
+    return (uint8_t)((code >= limit[0]) << 3 | (code >= limit[1]) << 4);
+}
+"""
+
+STEP = """
+static ALWAYS_INLINE int64_t PREFIXstep(NAME_state *state, PARAMETERS, uint8_t *status) {
+    PREFIXwires w;
+    SET
+    RUN
+    if (status)
+        *status = STATUS;
+    return (int64_t)w.RESULT;
+}
+"""
+
+BLOCK = """
+int64_t NAME_step(NAME_state *state, PARAMETERS, uint8_t *status) {
+    return step(state, ARGUMENTS, status);
+}
+
+static void with_status(NAME_state *state, size_t samples, size_t channels, size_t c, const int64_t *in,
+                        int64_t *out, uint8_t *status) {
+    NAME_state local = *state;
+    for (size_t n = 0; n < samples; n++) {
+        out[n * channels + c] = step(&local, CODES, &status[n * channels + c]);
+    }
+    *state = local;
+}
+
+static const size_t behind = BEHIND;
+
+static ALWAYS_INLINE void tick(NAME_state *state, wires *w, size_t n, size_t first, size_t last, size_t channels,
+                               size_t c, const int64_t *in, int64_t *out) {
+    TICKS
+}
+
+static void partial_tick(NAME_state *state, wires *w, size_t n, size_t samples, size_t channels, size_t c,
+                         const int64_t *in, int64_t *out) {
+    tick(state, w, n, n < samples ? 0 : n - samples + 1, n > behind ? behind : n, channels, c, in, out);
+}
+
+static void without_status(NAME_state *state, size_t samples, size_t channels, size_t c, const int64_t *in,
+                           int64_t *out) {
+    NAME_state local;
+    wires w, passing;
+    size_t n;
+    memset(&w, 0, sizeof w);
+    for (n = 0; n != behind; n++)
+        partial_tick(state, &w, n, samples, channels, c, in, out);
+    local = *state;
+    passing = w;
+    for (; n + 4 <= samples; n += 4) {
+        tick(&local, &passing, n, 0, behind, channels, c, in, out);
+        tick(&local, &passing, n + 1, 0, behind, channels, c, in, out);
+        tick(&local, &passing, n + 2, 0, behind, channels, c, in, out);
+        tick(&local, &passing, n + 3, 0, behind, channels, c, in, out);
+    }
+    *state = local;
+    w = passing;
+    for (; n < samples + behind; n++)
+        partial_tick(state, &w, n, samples, channels, c, in, out);
+}
+
+void NAME_block(NAME_state *states, size_t samples, size_t channels, const int64_t *in, int64_t *out, uint8_t *status) {
+    const size_t turn = channels > 1 ? 64 + 16384 / channels : samples;
+    for (size_t done = 0; done < samples; done += turn) {
+        const size_t now = samples - done < turn ? samples - done : turn;
+        const size_t at = done * channels;
+        for (size_t c = 0; c < channels; c++)
+            if (status)
+                with_status(&states[c], now, channels, c, &in[at * INPUTS], &out[at], &status[at]);
+            else
+                without_status(&states[c], now, channels, c, &in[at * INPUTS], &out[at]);
+    }
+}
+"""
+
+SUMS = """
+static void integrate(NAME_decimator *state, int64_t code) {
+    uint64_t sum = (uint64_t)code;
+    for (size_t k = 0; k < STAGES; k++)
+        sum = state->sums[k] += sum;
+}
+
+static int64_t comb(NAME_decimator *state) {
+    uint64_t value = state->sums[LAST];
+    for (size_t k = 0; k < STAGES; k++) {
+        const uint64_t now = value;
+        value -= state->combs[k];
+        state->combs[k] = now;
+    }
+    return (int64_t)value;
+}
+
+int NAME_push(NAME_decimator *state, TAKEN, int64_t *result, uint8_t *status) {
+    FIRST
+    int found = 0;
+    if (!state->started) {
+        for (size_t k = 0; k < WARM; k++) {
+            integrate(state, code);
+            if (k % FACTOR == 0)
+                comb(state);
+        }
+        state->started = 1;
+    }
+    integrate(state, code);
+    state->KEPT |= SEEN;
+    if (state->phase == 0) {
+        const int64_t rounded = (comb(state) + HALF) >> DROPPED;
+        *result = step(&state->filter, CHANNEL rounded, &flags);
+        if (status)
+            *status = (uint8_t)((flags & ~MASK) | PASSED);
+        state->KEPT = 0;
+        found = 1;
+    }
+    state->phase = (state->phase + 1) % FACTOR;
+    return found;
+}
+"""
+
+HEADER = """
+#ifndef GUARD_H
+#define GUARD_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct { WORD s[WORDS]; } NAME_state;
+
+void NAME_reset(NAME_state *state);
+int64_t NAME_step(NAME_state *state, PARAMETERS, uint8_t *status);
+WEAR
+void NAME_block(NAME_state *states, size_t samples, size_t channels, const int64_t *in, int64_t *out, uint8_t *status);
+DECIMATOR
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
+"""
+
+DECIMATOR = """
+typedef struct {
+    uint64_t sums[STAGES], combs[STAGES];
+    unsigned phase, started, KEPT;
+    NAME_state filter;
+} NAME_decimator;
+
+int NAME_push(NAME_decimator *state, TAKEN, int64_t *result, uint8_t *status);
+"""
+
+
+def filled(text: str, **words: object) -> str:
+    """Return a text with its words in capitals replaced, all at once."""
+    keys = "|".join(sorted(words, key=len, reverse=True))
+    return re.sub(rf"\b(?:{keys})", lambda found: str(words[found[0]]), text)
+
+
+def ticks(prefix_codes: Sequence[tuple[str, str]], stages: int, result: str) -> str:
+    """Return the body of `tick`; `prefix_codes` are the members of the inputs and the codes they are set to."""
+    parts = []
+    for k in reversed(range(stages)):
+        condition = f"first <= {k} && {k} <= last" if k else "first == 0"
+        given = "".join(f"w->{member} = {code};" for member, code in prefix_codes) if k == 0 else ""
+        taken = f"out[(n - behind) * channels + c] = (int64_t)w->{result};" if k == stages - 1 else ""
+        parts.append(f"if ({condition}) {{ {given} stage{k}(state, w); {taken} }}")
+    return "\n".join(parts)
