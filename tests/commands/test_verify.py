@@ -26,7 +26,7 @@ SPEC = EXAMPLES / f"{NAME}.toml"
 
 command = Invocation("verify", columns=200)
 
-NOT_READ = ("liveness", "rtlil")
+NOT_READ = ("rtlil",)
 """What is read of no core."""
 
 
@@ -71,10 +71,11 @@ def test_against_everything(folder: Path) -> None:
         "arithmetic": "proven",
         "filter": "proven",
         "manifest": "partial",
-        "hardware": "partial",
+        "hardware": "proven",
         "program": "proven",
-        "unit": "not_read",
-        "flags": "not_read",
+        "unit": "proven",
+        "flags": "proven",
+        "liveness": "proven",
         "c_model": "proven",
         **dict.fromkeys(NOT_READ, "not_read"),
     }

@@ -167,7 +167,10 @@ def _files_proven(
     check_ports(modules[certificate.name], item)
     manifest = read_manifest(content_of(folder / f"{certificate.name}.json"), certificate, item)
     proofs, decimator = _hardware_proven(certificate, item, text, progress)
-    manifest.hold_clocks(proofs.hardware if certificate.decimation is None else None)
+    if certificate.decimation is None:
+        manifest.hold_clocks(proofs.hardware, None if proofs.unit is None else proofs.unit.progress)
+    else:
+        manifest.hold_clocks(None, None)
     manifest.hold_program(None if proofs.program is None else _program_of(certificate, text))
     progress("C model", 0, 0)
     model = check_c_model(*(unicode_text(folder / f"{certificate.name}.{end}") for end in "ch"), certificate, item)

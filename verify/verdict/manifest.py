@@ -16,6 +16,7 @@ from sosmith.verify.certificate_file import Certificate, ItemEntry, PortEntry, S
 from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.parallel.check import HardwareVerdict
 from sosmith.verify.program.text import ProgramText
+from sosmith.verify.progress import Progress
 from sosmith.verify.specified.words import table_of, words_of
 from sosmith.verify.verdict.derived import (
     Figure,
@@ -54,13 +55,20 @@ class Manifest:
     tree: Mapping[str, Any]
     open: list[str] = field(default_factory=list)
 
-    def hold_clocks(self, found: HardwareVerdict | None) -> None:
-        """Hold the clocks against those of a proven pipeline, which takes a sample at each; None without one."""
-        if found is None:
-            self.open += _CLOCKS
+    def hold_clocks(self, pipeline: HardwareVerdict | None, unit: Progress | None) -> None:
+        """Hold the clocks against those of a proven pipeline, which takes a sample at each, or of a proven unit.
+
+        Of a unit, the latency is a limit, which a result must keep.
+        """
+        if pipeline is not None:
+            for key, value in zip(_CLOCKS, (pipeline.clearing, pipeline.latency, 1), strict=True):
+                _compare(key, self.tree[key], value)
             return
-        for key, value in zip(_CLOCKS, (found.clearing, found.latency, 1), strict=True):
-            _compare(key, self.tree[key], value)
+        if unit is not None:
+            stated = self.tree["latency_cycles"]
+            kept = isinstance(stated, int) and stated >= unit.given
+            require(kept, f"latency_cycles in the manifest must be at least {unit.given}, not {_cut(stated)}")
+        self.open += [key for key in _CLOCKS if unit is None or key != "latency_cycles"]
 
     def hold_program(self, found: ProgramText | None) -> None:
         """Hold the schedule against the program that was read from the hardware; None if none was."""
