@@ -9,6 +9,7 @@ from tests.verify.small_specifications import INSTRUMENT, PLAIN, STEADY, STEADY_
 from tests.verify.unit.units import SEVERAL, WORN, Unit, unit
 
 from sosmith.hdl.plan.folded_clocks import cycles_per_sample, reset_cycles
+from sosmith.verify.graph import RejectedError
 
 # What the generator writes is accepted.
 
@@ -20,7 +21,7 @@ from sosmith.hdl.plan.folded_clocks import cycles_per_sample, reset_cycles
         (STEADY, "serial", 1),
         (INSTRUMENT, "folded", 1),
         (STEADY_INSTRUMENT + WORN, "serial", 2),
-        (STEADY_INSTRUMENT + SEVERAL, "folded", 3),
+        (SEVERAL, "folded", 3),
     ],
     ids=["folded", "serial", "settling", "wear", "several limits"],
 )
@@ -266,3 +267,64 @@ def test_each_break_of_a_folded_unit_is_named(kind: str) -> None:
 @pytest.mark.parametrize("kind", SERIAL_BREAKS)
 def test_each_break_of_a_serial_unit_is_named(kind: str) -> None:
     _named(unit(STEADY, "serial"), *SERIAL_BREAKS[kind])
+
+
+FLAG_BREAKS = {
+    "a limit of wear": (
+        r"wear_limits\[1\] = \d+'h(\w+)\w;",
+        r"wear_limits[1] = 24'h\g<1>1;",
+        "wear_limits must hold the .*",
+    ),
+    "limits of another channel": (
+        r"wear_limits\[channel\]",
+        "wear_limits[s_axis_tdest[1:0]]",
+        "wear_limits must be read .*",
+    ),
+    "wear that is above its limit": (r"(assign m_axis_tuser\[3\] = .*) >= ", r"\1 > ", "bit 3 of m_axis_tuser must .*"),
+    "no wear": (r"(assign m_axis_tuser\[4\] = ).*;", r"\g<1>1'h0;", "bit 4 of m_axis_tuser must be wear_critical, .*"),
+    "another channel": (
+        r"(assign m_axis_tdest = )\{ 6'h00, channel \};",
+        r"\1s_axis_tdest;",
+        "m_axis_tdest must be .*",
+    ),
+    "a channel that does not stay": (
+        r"else if \(enable\d+\) channel <=",
+        "else channel <=",
+        "bits of x must not be used",
+    ),
+    "bits of another channel": (
+        r"start \? s_axis_tdest\[1:0\]",
+        "start ? s_axis_tdest[2:1]",
+        "channel must be that of .*",
+    ),
+    "words of another channel": (r"words0\[\{ channel, ", "words0[{ s_axis_tdest[1:0], ", "words0 must be used for .*"),
+    "a channel too many": (
+        r"s_axis_tdest < 2'h3",
+        "s_axis_tdest <= 2'h3",
+        "valid1 must not depend on data at instruction 0",
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", FLAG_BREAKS)
+def test_each_break_of_flags_and_channels_is_named(kind: str) -> None:
+    _named(unit(SEVERAL, "folded", 3), *FLAG_BREAKS[kind])
+
+
+def test_a_flag_that_the_program_judges_is_that_of_its_sample() -> None:
+    """It is followed through all states: taken over a clock early, it would be that of the sample before."""
+    core = unit(PLAIN)
+    text, count = re.subn(
+        r"if \(n\d+\) judged <= \{ settling, ", "if (m_axis_tvalid) judged <= { settling, ", core.text
+    )
+    assert count == 1
+    assert core.rejection(text) == "judged must be copy after a clock, not another value"
+    text, count = re.subn(r"(if \(n\d+\)) settling <= added\[26\];", r"\1 settling <= added[25];", core.text)
+    assert count == 1
+    assert core.rejection(text) == "settling must be judge after a clock, not another value"
+
+
+def test_a_text_without_a_unit_is_refused() -> None:
+    core = unit(STEADY)
+    with pytest.raises(RejectedError, match=r"^the unit must have a register instruction4$"):
+        core.check(core.text.replace("instruction4", "instruction9"))

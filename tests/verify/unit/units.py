@@ -7,6 +7,7 @@ from functools import cache
 
 from tests.verify.parallel.simulated import Simulation
 from tests.verify.program.programs import Made, small
+from tests.verify.small_specifications import STEADY_INSTRUMENT
 
 from sosmith.verify.certificate_file import AboutEntry, Certificate, ItemEntry
 from sosmith.verify.graph import RejectedError
@@ -22,7 +23,7 @@ warning = 2.0
 limit = 4.0
 """
 
-SEVERAL = WORN.replace("3.0", "[3.0, 3.5, 4.0]")
+SEVERAL = "channels = 3\n" + STEADY_INSTRUMENT + WORN.replace("3.0", "[3.0, 3.5, 4.0]")
 
 
 def stated(core: Made) -> Certificate:
