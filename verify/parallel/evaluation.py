@@ -149,10 +149,9 @@ class Evaluation:
                 return self._cut(whole, low)  # what stages hand on is a variable, and so are its bits made of it
         drivers = self._netlist.drivers.get(name)
         if drivers is None or name in self._cuts:
-            require(
-                name in self._cuts or name in self._netlist.registers or self._netlist.ports.get(name) == "input",
-                f"{name} must be driven to be used",
-            )
+            known = name in self._cuts or name in self._netlist.registers or self._netlist.ports.get(name) == "input"
+            none = "bits of x must not be used" if name.startswith("?") else f"{name} must be driven to be used"
+            require(known, none)
             part = self._fields(name, low, width)
             return self._cut(self._content(name), low) if part is None else part
         total: Form = {}

@@ -35,8 +35,8 @@ class Output:
     contexts : Contexts
     stages : Stages
     certificate : Certificate
-        Whose graph says how a result is limited, whose ports have rails, and whose item at what codes the output is worn:
-        without an item, the flags of wear are left out.
+        Whose graph says how a result is limited, and whose ports have rails. Its item says at what codes the output is
+        worn; without an item, the flags of wear are left out.
 
     Attributes
     ----------

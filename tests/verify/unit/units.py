@@ -7,8 +7,9 @@ from functools import cache
 
 from tests.verify.parallel.simulated import Simulation
 from tests.verify.program.programs import Made, small
+from tests.verify.small_specifications import STEADY_INSTRUMENT
 
-from sosmith.verify.certificate_file import AboutEntry, Certificate
+from sosmith.verify.certificate_file import AboutEntry, Certificate, ItemEntry
 from sosmith.verify.graph import RejectedError
 from sosmith.verify.parallel.netlist import flattened
 from sosmith.verify.program.check import check_program
@@ -22,32 +23,33 @@ warning = 2.0
 limit = 4.0
 """
 
+SEVERAL = "channels = 3\n" + STEADY_INSTRUMENT + WORN.replace("3.0", "[3.0, 3.5, 4.0]")
 
-def stated(core: Made, spec: str) -> Certificate:
-    """Return the certificate of a core with the words of its specification."""
-    about = AboutEntry(specification=spec, sha256="0" * 64, options={}, files=(), versions={}, certificate="0" * 64)
+
+def stated(core: Made) -> Certificate:
+    """Return the certificate of a core with what it says of the flags."""
+    item = ItemEntry.model_construct(wear=core.design.datapath.wear, calibrated=core.design.datapath.calibrated)
+    about = AboutEntry.model_construct(item=item)
     return core.certificate.model_copy(update={"about": about})
 
 
 class Unit:
-    """A core with the words of its specification."""
+    """A core with what its certificate says of it."""
 
-    def __init__(
-        self, spec: str, architecture: str = "folded", channels: int = 1, realization: str = "df1_ef1"
-    ) -> None:
+    def __init__(self, spec: str, architecture: str, channels: int, realization: str) -> None:
         self.core = small(spec, architecture, realization, channels)
-        self.certificate = stated(self.core, spec)
+        self.certificate = stated(self.core)
         self.text, self.channels, self._serial = self.core.text, channels, architecture == "serial"
 
     def check(self, text: str | None = None) -> UnitVerdict:
         return check_unit(text or self.text, self.certificate, serial=self._serial)
 
     def rejection(self, text: str) -> str:
-        """Return the sentence of a rejection, of the program or of the unit; nothing if a text is accepted."""
-        ends = [(port.lowest, port.highest) for port in self.certificate.inputs]
+        """Return the sentence of a rejection, of the unit or of the program; nothing if a text is accepted."""
+        everything = tuple((port.lowest, port.highest) for port in self.certificate.inputs)
         try:
-            check_program(text, self.certificate, calibrated=ends)
             self.check(text)
+            check_program(text, self.certificate, calibrated=self.core.design.datapath.calibrated or everything)
         except RejectedError as error:
             return str(error)
         return ""

@@ -24,10 +24,10 @@ def print_proof(certificate: Entries, proof: Proof) -> None:
     programs = [found.instructions for found in (proof.calibration, proof.program) if isinstance(found, ProgramVerdict)]
     if programs:
         both = len(programs) > 1
+        unproven = f"; the unit{'s' * both} that run{'s' * (not both)} them {'are' if both else 'is'} not part of it"
         console.print(
             f"[bold green]program{'s' * both}[/]: {' and '.join(map(str, programs))} instructions in the SystemVerilog "
-            f"compute these graphs, for all inputs and states; the unit{'s' * both} that run{'s' * (not both)} them "
-            f"{'are' if both else 'is'} not part of it"
+            f"compute these graphs, for all inputs and states{'' if proof.is_unit_proven else unproven}"
         )
     if isinstance(proof.calibration, HardwareVerdict):
         _print_hardware(console, "calibration", proof.calibration)
