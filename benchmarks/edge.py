@@ -18,13 +18,13 @@ from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
-from tests.edge.environments import COMMANDS, tried
 from tests.edge.hostile_alarms import published
 from tests.edge.hostile_board import to_model, to_netlist
-from tests.edge.hostile_page import attacked
 from tests.edge.hostile_run import hostile_run
-from tests.edge.kills import duration, killed
-from tests.edge.writers import QUICK, WHOLE
+from tests.edge.pages.hostile_page import attacked
+from tests.edge.processes.environments import COMMANDS, tried
+from tests.edge.processes.kills import duration, killed
+from tests.edge.processes.writers import QUICK, WHOLE
 
 ROOT = Path(__file__).resolve().parent.parent
 RECORD = ROOT / "benchmarks" / "edge.json"

@@ -21,7 +21,7 @@ from websockets.sync.client import connect
 from sosmith.host.page import LivePage
 from sosmith.host.readings import Readings
 from sosmith.studio.server import Studio
-from tests.edge import hostile_browser as browser
+from tests.edge.pages import hostile_browser as browser
 from tests.host.lines import device_of
 from tests.interface.small import instrument_design
 from tests.studio.sessions import session_in
