@@ -1,7 +1,7 @@
 """The edge of the house: what comes from outside lies. Counts go to benchmarks/edge.json and docs/assurance.md.
 
 python -m benchmarks.edge                  all parts, and record
-python -m benchmarks.edge --part pages     one part, and record; parts: host, board, pages, kills, environments, alarms
+python -m benchmarks.edge --part kills     one part, and record; see `PARTS`
 python -m benchmarks.edge --check          a share of each part without a record, status 1 if there is a finding
 python -m benchmarks.edge --document       only write the document from the record
 """
@@ -18,13 +18,13 @@ from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
-from tests.edge.environments import COMMANDS, tried
 from tests.edge.hostile_alarms import published
 from tests.edge.hostile_board import to_model, to_netlist
-from tests.edge.hostile_page import attacked
 from tests.edge.hostile_run import hostile_run
-from tests.edge.kills import duration, killed
-from tests.edge.writers import QUICK, WHOLE
+from tests.edge.pages.hostile_page import attacked
+from tests.edge.processes.environments import COMMANDS, tried
+from tests.edge.processes.kills import duration, killed
+from tests.edge.processes.writers import QUICK, WHOLE
 
 ROOT = Path(__file__).resolve().parent.parent
 RECORD = ROOT / "benchmarks" / "edge.json"
@@ -70,18 +70,24 @@ def board(share: int) -> Rows:
     }
 
 
-def pages(share: int) -> Rows:
-    """Say hostile things to the studio and to the page of a monitor."""
-    rows: Rows = {}
-    for name, shown in (("studio", "studio"), ("monitor", "page of `monitor`")):
-        heard = [attacked(name, seed, 1000 // share) for seed in range(_FIRST, _FIRST + 10)]
-        findings = [one for each in heard for one in each.findings]
-        _tell(name, findings)
-        rows |= {
-            f"{shown}: hostile requests, frames and messages": sum(each.messages for each in heard),
-            f"{shown}: findings": len(findings),
-        }
-    return rows
+def studio(share: int) -> Rows:
+    """Say hostile things to the studio."""
+    return _page("studio", "studio", share)
+
+
+def page(share: int) -> Rows:
+    """Say hostile things to the page of a monitor."""
+    return _page("monitor", "page of `monitor`", share)
+
+
+def _page(name: str, shown: str, share: int) -> Rows:
+    heard = [attacked(name, seed, 1000 // share) for seed in range(_FIRST, _FIRST + 10)]
+    findings = [one for each in heard for one in each.findings]
+    _tell(name, findings)
+    return {
+        f"{shown}: hostile requests, frames and messages": sum(each.messages for each in heard),
+        f"{shown}: findings": len(findings),
+    }
 
 
 def kills(share: int) -> Rows:
@@ -127,7 +133,8 @@ def alarms(share: int) -> Rows:
 PARTS: dict[str, Callable[[int], Rows]] = {
     "host": host,
     "board": board,
-    "pages": pages,
+    "studio": studio,
+    "page": page,
     "kills": kills,
     "environments": environments,
     "alarms": alarms,

@@ -1,15 +1,19 @@
 """The serial port: a whole session over a pseudo-terminal, ports that are taken, and ports that vanish."""
 
+import os
 import threading
 from pathlib import Path
 
 import numpy as np
 import pytest
+import serial
 from tests.host.lines import device_of, plain_device
 from tests.host.ports import plugged
 from tests.interface.small import filter_design
 
 import sosmith
+from sosmith.model.link.device import Device
+from sosmith.sim.virtual_board.terminal import Terminal
 
 
 @pytest.mark.parametrize("baud", [115_200, 1_000_000, 3_000_000])
@@ -72,3 +76,35 @@ def test_unplugging_in_the_middle_of_a_stream() -> None:
     thread.join(20)
     assert [type(error) for error in lost] == [sosmith.LinkLostError]
     board.close()
+
+
+def test_a_port_that_vanishes_while_it_is_opened(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Between the opening and the look at what waits; termios has an error of its own, which is no OSError."""
+    terminal = Terminal()
+    real = serial.Serial.reset_input_buffer
+
+    def unplugged(port: serial.Serial) -> None:
+        terminal.__exit__(None, None, None)
+        real(port)
+
+    monkeypatch.setattr(serial.Serial, "reset_input_buffer", unplugged)
+    message = rf"^{terminal.path} must be a serial port that is free, not: Input/output error$"
+    with pytest.raises(sosmith.ToolError, match=message):
+        sosmith.Board(terminal.path)
+
+
+def test_a_port_that_vanishes_after_any_byte() -> None:
+    for sent in (0, 1, 2, 11, 12, 13, 80):
+        terminal, device = Terminal(), plain_device()
+
+        def answer(left: int, terminal: Terminal = terminal, device: Device = device) -> None:
+            while left > 0:
+                said = device.feed(os.read(terminal.end, 4096))[:left]
+                left -= os.write(terminal.end, said)
+            terminal.__exit__(None, None, None)
+
+        board = threading.Thread(target=answer, args=(sent,))
+        board.start()
+        with pytest.raises(sosmith.ToolError, match=r"^/dev/pts/\d+ must (stay connected|be a serial port)"):
+            sosmith.Board(terminal.path)
+        board.join()

@@ -11,7 +11,7 @@ import pytest
 from tests.suite.extras import needed
 
 from sosmith.host.recording import check_output, recording
-from sosmith.model.errors import SpecificationError
+from sosmith.model.errors import SpecificationError, ToolError
 
 COLUMNS = ("time_s", "clearance_mm", "status")
 TEXT = "time_s,clearance_mm,status\n0.0,1.5,0\n0.01,1.25,4\n"
@@ -201,3 +201,49 @@ def test_an_interruption_leaves_a_complete_recording(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         record()
     assert parquet.read_table(path).num_rows == 1
+
+
+def test_in_parquet_what_a_row_looks_like_decides_no_type(tmp_path: Path) -> None:
+    """A digest may look like a number, and a clock may be set to any year, after as many rows as there are."""
+    parquet = needed("pyarrow.parquet")
+    path = tmp_path / "rows.parquet"
+    first, last = ("2026-01-01T00:00:00.500000Z", "0123456789e1"), ("9999-12-31T23:59:59.000000Z", "012345678901")
+    with recording(path, ("utc", "board")) as made:
+        made.add([first] * 30_000)
+        made.add([last])
+    found = parquet.read_table(path)
+    assert found.column("board").to_pylist() == [first[1]] * 30_000 + [last[1]]
+    assert found.column("utc").to_pylist()[-1].isoformat() == "9999-12-31T23:59:59+00:00"
+
+
+def test_rows_that_somebody_has_changed_are_told(tmp_path: Path) -> None:
+    needed("pyarrow.parquet")
+    path = tmp_path / "rows.parquet"
+
+    def record() -> None:
+        with recording(path, ("utc", "board")) as made:
+            made.add([("yesterday", "a")])
+
+    with pytest.raises(ToolError) as caught:
+        record()
+    assert str(caught.value).startswith(f"{path}: the rows in {path}.rows.csv must be those that were recorded, not: ")
+    assert "\n" not in str(caught.value)
+    assert (tmp_path / "rows.parquet.rows.csv").read_text() == "utc,board\nyesterday,a\n"
+    assert not path.exists()
+
+
+@pytest.mark.parametrize("kind", ["link", "pipe", "file"])
+def test_what_lies_where_a_parquet_file_is_made_is_not_written_to(kind: str, tmp_path: Path) -> None:
+    needed("pyarrow.parquet")
+    place = tmp_path / "rows.parquet.part"
+    (tmp_path / "other").write_text("of others")
+    if kind == "link":
+        place.symlink_to("other")
+    elif kind == "pipe":
+        os.mkfifo(place)
+    else:
+        place.write_text("of a kill")
+    with recording(tmp_path / "rows.parquet", COLUMNS) as made:
+        made.add([(0.0, 1.5, 0)])
+    assert sorted(entry.name for entry in tmp_path.iterdir()) == ["other", "rows.parquet"]
+    assert (tmp_path / "other").read_text() == "of others"

@@ -54,10 +54,10 @@ class SerialLine:
     def __init__(self, port: str, baud: int) -> None:
         try:
             self._serial = serial.Serial(port, baud, timeout=0, write_timeout=10.0, exclusive=True)
-        except (serial.SerialException, OSError, ValueError) as error:
+            self._serial.reset_input_buffer()
+        except (serial.SerialException, OSError, ValueError, termios.error) as error:  # the last one: gone meanwhile
             raise ToolError(f"{port} must be a serial port that is free, not: {_reason(error)}") from None
         self._port = port
-        self._serial.reset_input_buffer()
 
     def write(self, data: bytes) -> None:
         """Send all of `data`; raises LinkLostError if the port is gone or takes nothing."""
@@ -86,8 +86,9 @@ class SerialLine:
 def _reason(error: Exception) -> str:
     """Return what the system says, without what pyserial puts around it."""
     number = error.errno if isinstance(error, OSError) else None
-    if isinstance(error.__context__, termios.error):
-        number = error.__context__.args[0]
+    for each in (error, error.__context__):
+        if isinstance(each, termios.error):
+            number = each.args[0]
     if number is None:
         return str(error)
     return _PLAIN.get(number) or os.strerror(number)

@@ -225,15 +225,29 @@ class ParquetRecording:
                 f"{self._path}: the disk must take the recording, not: {failure.strerror or failure}; "
                 f"its rows are in {self._journal}"
             ) from None
+        except ValueError as failure:  # as pyarrow's own, by rows that somebody else has changed
+            reason = str(failure).splitlines()[0]
+            raise ToolError(
+                f"{self._path}: the rows in {self._journal} must be those that were recorded, not: {reason}"
+            ) from None
         finally:
             self._rows.give_back()
 
     def _convert(self) -> None:
+        import pyarrow
         from pyarrow import csv as arrow
         from pyarrow import parquet
 
+        # What the first rows look like must not decide: a digest may look like a number, and a clock may be set far.
+        types = {"utc": pyarrow.timestamp("us", "UTC"), "board": pyarrow.string()}
+        options = arrow.ConvertOptions(column_types=types)
         unfinished = self._path.with_name(self._path.name + ".part")
-        with arrow.open_csv(self._journal) as batches, parquet.ParquetWriter(unfinished, batches.schema) as writer:
+        unfinished.unlink(missing_ok=True)  # of a kill; a link or a pipe there would be followed or waited for
+        with (
+            unfinished.open("xb") as file,
+            arrow.open_csv(self._journal, convert_options=options) as batches,
+            parquet.ParquetWriter(file, batches.schema) as writer,
+        ):
             for batch in batches:
                 writer.write_batch(batch)
         unfinished.replace(self._path)

@@ -14,6 +14,10 @@ Row = tuple[float, *tuple[float, ...]]
 """Time, channel if there are several, value, code, status."""
 
 
+TAKEN = frozenset({"utc", "time_s", "run", "session", "channel", "status", "board"})
+"""Names of columns that a value's must differ from."""
+
+
 def columns(identity: Identity) -> tuple[str, ...]:
     """Return the names of the columns: time_s, channel if there are several, the value with its unit, code, status."""
     output = identity.output_port
@@ -22,9 +26,10 @@ def columns(identity: Identity) -> tuple[str, ...]:
 
 
 def value_column(output: Port) -> str:
-    """Return the name of the column of an output's values, such as clearance_mm."""
+    """Return the name of the column of an output's values, such as clearance_mm; status_value if it is `TAKEN`."""
     unit = "".join(c if c.isalnum() else "_" for c in output.unit)
-    return f"{output.name}_{unit}" if unit else output.name
+    name = f"{output.name}_{unit}" if unit else output.name
+    return f"{name}_value" if name in TAKEN or name == f"{output.name}_code" else name
 
 
 def rows(identity: Identity, results: Results, first: int = 0) -> Iterator[Row]:

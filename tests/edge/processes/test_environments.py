@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.edge.environments import HARMFUL, HARMLESS, tried
+from tests.edge.processes.environments import HARMFUL, HARMLESS, tried
 
 FAST = range(12)
 

@@ -23,7 +23,7 @@ from sosmith.model.text_files import write_files
 from sosmith.sim.build_cache import BuildCache
 from sosmith.sim.exploration.record import record_in
 from tests.commands.command_line import FILTER
-from tests.edge.forks import Ledger, forked
+from tests.edge.processes.forks import Ledger, forked
 from tests.host.measuring import measuring_identity
 from tests.instrument.calibration.measuring import readings, write_csv
 from tests.suite.extras import needed

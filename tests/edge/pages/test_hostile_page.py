@@ -13,7 +13,7 @@ from websockets.sync.client import connect
 
 from sosmith.host import loopback
 from sosmith.host.loopback import MAX_CONNECTIONS, MAX_SOCKETS, POLICY_VIOLATION
-from tests.edge.hostile_page import attacked, exchanged, good, page_of
+from tests.edge.pages.hostile_page import attacked, exchanged, good, page_of
 
 
 @pytest.mark.parametrize("name", ["monitor", "studio"])

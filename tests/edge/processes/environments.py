@@ -21,7 +21,7 @@ from sosmith import cli
 from sosmith.model.text_files import to_json
 from tests.commands.command_line import FILTER
 from tests.commands.invocation import Invocation
-from tests.edge.forks import Ended, forked
+from tests.edge.processes.forks import Ended, forked
 from tests.gen.report.reports import report
 from tests.instrument.calibration.measuring import readings, write_csv
 

@@ -8,8 +8,8 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-from tests.edge.forks import Ledger, forked, moment
-from tests.edge.writers import Writer
+from tests.edge.processes.forks import Ledger, forked, moment
+from tests.edge.processes.writers import Writer
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from tests.edge.kills import duration, killed
-from tests.edge.writers import QUICK, WHOLE
+from tests.edge.processes.kills import duration, killed
+from tests.edge.processes.writers import QUICK, WHOLE
 
 FAST = 4
 
