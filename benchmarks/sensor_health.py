@@ -289,8 +289,9 @@ The picture is of an emulated sensor that is turned on day 60.
   less {allowance:g}; the alarm is at {decision:g}.
 - **Scatter**: the same for the scatter, upwards.
 
-Outliers and readings at the sensor's rail do not count. The first day is held against the type only, and raises no
-alarm. An alarm stands, and the exit status is 1, until `--since` begins the charts later: the sensor has been
+Readings at the sensor's rail do not count, nor do measurements off the plane of their own day; `add` tells how many
+are off the curve that it fits to all days, which may be others. The first day is held against the type only, and
+raises no alarm. An alarm stands, and the exit status is 1, until `--since` begins the charts later: the sensor has been
 looked at. Measurements of another sensor belong under another name (`--sensor`): the calibration would take them
 for the old one's drift.
 

@@ -9,6 +9,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from sosmith.gen.filter.decimation import SAMPLED
 from sosmith.gen.filter.response import FilterFacts
 from sosmith.gen.filter.step_response import SETTLED, StepResponse
 from sosmith.gen.fpga.synthesis import Netlist
@@ -313,7 +314,7 @@ def _decimation_caption(found: DecimationFacts, unit: str) -> str:
         f"one of the bands on the right comes out in the pass band with an amplitude of at most {worst}; one at any "
         f"frequency from half that rate on, wherever it comes out, with at most {amount(found.largest, unit)} "
         f"({decibels(found.largest_db)}), where a filter without a decimator has "
-        f"{decibels(found.direct_largest_db)}. In the pass band the gain is "
+        f"{decibels(found.direct_largest_db)}. At {SAMPLED} frequencies in the pass band the gain is "
         f"within {plain_number(found.deviation_db)} dB of that without a decimator, and decimator and filter together "
         f"delay by {amount(found.delay, 's')}."
     )

@@ -324,7 +324,8 @@ def _check_decimation(document: Document) -> None:
     factor = 2 if table.decimate == AUTO else int(table.decimate)
     if factor > most:
         raise UnfitError(
-            f"at most {math.floor(most)}, so that the cutoff is at most {MAX_RATIO} of the lower sample rate"
+            f"at most {2 ** (math.floor(most).bit_length() - 1)}, so that the cutoff is at most {MAX_RATIO} of the "
+            "lower sample rate"
             if most >= 2
             else f"left out, as the cutoff would be more than {MAX_RATIO} of the lower sample rate",
             found,
