@@ -132,7 +132,9 @@ def health_table(sensor: str, found: Health) -> Table:
     days, outliers, measured = len(known.days) - found.first, int(known.outliers.sum()), int(known.count.sum())
     verdict = count(len(found.alarms), "alarm") if found.alarms else "no alarm"
     # Not those of the fit: that leaves out what is off the polynomial of all days.
-    left_out = f"; {outliers:,} of {measured:,} measurements left out, off the plane of their own day" if outliers else ""
+    left_out = (
+        f"; {outliers:,} of {measured:,} measurements left out, off the plane of their own day" if outliers else ""
+    )
     raised = {alarm.chart.name: alarm.raised for alarm in found.alarms}
     rows = [
         (

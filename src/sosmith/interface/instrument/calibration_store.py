@@ -11,8 +11,8 @@ from typing import Any
 
 from sosmith.gen.calibration.acceptance import REQUIRED_R
 from sosmith.gen.facts.table import Table, View
-from sosmith.instrument.calibration.acceptance import Method, Range
 from sosmith.gen.quantity import count
+from sosmith.instrument.calibration.acceptance import Method, Range
 from sosmith.instrument.calibration.advice import Advice
 from sosmith.instrument.calibration.calibration_report import (
     addition_json,
