@@ -48,7 +48,7 @@ RECORD = HERE / "sensor_health.json"
 PAGE = ROOT / "docs" / "health.md"
 
 SCENARIO = ROOT / "examples" / "scenarios" / "a_week_in_service.toml"
-"""The week in service, gone on with for more days: 15 measurements each morning of an ageing sensor."""
+"""The week in service, continued for more days: 15 measurements each morning of an ageing sensor."""
 
 SENSORS = tuple(FORWARD_MODELS)
 DAYS, SEEDS = 250, 24
@@ -268,7 +268,7 @@ TEMPLATE = """# Sensor health
 
 Made by `{command}`; every figure is a result of that run.
 
-`sosmith calibrate health` says whether a sensor still behaves as its measurements so far and its type let expect.
+`sosmith calibrate health` says whether a sensor still behaves as its measurements so far and its type would predict.
 Each day's measurements in the store are predicted from the days before, by the mixed-effects model of the
 [calibration](calibration.md#two-ways-of-fitting), and three numbers are kept of the difference: a step of the
 offset, a step of the gain, and the scatter. While the sensor drifts no more than its type, they are independent,
@@ -303,7 +303,7 @@ many.
 
 ## False alarms
 
-The week in service of the [campaign](campaign.md), gone on with for {days} days: 15 measurements a day, an ageing
+The week in service of the [campaign](campaign.md), continued for {days} days: 15 measurements a day, an ageing
 sensor, {seeds} sensors of each kind, none of which was used to choose the limits. All are taken for sensors of the
 type equation 5a. First alarms only; mean and variance are those of offset, gain and scatter.
 
