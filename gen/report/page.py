@@ -23,6 +23,7 @@ from sosmith.gen.report.recursion import Recursion
 from sosmith.gen.report.samples import MAX_POINTS, viewer_data
 from sosmith.gen.report.step_plot import step_figure
 from sosmith.gen.report.tiles import ErrorUnit, Summary, amount, tile_rows
+from sosmith.gen.specification.values import listed
 from sosmith.gen.version import __version__
 from sosmith.model.templates import render
 
@@ -77,10 +78,24 @@ def _reasons(evidence: Evidence, summary: Summary) -> list[str]:
     unit = ErrorUnit.of(evidence)
     error, bound = (unit.amount(value) for value in (summary["error"]["max_abs"], evidence.facts.error_bound))
     ran = "hardware" if evidence.gates is None else f"netlist for the {evidence.gates.board.title}"
-    return [
+    arithmetic = (
         f"The simulated {ran} agrees with its integer model bit for bit, and stays within {error} "
         f"of the exact calculation; the proven limit is {bound}."
-    ]
+    )
+    return [f"{arithmetic}{_of_the_signal(evidence, summary, bound)}"]
+
+
+def _of_the_signal(evidence: Evidence, summary: Summary, bound: str) -> str:
+    """Tell the error of the signal from that of the arithmetic, which alone decides; empty without a true value."""
+    if summary["true_error"] is None:
+        return ""
+    off = amount(summary["true_error"]["max_abs"], evidence.facts.unit)
+    causes = [] if evidence.facts.core == "filter" else ["the sensor", "its calibration"]
+    causes += [] if evidence.facts.filter is None else ["the delay of the filter", "the noise that passes it"]
+    return (
+        f" This is about the arithmetic. The output is off by up to {off} from the true value, and the hardware adds "
+        f"at most {bound} of that: the rest is in the exact calculation as well, from {listed(causes)}."
+    )
 
 
 def _trace_figure(evidence: Evidence, transient: int) -> Figure:
