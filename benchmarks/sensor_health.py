@@ -48,7 +48,7 @@ RECORD = HERE / "sensor_health.json"
 PAGE = ROOT / "docs" / "health.md"
 
 SCENARIO = ROOT / "examples" / "scenarios" / "a_week_in_service.toml"
-"""The week in service, gone on with for more days: 15 measurements each morning of an ageing sensor."""
+"""The week in service, continued for more days: 15 measurements each morning of an ageing sensor."""
 
 SENSORS = tuple(FORWARD_MODELS)
 DAYS, SEEDS = 250, 24
@@ -268,7 +268,7 @@ TEMPLATE = """# Sensor health
 
 Made by `{command}`; every figure is a result of that run.
 
-`sosmith calibrate health` says whether a sensor still behaves as its measurements so far and its type let expect.
+`sosmith calibrate health` says whether a sensor still behaves as its measurements so far and its type would predict.
 Each day's measurements in the store are predicted from the days before, by the mixed-effects model of the
 [calibration](calibration.md#two-ways-of-fitting), and three numbers are kept of the difference: a step of the
 offset, a step of the gain, and the scatter. While the sensor drifts no more than its type, they are independent,
@@ -289,8 +289,9 @@ The picture is of an emulated sensor that is turned on day 60.
   less {allowance:g}; the alarm is at {decision:g}.
 - **Scatter**: the same for the scatter, upwards.
 
-Outliers and readings at the sensor's rail do not count. The first day is held against the type only, and raises no
-alarm. An alarm stands, and the exit status is 1, until `--since` begins the charts later: the sensor has been
+Readings at the sensor's rail do not count, nor do measurements off the plane of their own day; `add` tells how many
+are off the curve that it fits to all days, which may be others. The first day is held against the type only, and
+raises no alarm. An alarm stands, and the exit status is 1, until `--since` begins the charts later: the sensor has been
 looked at. Measurements of another sensor belong under another name (`--sensor`): the calibration would take them
 for the old one's drift.
 
@@ -302,7 +303,7 @@ many.
 
 ## False alarms
 
-The week in service of the [campaign](campaign.md), gone on with for {days} days: 15 measurements a day, an ageing
+The week in service of the [campaign](campaign.md), continued for {days} days: 15 measurements a day, an ageing
 sensor, {seeds} sensors of each kind, none of which was used to choose the limits. All are taken for sensors of the
 type equation 5a. First alarms only; mean and variance are those of offset, gain and scatter.
 

@@ -1,4 +1,4 @@
-"""What the site adds to docs/: README and CHANGELOG as pages of it, and links only to what it has.
+"""What the site adds to docs/: README and CHANGELOG as pages of it, links only to what it has, a search from a disk.
 
 A hook of MkDocs, named in mkdocs.yml.
 """
@@ -41,3 +41,13 @@ def on_page_markdown(markdown: str, page: Any, files: Files, **_: Any) -> str:
         return f"{link['image']}[{link['text']}]({target}{link['anchor'] or ''})"
 
     return _LINK.sub(linked, markdown)
+
+
+def on_post_build(config: Any) -> None:
+    """Have the search need no server: its index becomes a script, and `search.js` looks into it."""
+    search = Path(config["site_dir"]) / "search"
+    index = search / "search_index.json"
+    (search / "search_index.js").write_text(f"sosmithSearch = {index.read_text(encoding='utf-8')};\n", encoding="utf-8")
+    for replaced in (index, search / "worker.js"):
+        replaced.unlink()
+    (search / "main.js").write_text((ROOT / "docs" / "search.js").read_text(encoding="utf-8"), encoding="utf-8")

@@ -337,8 +337,8 @@ def polynomial_of(spec: Specification) -> tuple[Polynomial, Fit | None]:
 
 
 def calibrated_codes(inputs: Sequence[Port], fitted: Fit) -> tuple[tuple[int, int], ...]:
-    """Lowest and highest code of each input that the measurements covered."""
-    return tuple(port.enclosing(*ends) for port, ends in zip(inputs, fitted.covered, strict=True))
+    """Lowest and highest code that a measured value of each input has: any other is of a value outside."""
+    return tuple(port.codes_between(*ends) for port, ends in zip(inputs, fitted.covered, strict=True))
 
 
 def filter_of(spec: Specification) -> Filter:

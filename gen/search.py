@@ -160,7 +160,18 @@ class Search:
             return quantized, f"{asked.name} at the word lengths chosen for {asked.widths_of}, as asked"
         if asked.name == AUTO:
             return selection.cheapest(partial(self._in_hardware, kind, look_ahead=self._looks_ahead))
-        return selection.proven(asked.name), f"{asked.name}: asked for {asked.source}"
+        try:
+            return selection.proven(asked.name), f"{asked.name}: asked for {asked.source}"
+        except ShortfallError as error:
+            raise ShortfallError(f"{error}{self._other_that_does(kind, selection)}") from None
+
+    def _other_that_does(self, kind: type[Architecture], selection: Selection) -> str:
+        """Say which realization meets the specification as it is, if one does."""
+        try:
+            found, _ = selection.cheapest(partial(self._in_hardware, kind, look_ahead=self._looks_ahead))
+        except ShortfallError:
+            return ""
+        return f'; hardware.realization = "{found.realization}" meets the specification as it is'
 
     def _plan_of(self, realization: str) -> Plan:
         """Plan a realization, once for all architectures that are tried."""

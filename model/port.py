@@ -80,9 +80,9 @@ class Port:
         """Bytes that the code occupies on an AXI4-Stream."""
         return (self.bits + 7) // 8
 
-    def enclosing(self, low: float, high: float) -> tuple[int, int]:
-        """Return the ends of the smallest code range that holds `low` to `high`, limited to the format."""
-        ends = (math.floor((Fraction(low) - self.zero) / self.lsb), math.ceil((Fraction(high) - self.zero) / self.lsb))
+    def codes_between(self, low: float, high: float) -> tuple[int, int]:
+        """Return the first and the last code that values from `low` to `high` have, limited to the format."""
+        ends = (math.floor((Fraction(value) - self.zero) / self.lsb + Fraction(1, 2)) for value in (low, high))
         first, last = (min(max(end, self.lowest), self.highest) for end in ends)
         return first, last
 

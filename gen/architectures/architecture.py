@@ -206,16 +206,26 @@ class Architecture(ABC):
 
     @property
     def _taken_cycles(self) -> int:
-        """Clocks from the edge that finds a sample to the one that accepts it: 0 if it is accepted at once."""
+        """Clocks from the edge that finds a sample to the one that accepts it; 0 if it is accepted at once.
+
+        An upper limit in serial.
+        """
         return 0
 
     @property
     def latency_cycles(self) -> int:
-        """Clocks from the edge that accepts a sample to the edge that can output it; an upper limit in serial."""
-        before = 0 if self.ahead is None else self.ahead.latency_cycles
-        if self.decimator is not None:
-            before += decimator_clocks.latency_cycles(self.decimator, self.channels) + self.hold
-        return before + self._latency_cycles
+        """Most clocks from the edge that accepts a sample to the edge that can output its result.
+
+        If neither the sample nor the result waits for another one, or for the sink. Behind a decimator the first sample
+        may be accepted while memories are still cleared, which is among them.
+        """
+        if self.decimator is None:
+            return self._latency_cycles
+        before = decimator_clocks.latency_cycles(self.decimator, self.channels)
+        before += 0 if self.ahead is None else self.ahead.latency_cycles
+        several = self.channels > 1  # which are let in when all is cleared
+        still_cleared = 0 if several else self._cleared_cycles - decimator_clocks.reset_cycles(self.decimator)
+        return max(before, still_cleared) + self._latency_cycles + self.hold
 
     @property
     def clock_estimate(self) -> float | None:
@@ -224,15 +234,18 @@ class Architecture(ABC):
 
     @property
     def reset_cycles(self) -> int:
-        """Clocks after a reset until the first sample is accepted, while memories are cleared or a decimator fills."""
+        """Clocks after a reset until a sample on offer is accepted; an upper limit in serial."""
         if self.decimator is None:
-            return self._cleared_cycles
+            return self._cleared_cycles + self._taken_cycles
         filled = decimator_clocks.reset_cycles(self.decimator, self.channels)
-        if self.ahead is not None and self.channels > 1:
-            return max(self._cleared_cycles, filled, self.ahead.reset_cycles)
-        if self.ahead is not None:  # which gives the first sample that the decimator fills with
-            filled += self.ahead.reset_cycles + self.ahead.latency_cycles + decimator_clocks.FIRST_SAMPLE
-        return max(self._cleared_cycles, filled)
+        ahead = self.ahead
+        if self.channels > 1:
+            cleared = max(self._cleared_cycles, 0 if ahead is None else ahead._cleared_cycles)
+            return max(cleared, filled) + (0 if ahead is None else ahead._taken_cycles)
+        if ahead is None:
+            return filled
+        # The calibration gives the first sample that the decimator fills with.
+        return ahead._cleared_cycles + ahead.latency_cycles + filled + decimator_clocks.FIRST_SAMPLE
 
     @property
     def cycles_per_sample(self) -> int:

@@ -99,9 +99,7 @@ class SharedUnit(Architecture):
 
     @property
     def _taken_cycles(self) -> int:
-        if folded_clocks.overlaps(self.program, serial=self.bit_serial):
-            return folded_clocks.taken_cycles(self.program)
-        return self._cycles_per_sample
+        return folded_clocks.taken_cycles(self.program, serial=self.bit_serial, protect=self.protect)
 
     def _core(self, *, before: bool = False) -> Component:
         from sosmith.hdl.cores.folded import FoldedCore  # only what makes hardware loads Amaranth

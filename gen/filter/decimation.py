@@ -51,7 +51,7 @@ _CORRECTION_BITS = 10
 _ALIASING_BITS = 192
 """Fraction bits of the bounds on aliasing."""
 
-_GRID = 256
+SAMPLED = 256
 """Frequencies in the pass band at which gains are compared."""
 
 
@@ -133,8 +133,8 @@ class Decimation:
         return group_delay(filter_.exact) / self.rate + own_delay(self.factor, self.stages) / self.sample_rate
 
     def deviation(self, filter_: Filter, direct: Filter) -> float:
-        """Largest deviation, in the pass band, of decimator and corrected filter from a `direct` filter, in dB."""
-        frequency = np.array([k * float(self.edge) / _GRID for k in range(1, _GRID + 1)])
+        """Largest deviation of decimator and corrected filter from a `direct` one in dB, at `SAMPLED` frequencies."""
+        frequency = np.array([k * float(self.edge) / SAMPLED for k in range(1, SAMPLED + 1)])
         made = self.gain(frequency) * np.abs(complex_response(filter_.sos, frequency, float(self.rate)))
         wanted = np.abs(complex_response(direct.sos, frequency, float(self.sample_rate)))
         ratios = (made / wanted).tolist()

@@ -94,7 +94,8 @@ class DecimationFacts:
     cycles_per_result : int
         Clocks between results at the highest rate.
     deviation_db : float
-        Largest deviation of the gain in the pass band from that of the filter without a decimator.
+        Largest deviation of the gain from that of the filter without a decimator, at `SAMPLED` frequencies of the pass
+        band; no bound on what is between them.
     delay : float
         Group delay of decimator and filter at zero frequency, in s.
     aliasing : tuple of AliasingFacts

@@ -93,7 +93,7 @@ def _timing(design: CoreDesign, facts: CoreFacts) -> Sequence[str]:
     first = f", the first {ready} clocks after reset" if ready else ""
     return (
         f"Clock: {float(design.spec.hardware.clock) / 1e6:g} MHz in the specification. {taken}{first}.",
-        f"A result leaves at most {facts.interface.latency_cycles} clocks after {its}, if it need not wait.",
+        f"A result leaves at most {facts.interface.latency_cycles} clocks after {its}, if neither waits for another.",
     )
 
 

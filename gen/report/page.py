@@ -9,6 +9,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from sosmith.gen.filter.decimation import SAMPLED
 from sosmith.gen.filter.response import FilterFacts
 from sosmith.gen.filter.step_response import SETTLED, StepResponse
 from sosmith.gen.fpga.synthesis import Netlist
@@ -22,6 +23,7 @@ from sosmith.gen.report.recursion import Recursion
 from sosmith.gen.report.samples import MAX_POINTS, viewer_data
 from sosmith.gen.report.step_plot import step_figure
 from sosmith.gen.report.tiles import ErrorUnit, Summary, amount, tile_rows
+from sosmith.gen.specification.values import listed
 from sosmith.gen.version import __version__
 from sosmith.model.templates import render
 
@@ -76,10 +78,24 @@ def _reasons(evidence: Evidence, summary: Summary) -> list[str]:
     unit = ErrorUnit.of(evidence)
     error, bound = (unit.amount(value) for value in (summary["error"]["max_abs"], evidence.facts.error_bound))
     ran = "hardware" if evidence.gates is None else f"netlist for the {evidence.gates.board.title}"
-    return [
+    arithmetic = (
         f"The simulated {ran} agrees with its integer model bit for bit, and stays within {error} "
         f"of the exact calculation; the proven limit is {bound}."
-    ]
+    )
+    return [f"{arithmetic}{_of_the_signal(evidence, summary, bound)}"]
+
+
+def _of_the_signal(evidence: Evidence, summary: Summary, bound: str) -> str:
+    """Tell the error of the signal from that of the arithmetic, which alone decides; empty without a true value."""
+    if summary["true_error"] is None:
+        return ""
+    off = amount(summary["true_error"]["max_abs"], evidence.facts.unit)
+    causes = [] if evidence.facts.core == "filter" else ["the sensor", "its calibration"]
+    causes += [] if evidence.facts.filter is None else ["the delay of the filter", "the noise that passes it"]
+    return (
+        f" This is about the arithmetic. The output is off by up to {off} from the true value, and the hardware adds "
+        f"at most {bound} of that: the rest is in the exact calculation as well, from {listed(causes)}."
+    )
 
 
 def _trace_figure(evidence: Evidence, transient: int) -> Figure:
@@ -313,7 +329,7 @@ def _decimation_caption(found: DecimationFacts, unit: str) -> str:
         f"one of the bands on the right comes out in the pass band with an amplitude of at most {worst}; one at any "
         f"frequency from half that rate on, wherever it comes out, with at most {amount(found.largest, unit)} "
         f"({decibels(found.largest_db)}), where a filter without a decimator has "
-        f"{decibels(found.direct_largest_db)}. In the pass band the gain is "
+        f"{decibels(found.direct_largest_db)}. At {SAMPLED} frequencies in the pass band the gain is "
         f"within {plain_number(found.deviation_db)} dB of that without a decimator, and decimator and filter together "
         f"delay by {amount(found.delay, 's')}."
     )

@@ -6,7 +6,7 @@ The one table of it: the rules of a specification walk it, the automatic choice 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from itertools import combinations as pairs
@@ -177,20 +177,27 @@ class Terms:
         As in the specification.
     lacks : Mapping of Option to Refusal
         The options that it does not take, and why.
+    apart : Mapping of (Option, Option) to Refusal
+        Those that it takes, but not together.
     """
 
     name: str
     lacks: Mapping[Option, Refusal] = field(default_factory=dict)
+    apart: Mapping[tuple[Option, Option], Refusal] = field(default_factory=dict)
 
-    def takes(self, options: Iterator[Option] | tuple[Option, ...]) -> bool:
+    def takes(self, options: tuple[Option, ...]) -> bool:
         """Say whether it takes all of the options."""
-        return not any(option in self.lacks for option in options)
+        return not any(option in self.lacks for option in options) and not any(
+            one in options and other in options for one, other in self.apart
+        )
 
 
 _SLOW = Refusal(Verdict.NO_USE, "{name} takes several clocks for each sample")
 _ONE_BLOCK = Refusal(Verdict.REFUSED, "its program needs one", only="'auto' or at least 1")
 
-PARALLEL = Terms("parallel")
+_FIXED = Refusal(Verdict.REFUSED, "adders multiply by constants that are fixed")
+
+PARALLEL = Terms("parallel", apart={(RELOAD, NO_MULTIPLIERS): _FIXED})
 FOLDED = Terms("folded", {SEVERAL: _SLOW, LOOK_AHEAD: _SLOW, NO_MULTIPLIERS: _ONE_BLOCK})
 SERIAL = Terms("serial", {SEVERAL: _SLOW, LOOK_AHEAD: _SLOW})
 ONLINE = Terms(
@@ -202,8 +209,6 @@ ONLINE = Terms(
 TERMS = {terms.name: terms for terms in (PARALLEL, FOLDED, SERIAL, ONLINE)}
 """All architectures by name; `sosmith.gen.architectures.registry` has a class for each."""
 
-_FIXED = Refusal(Verdict.REFUSED, "adders multiply by constants that are fixed")
-
 _APART: dict[tuple[Option, Option], Refusal] = {
     **dict.fromkeys(((DECIMATE, each) for each in (RELOAD, PROTECT, ZERO)), LATER),
     **dict.fromkeys(((SEVERAL, each) for each in (CHANNELS, RELOAD, PROTECT, DECIMATE)), LATER),
@@ -212,7 +217,7 @@ _APART: dict[tuple[Option, Option], Refusal] = {
     (LOOK_AHEAD, FEW_MULTIPLIERS): Refusal(
         Verdict.REFUSED, "all its products by constants are made of adders", only="'auto' or 0"
     ),
-    **dict.fromkeys(((RELOAD, each) for each in (NO_MULTIPLIERS, FEW_MULTIPLIERS)), _FIXED),
+    (RELOAD, FEW_MULTIPLIERS): _FIXED,
 }
 """Options that do not go together, in the order in which messages tell them: of the second one's key."""
 
@@ -242,7 +247,7 @@ def check_combinations(spec: Specified) -> None:
         assert terms is not None
         if (lacking := terms.lacks.get(option)) is not None:
             raise _without_option(spec, terms, option, lacking)
-    for (kept, other), refusal in _APART.items():
+    for (kept, other), refusal in (_APART | ({} if terms is None else dict(terms.apart))).items():
         if kept in asked and other in asked:
             raise _unfit(refusal, other.without, kept.phrase(spec), other.key, literal(other.of(spec)))
 

@@ -6,14 +6,14 @@ Each function checks one subject and raises `UnfitError` with the path of the ke
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 
 from sosmith.gen.specification.choices import AUTO, CALIBRATION_INPUTS, FAMILIES, KINDS, LOOK_AHEAD, LOSSES, MAX_RATIO
 from sosmith.gen.specification.combinations import check_combinations
 from sosmith.gen.specification.schema import MAX_ORDER, Document, FilterTable, InputTable
 from sosmith.gen.specification.uncertainty import check_coefficients
-from sosmith.gen.specification.values import UnfitError, identifier, key_text, listed, literal, one_of
+from sosmith.gen.specification.values import UnfitError, identifier, key_text, listed, literal, one_of, together
 from sosmith.model.converters.spi_converter import CONVERTERS
 
 MARGIN = Fraction(1, 10**6)
@@ -38,16 +38,20 @@ def check(document: Document) -> None:
     Raises
     ------
     UnfitError
-        For the first finding.
+        For all findings, one of each subject.
     """
-    _check_inputs(document)
-    _check_calibration(document)
-    _check_uncertainty(document)
-    _check_filter(document.filter, document.sample_rate)
-    _check_decimation(document)
-    _check_output(document)
-    _check_wear(document)
-    _check_converters(document)
+    findings = []
+    for rules in _SUBJECTS:
+        try:
+            for rule in rules:
+                rule(document)
+        except UnfitError as unfit:
+            findings.append(unfit)
+    if findings:
+        raise together(findings)
+
+
+def _check_clock(document: Document) -> None:
     lanes = document.hardware.samples_per_clock
     if document.hardware.clock * lanes < document.sample_rate:
         share = f" divided by hardware.samples_per_clock = {lanes}" if lanes > 1 else ""
@@ -56,8 +60,6 @@ def check(document: Document) -> None:
             literal(document.hardware.clock),
             where="hardware.clock",
         )
-    check_combinations(document)
-    _check_pipeline(document)
 
 
 def _check_pipeline(document: Document) -> None:
@@ -139,7 +141,8 @@ def _check_uncertainty(document: Document) -> None:
             raise UnfitError("of an amplitude of 0 or more", f"{float(amplitude):g}", where=f"uncertainty.motion[{k}]")
 
 
-def _check_filter(table: FilterTable, sample_rate: Fraction) -> None:
+def _check_filter(document: Document) -> None:
+    table, sample_rate = document.filter, document.sample_rate
     given = [key for key in (*_BY_ORDER, *_BY_EDGES, *_BY_SECTIONS) if getattr(table, key) is not None]
     match [any(key in given for key in form) for form in (_BY_ORDER, _BY_EDGES[:2], _BY_SECTIONS)]:
         case [True, False, False]:
@@ -324,7 +327,8 @@ def _check_decimation(document: Document) -> None:
     factor = 2 if table.decimate == AUTO else int(table.decimate)
     if factor > most:
         raise UnfitError(
-            f"at most {math.floor(most)}, so that the cutoff is at most {MAX_RATIO} of the lower sample rate"
+            f"at most {2 ** (math.floor(most).bit_length() - 1)}, so that the cutoff is at most {MAX_RATIO} of the "
+            "lower sample rate"
             if most >= 2
             else f"left out, as the cutoff would be more than {MAX_RATIO} of the lower sample rate",
             found,
@@ -384,3 +388,14 @@ def _check_wear(document: Document) -> None:
                 literal(wear.warning),
                 where="wear.warning",
             )
+
+
+_SUBJECTS: tuple[tuple[Callable[[Document], None], ...], ...] = (
+    (_check_inputs, _check_converters),
+    (_check_calibration, _check_uncertainty),
+    (_check_filter, _check_decimation),
+    (_check_output, _check_wear),
+    (_check_clock,),
+    (check_combinations, _check_pipeline),
+)
+"""The rules by subject; those after the first one take it to be kept."""

@@ -45,6 +45,7 @@ from sosmith.gen.specification.values import (
     positive,
     rising_pair,
     text,
+    together,
     whole,
 )
 from sosmith.model.converters.spi_converter import CONVERTERS, SUPPLIES
@@ -245,10 +246,6 @@ _TABLES: dict[str, type[Table]] = {
 }
 
 
-MAX_SHOWN = 12
-"""Most errors that are shown beside the first one."""
-
-
 def parse(tree: dict[str, Any]) -> Document:
     """Check the shape of a specification.
 
@@ -266,13 +263,7 @@ def parse(tree: dict[str, Any]) -> Document:
         return Document.model_validate(tree)
     except ValidationError as error:
         findings = sorted(error.errors(), key=lambda finding: _position(tree, finding["loc"]))
-    unfit, *others = map(_unfit, findings)
-    if others:
-        # A sentence each, on lines of their own: a typing error often makes two, a wrong key and a missing one.
-        rest = "".join(f"\n  {other}" for other in others[:MAX_SHOWN])
-        rest += f"\n  and {len(others) - MAX_SHOWN} more" if len(others) > MAX_SHOWN else ""
-        unfit = UnfitError(unfit.expected, unfit.found + rest, where=unfit.where, later=unfit.later)
-    raise unfit
+    raise together([_unfit(finding) for finding in findings])
 
 
 def _position(tree: Any, path: tuple[int | str, ...]) -> list[int]:

@@ -197,8 +197,8 @@ def load(path: Path) -> Specification:
     Raises
     ------
     SpecificationError
-        For the first error, in one sentence: the file, the path of the key or the line, what was expected
-        and what was found.
+        For all errors, in a sentence each: the file, the path of the key or the line, what was expected and what
+        was found. Rules about several keys are checked once each key is right, and one of a subject is told.
     """
     return from_text(read_text(path, what="the specification", max_bytes=MAX_BYTES), path)
 

@@ -19,6 +19,9 @@ Item = TypeVar("Item")
 
 IDENTIFIER = f"a Verilog identifier of at most {MAX_NAME} letters, digits and underscores"
 
+MAX_SHOWN = 12
+"""Most errors that are shown beside the first one."""
+
 MAX_DIGITS = 50
 MAX_EXPONENT = 30
 """Magnitudes are zero or from 1e-30 to below 1e30: `Fraction` would store ``1e999999999`` in full."""
@@ -50,6 +53,17 @@ class UnfitError(ValueError):
     def inside(self, where: str) -> UnfitError:
         """Return the same error with `where` prepended to its path."""
         return UnfitError(self.expected, self.found, where=where + self.where, later=self.later)
+
+
+def together(findings: Sequence[UnfitError]) -> UnfitError:
+    """Return one error for all findings: a sentence each, on lines of their own, the first one first.
+
+    A typing error often makes two: a wrong key and a missing one.
+    """
+    first, *others = findings
+    rest = "".join(f"\n  {other}" for other in others[:MAX_SHOWN])
+    rest += f"\n  and {len(others) - MAX_SHOWN} more" if len(others) > MAX_SHOWN else ""
+    return UnfitError(first.expected, first.found + rest, where=first.where, later=first.later)
 
 
 def literal(value: object) -> str:

@@ -8,7 +8,7 @@ from fractions import Fraction
 
 from sosmith.gen.filter.design import Filter
 from sosmith.gen.proof.cascade_proof import CascadeProof, coefficient_extent, rounding_gains
-from sosmith.gen.realizations.registry import BEST_KEPT, Section
+from sosmith.gen.realizations.registry import Section
 from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
 from sosmith.gen.word_lengths.bit_limits import MAX_BITS, MIN_BITS
 from sosmith.gen.word_lengths.cascade import cascade, parts_of, stages_of, unquantized
@@ -50,7 +50,7 @@ def equally_shared(
             return sections, proof
         # A quantizer's error is not centred on zero.
         finer = [{name: frac + 1 for name, frac in sources.items()} for sources in fracs]
-        fracs = _within_limits(finer, ideal, realization, share)
+        fracs = _within_limits(finer, ideal, share)
 
 
 def _coefficient_bits(ideal: Filter, realization: str, x: Range, share: Fraction, *, steady: bool) -> int:
@@ -81,7 +81,7 @@ def _fraction_bits(ideal: Filter, realization: str, bits: int, share: Fraction) 
         {name: max(0, math.ceil(math.log2(error * count / share))) if error else 0 for name, error in sources.items()}
         for sources in unit
     ]
-    _within_limits(fracs, ideal, realization, share)
+    _within_limits(fracs, ideal, share)
     # An equal split wastes up to a bit each: remove bits while the sum allows it, starting with the first section.
     for sources, errors in zip(fracs, unit, strict=True):
         for name in sources:
@@ -91,13 +91,12 @@ def _fraction_bits(ideal: Filter, realization: str, bits: int, share: Fraction) 
     return fracs
 
 
-def _within_limits(fracs: _Fracs, ideal: Filter, realization: str, share: Fraction) -> _Fracs:
+def _within_limits(fracs: _Fracs, ideal: Filter, share: Fraction) -> _Fracs:
     """Return `fracs` unless there are too many fraction bits."""
     if max((frac for sources in fracs for frac in sources.values()), default=0) > MAX_BITS:
-        better = [] if realization == BEST_KEPT else [f"set hardware.realization to {BEST_KEPT}"]
         raise ShortfallError(
             f"the filter must keep its rounding error below {float(share):.3g} output LSB with {MAX_BITS} fraction "
-            f"bits in each state, and does not: {_remedy(ideal, *better)}"
+            f"bits in each state, and does not: {_remedy(ideal)}"
         )
     return fracs
 
@@ -122,9 +121,9 @@ def _rounded(ideal: Filter, realization: str, bits: int, fracs: Sequence[Mapping
     ]
 
 
-def _remedy(ideal: Filter, *first: str) -> str:
+def _remedy(ideal: Filter) -> str:
     """Suggest remedies if a part of the budget cannot keep to its share."""
-    ways = [*first, "raise output.max_error", "raise output.bits"]
+    ways = ["raise output.max_error", "raise output.bits"]
     if ideal.decimation > 1:
         assert ideal.cutoff is not None
         ratio = ideal.sample_rate / ideal.cutoff[-1]

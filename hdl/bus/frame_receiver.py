@@ -54,7 +54,7 @@ class FrameReceiver(wiring.Component):
         The oldest message is done with; only while `o_full` is high.
     o_malformed, o_overrun : Out(1)
         High for one clock at the end of a frame that is not complete or has a wrong length; and of one that began when
-        no buffer was free. Nothing between two zero bytes is no frame.
+        no buffer was free. Two zero bytes in a row are not a frame.
     """
 
     def __init__(self) -> None:

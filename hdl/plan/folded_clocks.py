@@ -14,10 +14,17 @@ def latency_cycles(program: Program, *, serial: bool, protect: str = "none") -> 
     return late + (program.serial_cycles + SERIAL_DEPTH if serial else len(program.instructions) + FOLDED_DEPTH)
 
 
-def taken_cycles(program: Program) -> int:
-    """Clocks from the edge that finds a sample to the one that accepts it, at most, in a folded core that overlaps."""
+def taken_cycles(program: Program, *, serial: bool, protect: str = "none") -> int:
+    """Clocks from the edge that finds a sample to the edge that accepts it; in serial, an upper bound.
+
+    With protection it is accepted when its result is there, otherwise once the program has read it.
+    """
+    if protect != "none":
+        return latency_cycles(program, serial=serial, protect=protect)
     takes = [number for number, instruction in enumerate(program.instructions) if instruction.opcode is Opcode.TAKE]
-    return takes[-1] + FOLDED_DEPTH
+    before = program.instructions[: takes[-1]]
+    clocks = sum(map(program.serial_cycles_of, before)) if serial else len(before)
+    return clocks + (SERIAL_DEPTH if serial else FOLDED_DEPTH - 1)
 
 
 def overlaps(program: Program, *, serial: bool, channels: int = 1, reload: bool = False, protect: str = "none") -> bool:

@@ -16,8 +16,19 @@ examples and realizations in docs/cost.md."""
 
 
 def latency_cycles(datapath: Datapath, channels: int = 1, *, protect: str = "none") -> int:
-    """Clocks from the edge that accepts a sample to the edge that can hand its result on, without a stall."""
-    return sum(depths(datapath, channels, protect)) + 1 + (channels > 1) + (len(datapath.wear) > 1)
+    """Most clocks from the edge that accepts a sample to the edge that can hand its result on, without a stall.
+
+    With several channels, a sample waits for a scrub of its channel, though not for one of another.
+    """
+    scrub = scrub_cycles(datapath, channels) if protect != "none" else 0
+    return sum(depths(datapath, channels, protect)) + 1 + (channels > 1) + (len(datapath.wear) > 1) + scrub
+
+
+def scrub_cycles(datapath: Datapath, channels: int) -> int:
+    """Most clocks that a sample waits for a scrub of its channel, which goes through the stages as a sample does."""
+    if channels == 1:
+        return 0  # states are registers, and are not scrubbed
+    return max(schedule(stage.graph, channels, rewrites=True).distance for stage in datapath.stages) - 1
 
 
 def depths(datapath: Datapath, channels: int, protect: str) -> list[int]:

@@ -129,9 +129,12 @@ def _rejected(fit: Fit) -> str:
 def health_table(sensor: str, found: Health) -> Table:
     """Return the charts of a sensor, and a sentence for each alarm."""
     known = found.innovations
-    days, outliers = len(known.days) - found.first, int(known.outliers.sum())
+    days, outliers, measured = len(known.days) - found.first, int(known.outliers.sum()), int(known.count.sum())
     verdict = count(len(found.alarms), "alarm") if found.alarms else "no alarm"
-    left_out = f", {count(outliers, 'outlier')} left out" if outliers else ""
+    # Not those of the fit: that leaves out what is off the polynomial of all days.
+    left_out = (
+        f"; {outliers:,} of {measured:,} measurements left out, off the plane of their own day" if outliers else ""
+    )
     raised = {alarm.chart.name: alarm.raised for alarm in found.alarms}
     rows = [
         (
@@ -141,22 +144,25 @@ def health_table(sensor: str, found: Health) -> Table:
         )
         for chart in found.charts
     ]
-    title = f"Sensor {sensor}: {verdict}; {days:,} days on the charts, to {date_of(known.days[-1])}{left_out}"
+    title = f"Sensor {sensor}: {verdict}; {count(days, 'day')} on the charts, to {date_of(known.days[-1])}{left_out}"
     notes = [alarm.sentence for alarm in found.alarms]
     return Table(title, rows, ("control chart", "last day", "largest", "limit", "alarm"), notes=notes)
 
 
-def advice_tables(sensor: str, date: str, found: Advice) -> list[Table]:
+def advice_tables(sensor: str, date: str, within: float, found: Advice) -> list[Table]:
     """Return where to measure, and what it is expected to bring."""
     plan = [(f"{clearance:g}", f"{temperature:.3g}", str(times)) for clearance, temperature, times in found.plan]
     gain = [
         (f"{clearance:g}", f"{temperature:.3g}", f"{before:.3g}", f"{after:.3g}")
         for (clearance, temperature), before, after in zip(found.targets, found.before, found.after, strict=True)
     ]
-    return [
-        Table(f"Sensor {sensor}, {date}: {found.count} measurements", plan, ("mm", "°C", "times")),
-        Table("95 % interval, ± mm", gain, ("mm", "°C", "without", "with")),
-    ]
+    title = "95 % interval, ± mm"
+    if not plan:
+        enough = f"nothing to measure, all are within ±{within:g} mm"
+        rows = [row[:-1] for row in gain]
+        return [Table(f"Sensor {sensor}, {date}: {enough}", rows, ("mm", "°C", title))]
+    asked = Table(f"Sensor {sensor}, {date}: {count(found.count, 'measurement')}", plan, ("mm", "°C", "times"))
+    return [asked, Table(title, gain, ("mm", "°C", "without", "with"))]
 
 
 def history_table(sensor: str, versions: Sequence[Version]) -> Table:

@@ -214,9 +214,10 @@ class Program:
     @property
     def serial_cycles(self) -> int:
         """Clocks of all instructions, at most, if a multiplication takes one for each bit of its second factor."""
-        return sum(map(self._serial_cycles, self.instructions))
+        return sum(map(self.serial_cycles_of, self.instructions))
 
-    def _serial_cycles(self, instruction: Instruction) -> int:
+    def serial_cycles_of(self, instruction: Instruction) -> int:
+        """Clocks of an instruction, at most."""
         if instruction.opcode in PRODUCTS:
             return self.digit_bits + 1
         return serial_clocks(instruction.constant)

@@ -104,7 +104,7 @@ class _LogStep(Step):
 
 
 class _BarStep(Step):
-    """A bar for each step, on a terminal."""
+    """One line on a terminal, with the bar of the current step; nothing is left of it in the end."""
 
     def __init__(self, progress: Progress) -> None:
         self._progress = progress
@@ -114,21 +114,12 @@ class _BarStep(Step):
     def __call__(self, name: str, done: int = 0, total: int = 0) -> None:
         with undisturbed():
             if name != self._name:
-                self.finish()
                 self._name = name
+                if self._task is not None:
+                    self._progress.remove_task(self._task)
                 self._task = self._progress.add_task(name, total=None)
             if total and self._task is not None:
                 self._progress.update(self._task, completed=done, total=total)
-
-    def finish(self) -> None:
-        """Mark the current step as done."""
-        if self._task is not None:
-            self._progress.update(self._task, total=1, completed=1)
-
-    def drop(self) -> None:
-        """Remove the current step, which has failed: the error says more than a bar that stands still."""
-        if self._task is not None:
-            self._progress.remove_task(self._task)
 
 
 def be_quiet(quiet: bool) -> None:
@@ -139,9 +130,9 @@ def be_quiet(quiet: bool) -> None:
 
 @contextmanager
 def show_progress(*, remaining: bool = False) -> Iterator[Step]:
-    """Show on stderr the progress of the steps inside the context: bars on a terminal, else one line a step.
+    """Show on stderr the progress of the steps inside the context: on a terminal one line, which then disappears.
 
-    With `remaining`, bars tell the time that is left as well.
+    Elsewhere, one line a step. With `remaining`, the line on a terminal tells the time that is left as well.
     """
     if _quiet:
         yield Step()
@@ -162,24 +153,16 @@ def show_progress(*, remaining: bool = False) -> Iterator[Step]:
     )
 
     columns: list[ProgressColumn] = [
-        SpinnerColumn(finished_text="[green]✓[/]"),
+        SpinnerColumn(),
         TextColumn("{task.description}", markup=False),
         BarColumn(bar_width=30),
         TextColumn("{task.percentage:>3.0f} %"),
         *([TimeRemainingColumn(), TextColumn("left")] if remaining else []),
         TimeElapsedColumn(),
     ]
-    progress = Progress(*columns, console=Console(stderr=True, width=width()))
+    progress = Progress(*columns, console=Console(stderr=True, width=width()), transient=True)
     with live(progress):
-        step = _BarStep(progress)
-        try:
-            yield step
-        except BaseException:
-            with undisturbed():
-                step.drop()
-            raise
-        with undisturbed():
-            step.finish()
+        yield _BarStep(progress)
 
 
 def width() -> int | None:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.commands.invocation import Invocation
+from tests.gen.designs import EXAMPLES
 from tests.instrument.calibration.measuring import readings, write_csv
 
 from sosmith.commands.instrument.calibrate import calibrate
@@ -283,8 +284,11 @@ def test_advice_reaches_what_it_promises() -> None:
     result = run(*call, "--most", "1")
     assert isinstance(result.exception, ShortfallError)
     assert re.fullmatch(
-        r"the intervals must be within 0\.05 mm, and 1 measurements bring them to 0\.\d+ mm only", str(result.exception)
+        r"the intervals must be within 0\.05 mm, and 1 measurement brings them to 0\.\d+ mm only", str(result.exception)
     )
+    enough = good("advise", "2mm", "--within", "1mm", "--date", "2024-03-02").stdout
+    assert enough.startswith("Sensor sensor, 2024-03-02: nothing to measure, all are within ±1 mm\n")
+    assert "times" not in enough
 
 
 def test_a_sensor_mounted_anew_raises_an_alarm_until_it_is_accepted() -> None:
@@ -308,6 +312,16 @@ def test_a_sensor_mounted_anew_raises_an_alarm_until_it_is_accepted() -> None:
     assert (first["chart"], first["date"], first["explanation"]) == ("offset step", "2024-03-08", "mounted anew")
     assert len(told["days"]) == 12
     assert good("health", "--since", "2024-03-11").stdout.startswith("Sensor sensor: no alarm; 2 days on the charts")
+
+
+def test_health_says_which_measurements_it_leaves_out() -> None:
+    """Those of `add` are others: off the polynomial of all days."""
+    for number, month in enumerate(("march", "april"), start=3):
+        file = EXAMPLES / "measurements" / f"{month}.csv"
+        good("add", str(file), "--date", f"2024-0{number}-01")
+    shown = " ".join(good("health").stdout.split())
+    assert "1 day on the charts" in shown
+    assert re.search(r"; \d+ of 90 measurements left out, off the plane of their own day", shown)
 
 
 def test_an_export_carries_what_the_calibration_is_worth(tmp_path: Path) -> None:

@@ -51,10 +51,8 @@ VEHICLE = ROOT / "docs" / "vehicle.md"
 DOCUMENTS = [README, ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]
 BY_CI = {"./run demo", "./run test"}
 """Lines that other tests and the set-up on a fresh machine stand for."""
-NEEDS_SIMULATION = ("./run simulate ", "./run compare ")
+TAKES_LONG = ("./run simulate ", "./run compare ", "./run build ")
 """Beginnings of the lines that only the longer test carries out."""
-NEEDS_A_BOARD = re.compile(r"\./run (board|monitor|stream) .*|\./run simulate .* --port .*|\./run build .* --program")
-"""Lines that run until they are interrupted, or whose port is only known then; the tests of these commands run them."""
 
 _COMBINATIONS = re.compile(r"(?<=<!-- combinations -->\n).*?(?=<!-- end of combinations -->)", re.DOTALL)
 _PROOFS = re.compile(r"(?<=<!-- proofs -->\n).*?(?=<!-- end of proofs -->)", re.DOTALL)
@@ -112,7 +110,7 @@ def test_every_line_works_or_is_understood(folder: Path) -> None:
     lines = [line for line in shell_lines() if line not in BY_CI]
     assert len(lines) > 5
     for line in lines:
-        if line.startswith(NEEDS_SIMULATION) or NEEDS_A_BOARD.fullmatch(line):
+        if line.startswith(TAKES_LONG):
             name, *arguments = shlex.split(line)[1:]
             above = click.Context(cli, **cli.context_settings)  # a command keeps the help option of its first call
             command = cli.get_command(above, name)
@@ -125,7 +123,7 @@ def test_every_line_works_or_is_understood(folder: Path) -> None:
 @pytest.mark.slow
 def test_every_line_works(folder: Path) -> None:
     for line in shell_lines():
-        if line not in BY_CI and not NEEDS_A_BOARD.fullmatch(line):
+        if line not in BY_CI:
             run(line, folder)
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from tests.documents.shown import ROOT
+from tests.host.browser import BROWSER, browser
 
 _STYLE = re.compile(r"""url\(\s*["']?([^"')]+)|@import\s+["']([^"']+)""")
 _LOADING = {"script": "src", "img": "src", "source": "src", "iframe": "src", "object": "data", "link": "href"}
@@ -64,14 +65,44 @@ def test_what_a_page_takes_from_elsewhere_is_found(tmp_path: Path) -> None:
     ]
 
 
-@pytest.mark.slow
-def test_the_site_builds_strictly_and_stands_alone(tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Build the site, without a warning; return its folder."""
     pytest.importorskip("mkdocs", reason="mkdocs is missing: pip install 'sosmith[docs]'")
-    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(tmp_path / "site")]
+    folder = tmp_path_factory.mktemp("built") / "site"
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(folder)]
     result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert result.returncode == 0, result.stderr
     assert "WARNING" not in result.stderr
+    return folder
+
+
+@pytest.mark.slow
+def test_the_site_stands_alone(site: Path) -> None:
     pages = {path.relative_to(ROOT / "docs").with_suffix("").as_posix() for path in (ROOT / "docs").rglob("*.md")}
-    built = {path.relative_to(tmp_path / "site").with_suffix("").as_posix() for path in tmp_path.rglob("*.html")}
+    built = {path.relative_to(site).with_suffix("").as_posix() for path in site.rglob("*.html")}
     assert pages - {"recipes/README"} | {"index", "changelog", "recipes/index"} <= built
-    assert missing(tmp_path / "site") == []
+    assert missing(site) == []
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(BROWSER is None, reason="needs Chromium")
+def test_the_search_works_from_a_disk(site: Path, tmp_path: Path) -> None:
+    """From a page in a folder, by the beginning of a word, to a link that is there; and with nothing to find."""
+    titles = "[...document.querySelectorAll('#mkdocs-search-results a')].map(link => link.textContent)"
+    with browser(tmp_path / "profile") as tab:
+        tab.open((site / "recipes" / "notch.html").as_uri())
+        tab.until("document.readyState === 'complete' && document.querySelector('#rtd-search-form') !== null")
+        tab.value("document.querySelector('#rtd-search-form input').value = 'back-pressure'")
+        tab.value("document.querySelector('#rtd-search-form').submit()")
+        tab.until("document.querySelectorAll('#mkdocs-search-results a').length > 0")
+        assert tab.value("document.getElementById('mkdocs-search-query').value") == "back-pressure"
+        address = tab.value("document.querySelector('#mkdocs-search-results a').href")
+        assert (site / address.removeprefix(site.as_uri() + "/").partition("#")[0]).is_file()
+        typed = "query => { const f = document.getElementById('mkdocs-search-query'); f.value = query;"
+        typed += " f.dispatchEvent(new Event('input')); }"
+        tab.value(f"({typed})('look-ah')")
+        assert "Look-ahead" in tab.value(titles)
+        tab.value(f"({typed})('xyzzyqq')")
+        assert tab.value("document.getElementById('mkdocs-search-results').textContent") == "No results found"
+        assert tab.said == []

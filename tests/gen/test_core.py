@@ -2,7 +2,9 @@
 
 import re
 from dataclasses import replace
+from decimal import Decimal
 from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -11,7 +13,7 @@ from tests.gen.designs import EXAMPLES
 from sosmith.gen import search
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.realizations.registry import REALIZATIONS
-from sosmith.gen.specification.specification import Specification, load
+from sosmith.gen.specification.specification import Specification, from_tree, load
 from sosmith.gen.word_lengths.cost import cost_of
 from sosmith.gen.word_lengths.quantize import Plan, plan
 from sosmith.model.errors import ShortfallError
@@ -158,6 +160,24 @@ def test_none_for_one_reason(spec: Specification) -> None:
     )
     with pytest.raises(ShortfallError, match=f"^{re.escape(sentence)}$"):
         design_core(within(spec, Fraction(1, 10**12)))
+
+
+def test_a_realization_that_falls_short_is_told_which_one_does_not() -> None:
+    tree = {
+        "name": "kept",
+        "sample_rate": 1000,
+        "input": {"x": {"bits": 8, "range": [-1, 1], "signed": True}},
+        "filter": {"family": "butterworth", "kind": "lowpass", "order": 2, "cutoff": 1},
+        "output": {"bits": 8, "range": [-1, 1], "signed": True, "max_error": Decimal("0.003906250078125")},
+        "hardware": {"architecture": "parallel", "realization": "df1"},
+    }
+    sentence = (
+        "the filter must keep its rounding error below 5e-09 output LSB with 40 fraction bits in each state, and does "
+        "not: raise output.max_error, raise output.bits or decimate by 32 first, as the cutoff is 1/1000 of the sample "
+        'rate; hardware.realization = "df1_ef2" meets the specification as it is'
+    )
+    with pytest.raises(ShortfallError, match=f"^{re.escape(sentence)}$"):
+        design_core(from_tree(tree, Path("kept.toml")))
 
 
 def test_none_for_several_reasons(spec: Specification, monkeypatch: pytest.MonkeyPatch) -> None:

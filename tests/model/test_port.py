@@ -88,3 +88,14 @@ def test_impossible_ranges_are_refused(changes: dict[str, object], message: str)
 def test_a_step_must_be_positive() -> None:
     with pytest.raises(ValueError, match=r"^lsb must be positive, not Fraction\(0, 1\)$"):
         Port(name="x", bits=8, signed=False, lsb=Fraction(0), zero=Fraction(0))
+
+
+def test_codes_of_a_range_are_those_of_its_values() -> None:
+    """One code further, no value of the range is nearest to it: it is outside, and told without delay."""
+    port = Port(name="x", bits=8, signed=False, lsb=Fraction(1, 8), zero=Fraction(0))
+    assert port.codes_between(0.3, 0.95) == (2, 8)  # 0.3 is 2.4 steps and 0.95 is 7.6
+    assert port.codes_between(0.3125, 0.9374) == (3, 7)  # a half is rounded up
+    assert port.codes_between(0.3, 0.3) == (2, 2)
+    assert port.codes_between(-1.0, 1e6) == (0, 255)
+    low, high = port.codes_between(0.3, 0.95)
+    assert port.encode(np.array([0.3, 0.95])).tolist() == [low, high]

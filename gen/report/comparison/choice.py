@@ -23,7 +23,7 @@ class Choice:
     Attributes
     ----------
     taken : int or None
-        Index of the report; None where none can be named.
+        Index of the report; None where none can be named, as among equals.
     reason : str
         Why it, or why none; one sentence or two.
     beaten : tuple of int
@@ -58,6 +58,8 @@ def choose(reports: Sequence[Report], names: Sequence[str]) -> Choice:
         accurate = min(passing, key=lambda k: bounds[k])
         why = fair.cost or "A report does not tell what its hardware costs."
         limit = quantity(bounds[accurate], _unit(reports))
+        if all(bound == bounds[accurate] for bound in bounds.values()):
+            return Choice(None, f"Those that pass have the same error limit, {limit}. {why}")
         return Choice(accurate, f"{names[accurate]} has the smallest error limit, {limit}. {why}")
     known = {k: cost for k, cost in costs.items() if cost is not None}
     taken = min(rivals, key=lambda k: (known[k], bounds[k]))
@@ -70,7 +72,8 @@ def choose(reports: Sequence[Report], names: Sequence[str]) -> Choice:
     if rivals == passing:
         everyone = "both" if len(reports) == 2 else f"all {len(reports)}"
         of = everyone if len(passing) == len(reports) else f"the {len(passing)} of {len(reports)} that pass"
-        return Choice(taken, _why(reports, names, rivals, taken, known, bounds, of), beaten)
+        equal = all((known[k], bounds[k]) == (known[taken], bounds[taken]) for k in rivals)
+        return Choice(None if equal else taken, _why(reports, names, rivals, taken, known, bounds, of), beaten)
     name = str(reports[taken]["architecture"])
     if len(rivals) == 1:
         size = f"{known[taken]:,.0f} {cost_unit(reports[taken])}"

@@ -147,12 +147,16 @@ def _row(reports: Sequence[Report], figure: _Figure, *, fair: bool) -> Row:
 
 
 def column_names(reports: Sequence[Report], *, baseline: bool = False) -> list[str]:
-    """Names of the reports; those that share a name get its realization, and a number if that is not enough.
+    """Names of the reports: the folders that they lie in, where these are known and differ.
 
-    With `baseline`, the first is called so, and the others do not have to differ from it.
+    Otherwise those that share a name get its realization, and a number if that is not enough. With `baseline`, the
+    first is called so, and the others do not have to differ from it.
     """
     if baseline:
         return ["baseline", *column_names(reports[1:])]
+    folders = [str(report.get("folder", "")) for report in reports]
+    if all(folders) and len(set(folders)) == len(folders):
+        return folders
     names = [str(report["name"]) for report in reports]
     if len(set(names)) < len(names):
         parts = [(str(report["name"]), str(report["realization"])) for report in reports]

@@ -1,4 +1,4 @@
-"""How far each day's measurements are from what the days before let expect, in standard deviations.
+"""How far each day's measurements are from what the days before predict, in standard deviations.
 
 The mixed-effects model is filtered forwards with a grid of scatters and systematic errors, weighted by what the days
 so far say about them, so that nothing of a day is known before it comes. Of each day's measurements three numbers are

@@ -53,8 +53,8 @@ def import_command(
 ) -> None:
     """Write a specification with the filter of another tool's FILE.
 
-    FILE is told by its content: sos arrays of NumPy (.npy, .npz), MATLAB's SOS and G (.mat) and the exported text of
-    its filter designer, pyfda's .sos, .csv, .npz and .json, CMSIS-DSP's five columns, biquad lists as from Room EQ
+    FILE is recognized by its content: sos arrays of NumPy (.npy, .npz), MATLAB's SOS and G (.mat) and the exported text
+    of its filter designer, pyfda's .sos, .csv, .npz and .json, CMSIS-DSP's five columns, biquad lists as from Room EQ
     Wizard and miniDSP, or an analog prototype (.toml) with zeros, poles and gain in rad/s.
 
     Says on stderr how the file was read: tools disagree on the signs of a1 and a2. Of the two choices, the stable one

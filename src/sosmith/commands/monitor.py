@@ -96,7 +96,7 @@ def monitor_command(
     The samples of --trace are fed at the board's sample rate; a board with converters measures by itself. The board
     must have the core whose manifest and certificate are in --files. After it was unplugged, it is waited for; its
     filter then starts from reset, and the recording has the next session. Another board at its place ends the monitor.
-    Every alarm is told once, when its flag rises. Exits with 1 if there was one.
+    Every alarm is reported once, when its flag rises. Exits with 1 if there was one.
 
     The recording has the columns utc, time_s, run, session, channel if there are several, the result with its unit, its
     code, its status, and board, a digest of what the board says that it is; only the same board continues it. Ctrl-C

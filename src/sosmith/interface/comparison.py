@@ -132,4 +132,8 @@ def compare(reports: Sequence[Source], *, baseline: Source | None = None, tolera
 def _content(report: Source) -> Mapping[str, Any]:
     if isinstance(report, Report):
         return report.summary
-    return report if isinstance(report, Mapping) else load_report(Path(fspath(report)))
+    if isinstance(report, Mapping):
+        return report
+    path = Path(fspath(report))
+    folder = path.resolve() if path.is_dir() else path.resolve().parent
+    return load_report(path) | ({"folder": folder.name} if folder.name.isprintable() else {})

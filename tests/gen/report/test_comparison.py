@@ -180,9 +180,18 @@ def test_of_equal_costs_the_smallest_limit_is_taken() -> None:
 
 
 def test_nobody_wins_among_equals() -> None:
-    assert choose([report(), report()], NAMES).reason == (
+    choice = choose([report(), report()], NAMES)
+    assert (choice.taken, choice.beaten) == (None, ())
+    assert choice.reason == (
         "Both cost the same, 2,728 LUT4 equivalents, estimated before synthesis, and have the same error limit, 200 nm."
     )
+
+
+def test_nobody_wins_by_an_equal_limit_where_costs_cannot_be_compared() -> None:
+    synthesized = {"provenance.cost.source": "synthesis", "provenance.cost.board": "icestick"}
+    choice = choose([report(), report(**synthesized)], NAMES)
+    assert choice.taken is None
+    assert choice.reason.startswith("Those that pass have the same error limit, 200 nm. The costs have different orig")
 
 
 def test_without_fair_costs_the_smallest_limit_is_taken() -> None:
@@ -345,6 +354,14 @@ def test_column_names_tell_reports_apart() -> None:
         "flange_wear, df1",
         "flange_wear, df1_ef2 (2)",
     ]
+
+
+def test_columns_are_named_by_the_folders_of_the_reports() -> None:
+    first, second = report(folder="march"), report(folder="april")
+    assert column_names([first, second]) == ["march", "april"]
+    assert column_names([first, second], baseline=True) == ["baseline", "april"]
+    assert column_names([first, report(folder="march")]) == ["flange_wear, df1_ef2 (1)", "flange_wear, df1_ef2 (2)"]
+    assert column_names([first, report()]) == ["flange_wear, df1_ef2 (1)", "flange_wear, df1_ef2 (2)"]
 
 
 def test_json_is_plain_data() -> None:

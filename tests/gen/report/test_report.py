@@ -46,6 +46,7 @@ from sosmith.gen.report.evidence import Alternative, Evidence
 from sosmith.gen.report.mask import mask_shortfalls
 from sosmith.gen.report.page import render_page
 from sosmith.gen.report.report import summarise, write_report
+from sosmith.gen.report.tiles import ErrorUnit
 
 
 def masked(order: int, **changes: Any) -> FilterFacts:
@@ -672,6 +673,19 @@ def test_a_page_that_fails_leaves_the_old_report(tmp_path: Path, monkeypatch: py
     with pytest.raises(RuntimeError, match=r"^no picture$"):
         write_report(evidence(seed=8), tmp_path)
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+@without_pictures
+def test_the_verdict_tells_the_signal_from_the_arithmetic() -> None:
+    run = evidence()
+    summary = summarise(run)
+    off = quantity.quantity(summary["true_error"]["max_abs"], run.facts.unit).replace(" ", "\u00a0")
+    bound = ErrorUnit.of(run).amount(run.facts.error_bound)
+    assert summary["true_error"]["max_abs"] > run.facts.error_bound
+    sentence = f"The output is off by up to {off} from the true value, and the hardware adds at most {bound} of that:"
+    assert sentence in render_page(run, summary)
+    unknown = evidence(truth=None)
+    assert "from the true value, and" not in render_page(unknown, summarise(unknown))
 
 
 @without_pictures

@@ -989,7 +989,7 @@ BAD = [
     (
         "no multipliers for loadable constants",
         CLOCK,
-        CLOCK + "\nreload = true\nmultipliers = 0",
+        CLOCK + '\nreload = true\nmultipliers = 0\narchitecture = "parallel"',
         "hardware.multipliers must be 'auto' with hardware.reload = true, as adders multiply by constants that are "
         "fixed, not 0",
     ),

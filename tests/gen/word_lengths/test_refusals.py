@@ -64,7 +64,7 @@ def test_coefficients_where_decimation_does_not_help() -> None:
 def test_rounding_at_a_low_cutoff() -> None:
     refused(
         "the filter must keep its rounding error below 5e-09 output LSB with 40 fraction bits in each state, and does "
-        "not: set hardware.realization to df1_ef2, raise output.max_error, raise output.bits or decimate by 32 first, "
+        "not: raise output.max_error, raise output.bits or decimate by 32 first, "
         "as the cutoff is 1/1000 of the sample rate",
         beyond_half=Fraction(1, 10**8),
         ideal=butterworth(2, 0.001),

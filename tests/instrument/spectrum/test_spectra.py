@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import re
 from typing import Any
 
 import numpy as np
 import pytest
+from tests.documents.shown import ROOT
 
-from sosmith.instrument.spectrum.peaks import peaks
+from sosmith.instrument.spectrum.peaks import FALSE_LINES, peaks
 from sosmith.instrument.spectrum.settings import WINDOWS, SpectrumSettings
-from sosmith.instrument.spectrum.spectra import degrees_of_freedom, slow_rms, spectrum
+from sosmith.instrument.spectrum.spectra import FINER, degrees_of_freedom, slow_rms, spectrum
 from sosmith.model.errors import SpecificationError
 
 RATE = 50.0
@@ -148,3 +150,14 @@ def test_a_tone_in_noise_is_called_out() -> None:
     ((at, height),) = peaks(spectrum(noisy, RATE, PLAIN), 10)
     assert at == pytest.approx(2.5, abs=0.01)
     assert height == pytest.approx(0.1, rel=0.2)
+
+
+def test_the_document_states_the_loss_of_amplitude_and_the_share_of_false_lines() -> None:
+    """The worst place for a wave is in the middle between two frequencies at which amplitudes are read."""
+    text = " ".join((ROOT / "docs" / "spectrum.md").read_text(encoding="utf-8").split())
+    time = np.arange(20_000) / RATE
+    step = RATE / 2000
+    wave = np.sin(2 * np.pi * (400 + 1 / (2 * FINER)) * step * time)
+    ((_, height),) = peaks(spectrum(wave, RATE, SpectrumSettings(segment=40.0)))
+    assert f"a Hann window loses at most {math.ceil(1000 * (1 - height)) / 10:g} %" in text
+    assert f"(one false line in {round(1 / FALSE_LINES)} spectra of noise is expected)" in text

@@ -31,7 +31,7 @@ def print_comparison(comparison: Comparison) -> None:
     for judgement in comparison.judgements:
         _print_judgement(console, judgement)
     if not comparison.judgements:
-        verdict = "No choice." if choice.taken is None else f"Take {comparison.names[choice.taken]}."
+        verdict = "No recommendation." if choice.taken is None else f"Take {comparison.names[choice.taken]}."
         console.print(f"[bold]{escape(verdict)}[/] {escape(choice.reason)}", highlight=False)
 
 

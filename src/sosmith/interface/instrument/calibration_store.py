@@ -11,6 +11,7 @@ from typing import Any
 
 from sosmith.gen.calibration.acceptance import REQUIRED_R
 from sosmith.gen.facts.table import Table, View
+from sosmith.gen.quantity import count
 from sosmith.instrument.calibration.acceptance import Method, Range
 from sosmith.instrument.calibration.advice import Advice
 from sosmith.instrument.calibration.calibration_report import (
@@ -170,13 +171,13 @@ class Advised(View):
         if self.advice.reached:
             return ""
         return (
-            f"the intervals must be within {self.within:g} mm, and {self.advice.count} measurements bring them to "
-            f"{max(self.advice.after):.3g} mm only"
+            f"the intervals must be within {self.within:g} mm, and {count(self.advice.count, 'measurement')} "
+            f"bring{'s' * (self.advice.count == 1)} them to {max(self.advice.after):.3g} mm only"
         )
 
     def tables(self) -> list[Table]:
         """Return the plan, and the intervals without and with it."""
-        return advice_tables(self.sensor, self.date, self.advice)
+        return advice_tables(self.sensor, self.date, self.within, self.advice)
 
     def as_dict(self) -> dict[str, Any]:
         """Return all of it in JSON types."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from sosmith.gen.architectures.architecture import Architecture
 from sosmith.gen.calibration.fit import Fit, read_measurements
 from sosmith.gen.facts.table import Table
+from sosmith.gen.filter.decimation import SAMPLED
 from sosmith.gen.output.core_facts import CoreFacts, LimitCycleFacts, SectionFacts
 from sosmith.gen.output.decimation_facts import DecimationFacts, RateCosts
 from sosmith.gen.quantity import LEAST_PART, quantity
@@ -99,7 +100,10 @@ def _decimation(found: DecimationFacts, unit: str) -> Iterator[tuple[str, str]]:
         f"at most {found.largest_db:.1f} dB, {quantity(found.largest, unit)}, wherever it folds; "
         f"{found.direct_largest_db:.1f} dB without a decimator",
     )
-    yield "gain in the pass band", f"within {found.deviation_db:.2g} dB of that without a decimator"
+    yield (
+        "gain in the pass band",
+        f"within {found.deviation_db:.2g} dB of that without a decimator, at {SAMPLED} frequencies",
+    )
 
 
 def _rates(costs: Mapping[str, RateCosts], unit: str, channels: int) -> Table:
