@@ -173,7 +173,8 @@ def _files_proven(
         manifest.hold_clocks(None, None)
     manifest.hold_program(None if proofs.program is None else _program_of(certificate, text))
     progress("C model", 0, 0)
-    model = check_c_model(*(unicode_text(folder / f"{certificate.name}.{end}") for end in "ch"), certificate, item)
+    source, header = (unicode_text(folder / f"{certificate.name}.{end}") for end in "ch")
+    model = check_c_model(source, header, certificate, item)
     return replace(proofs, unheld=tuple(manifest.open), model=model), decimator
 
 

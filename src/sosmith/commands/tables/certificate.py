@@ -27,7 +27,7 @@ def print_proof(certificate: Entries, proof: Proof) -> None:
         unproven = f"; the unit{'s' * both} that run{'s' * (not both)} them {'are' if both else 'is'} not part of it"
         console.print(
             f"[bold green]program{'s' * both}[/]: {' and '.join(map(str, programs))} instructions in the SystemVerilog "
-            f"compute these graphs, for all inputs and states{'' if proof.is_unit_proven else unproven}"
+            f"compute these graphs, for all inputs and states{'' if _is_unit_proven(proof) else unproven}"
         )
     if isinstance(proof.calibration, HardwareVerdict):
         _print_hardware(console, "calibration", proof.calibration)
@@ -55,6 +55,11 @@ def print_proof(certificate: Entries, proof: Proof) -> None:
     if proof.rebuilt:
         console.print(f"[bold green]rebuilt[/]: {proof.rebuilt} files, the same byte for byte")
     _print_scope(console, proof)
+
+
+def _is_unit_proven(proof: Proof) -> bool:
+    """Whether the unit that runs the programs is proven too."""
+    return "unit" in proof.scope and not proof.scope["unit"].is_missing
 
 
 def _print_scope(console: TableConsole, proof: Proof) -> None:
