@@ -165,7 +165,7 @@ def _files_proven(
     check_ports(modules[certificate.name], item)
     manifest = read_manifest(content_of(folder / f"{certificate.name}.json"), certificate, item)
     proofs, decimator = _hardware_proven(certificate, item, text, progress)
-    manifest.hold_clocks(proofs.hardware if certificate.decimation is None else None)
+    manifest.hold_clocks(proofs.hardware or proofs.unit if certificate.decimation is None else None)
     manifest.hold_program(None if proofs.program is None else _program_of(certificate, text))
     return replace(proofs, unheld=tuple(manifest.open)), decimator
 

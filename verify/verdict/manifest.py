@@ -17,6 +17,7 @@ from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.parallel.check import HardwareVerdict
 from sosmith.verify.program.text import ProgramText
 from sosmith.verify.specified.words import table_of, words_of
+from sosmith.verify.unit.check import UnitVerdict
 from sosmith.verify.verdict.derived import (
     Figure,
     bound_of,
@@ -54,12 +55,15 @@ class Manifest:
     tree: Mapping[str, Any]
     open: list[str] = field(default_factory=list)
 
-    def hold_clocks(self, found: HardwareVerdict | None) -> None:
-        """Hold the clocks against those of a proven pipeline, which takes a sample at each; None without one."""
+    def hold_clocks(self, found: HardwareVerdict | UnitVerdict | None) -> None:
+        """Hold the clocks against those that are proven of a pipeline, which takes a sample at each, or of a unit."""
         if found is None:
             self.open += _CLOCKS
             return
-        for key, value in zip(_CLOCKS, (found.clearing, found.latency, 1), strict=True):
+        clocks = (found.clearing, found.latency, 1)
+        if isinstance(found, UnitVerdict):
+            clocks = found.progress.cleared, found.pace.latency, found.pace.interval
+        for key, value in zip(_CLOCKS, clocks, strict=True):
             _compare(key, self.tree[key], value)
 
     def hold_program(self, found: ProgramText | None) -> None:

@@ -8,7 +8,7 @@ import pytest
 from tests.verify.small_specifications import INSTRUMENT, PLAIN, STEADY, STEADY_INSTRUMENT, WIDE
 from tests.verify.unit.units import SEVERAL, WORN, Unit, unit
 
-from sosmith.hdl.plan.folded_clocks import cycles_per_sample, reset_cycles
+from sosmith.hdl.plan.folded_clocks import cycles_per_sample, latency_cycles, reset_cycles
 from sosmith.verify.graph import RejectedError
 
 # What the generator writes is accepted.
@@ -29,9 +29,10 @@ def test_small_cores(spec: str, architecture: str, channels: int) -> None:
     core = unit(spec, architecture, channels)
     found, program = core.check(), core.core.program
     assert found.states > len(program.instructions)
-    assert found.progress.cleared == reset_cycles(program, channels) + 1
-    if architecture == "folded":
-        assert found.progress.taken >= cycles_per_sample(program, serial=False, channels=channels)
+    serial = architecture == "serial"
+    assert found.progress.cleared == reset_cycles(program, channels)
+    assert found.pace.latency == latency_cycles(program, serial=serial)
+    assert found.pace.interval == cycles_per_sample(program, serial=serial, channels=channels)
 
 
 @pytest.mark.slow

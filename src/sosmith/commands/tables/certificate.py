@@ -27,7 +27,7 @@ def print_proof(certificate: Entries, proof: Proof) -> None:
         unproven = f"; the unit{'s' * both} that run{'s' * (not both)} them {'are' if both else 'is'} not part of it"
         console.print(
             f"[bold green]program{'s' * both}[/]: {' and '.join(map(str, programs))} instructions in the SystemVerilog "
-            f"compute these graphs, for all inputs and states{'' if proof.is_unit_proven else unproven}"
+            f"compute these graphs, for all inputs and states{'' if proof.scope['unit'].state.value == 'proven' else unproven}"
         )
     if isinstance(proof.calibration, HardwareVerdict):
         _print_hardware(console, "calibration", proof.calibration)
