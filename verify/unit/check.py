@@ -41,7 +41,7 @@ from sosmith.verify.reader.source import read_source
 from sosmith.verify.unit.contexts import Contexts
 from sosmith.verify.unit.control import DEST, FOLDED, SERIAL, Control, Event, Machine
 from sosmith.verify.unit.data import ADDED, READ, Data, Subject
-from sosmith.verify.unit.going_on import progress
+from sosmith.verify.unit.going_on import Pace, pace
 from sosmith.verify.unit.order import check_order
 from sosmith.verify.unit.output import Output
 from sosmith.verify.unit.ternary import Values
@@ -60,13 +60,18 @@ class UnitVerdict:
         Number of states of its control.
     cases : int
         Number of cases of its data.
-    progress : Progress
+    pace : Pace
         Within how many clocks it takes samples and gives results.
     """
 
     states: int
     cases: int
-    progress: Progress
+    pace: Pace
+
+    @property
+    def progress(self) -> Progress:
+        """Within how many clocks it takes samples and gives results."""
+        return self.pace.progress
 
 
 def check_unit(text: str, certificate: Certificate, *, serial: bool, top: str | None = None) -> UnitVerdict:
@@ -91,7 +96,7 @@ def check_unit(text: str, certificate: Certificate, *, serial: bool, top: str | 
     clearing = control.visit(cases.note)
     cases.check()
     check_order(control, program, output)
-    ways = progress(control, clearing, partial(_digits, program) if serial else lambda number: 1)
+    ways = pace(control, clearing, partial(_digits, program) if serial else lambda number: 1)
     return UnitVerdict(len(control.nodes), cases.count, ways)
 
 

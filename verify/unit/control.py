@@ -264,7 +264,7 @@ class Control:
                 wanted = int(address % self._program.words == self._program.words - 1) >> low & ((1 << width) - 1)
                 found = written[k].get(address)
                 require(found == wanted, f"{name}[{address}] must be {wanted} after a reset, not {found}")
-        return {name: held[name] for name in self.registers}, clocks
+        return {name: held[name] for name in self.registers}, clocks - 1
 
     def _clear(self, number: int, values: Values, written: dict[int, int]) -> bool:
         """Note what is written to a memory at a clock; return whether anything is."""

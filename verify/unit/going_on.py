@@ -3,16 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from typing import NamedTuple
 
 from sosmith.verify.graph import require
 from sosmith.verify.progress import Progress
 from sosmith.verify.unit.control import Control, Step, apart, is_inside
 
+
+class Pace(NamedTuple):
+    """How fast a unit is while the sink is ready.
+
+    Attributes
+    ----------
+    progress : Progress
+        Within how many clocks it takes a sample and gives its result.
+    latency : int
+        Most clocks from the edge at which a sample is found to the edge at which its result leaves.
+    interval : int
+        Most clocks from one sample to the next, if there always is one, of a channel that exists.
+    """
+
+    progress: Progress
+    latency: int
+    interval: int
+
+
 _Place = tuple[int, int]
 """A state, and how many results have to leave until the one in question has."""
 
 
-def progress(control: Control, clearing: int, digits: Callable[[int], int]) -> Progress:
+def pace(control: Control, clearing: int, digits: Callable[[int], int]) -> Pace:
     """Return the most clocks that things take.
 
     Parameters
@@ -46,18 +66,35 @@ def progress(control: Control, clearing: int, digits: Callable[[int], int]) -> P
     def giving(place: _Place) -> Iterable[tuple[int, _Place | None]]:
         node, count = place
         for step in following[node]:
-            left = count - step.event.leaves
-            yield clocks(step), None if not left else (step.after, left)
+            rest = count - step.event.leaves
+            yield clocks(step), None if not rest else (step.after, rest)
 
-    longest = _longest([(number, 0) for number in range(len(control.nodes))], taking)
-    taken = max(longest.values())
-    accepted: list[_Place] = []
-    for step in control.steps:
-        if step.event.accepted and control.nodes[step.before].machine.begun:
-            machine = control.nodes[step.after].machine
-            accepted.append((step.after, 1 + apart(machine) + machine.waiting if is_inside(machine) else 1))
-    ways = _longest(accepted, giving)
-    return Progress(taken, max((ways[place] for place in accepted), default=0), clearing)
+    def beginning(place: _Place) -> Iterable[tuple[int, _Place | None]]:
+        for step in following[place[0]]:
+            refused = control.nodes[step.before].machine.refused or control.nodes[step.after].machine.refused
+            if step.event.offered and not refused:
+                yield clocks(step), None if step.event.begins else (step.after, 0)
+
+    def left(step: Step) -> _Place:
+        """Return the state after a clock, and how many results leave until that of the last sample has."""
+        machine = control.nodes[step.after].machine
+        return step.after, 1 + apart(machine) + machine.waiting if is_inside(machine) else 1
+
+    begun = [step for step in control.steps if step.event.begins]
+    accepted = [step for step in control.steps if step.event.accepted and control.nodes[step.before].machine.begun]
+    everywhere = [(number, 0) for number in range(len(control.nodes))]
+    return Pace(
+        Progress(_most(everywhere, taking), _most(map(left, accepted), giving), clearing),
+        _most(map(left, begun), giving),
+        _most([(step.after, 0) for step in begun if step.event.ready], beginning),
+    )
+
+
+def _most(places: Iterable[_Place], ways: Callable[[_Place], Iterable[tuple[int, _Place | None]]]) -> int:
+    """Return the most clocks that it takes from any of the places to its end; 0 without places."""
+    starts = list(places)
+    found = _longest(starts, ways)
+    return max((found[place] for place in starts), default=0)
 
 
 def _longest(

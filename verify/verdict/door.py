@@ -167,10 +167,7 @@ def _files_proven(
     check_ports(modules[certificate.name], item)
     manifest = read_manifest(content_of(folder / f"{certificate.name}.json"), certificate, item)
     proofs, decimator = _hardware_proven(certificate, item, text, progress)
-    if certificate.decimation is None:
-        manifest.hold_clocks(proofs.hardware, None if proofs.unit is None else proofs.unit.progress)
-    else:
-        manifest.hold_clocks(None, None)
+    manifest.hold_clocks(proofs.hardware or proofs.unit if certificate.decimation is None else None)
     manifest.hold_program(None if proofs.program is None else _program_of(certificate, text))
     progress("C model", 0, 0)
     source, header = (unicode_text(folder / f"{certificate.name}.{end}") for end in "ch")

@@ -16,8 +16,8 @@ from sosmith.verify.certificate_file import Certificate, ItemEntry, PortEntry, S
 from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.parallel.check import HardwareVerdict
 from sosmith.verify.program.text import ProgramText
-from sosmith.verify.progress import Progress
 from sosmith.verify.specified.words import table_of, words_of
+from sosmith.verify.unit.check import UnitVerdict
 from sosmith.verify.verdict.derived import (
     Figure,
     bound_of,
@@ -55,20 +55,16 @@ class Manifest:
     tree: Mapping[str, Any]
     open: list[str] = field(default_factory=list)
 
-    def hold_clocks(self, pipeline: HardwareVerdict | None, unit: Progress | None) -> None:
-        """Hold the clocks against those of a proven pipeline, which takes a sample at each, or of a proven unit.
-
-        Of a unit, the latency is a limit, which a result must keep.
-        """
-        if pipeline is not None:
-            for key, value in zip(_CLOCKS, (pipeline.clearing, pipeline.latency, 1), strict=True):
-                _compare(key, self.tree[key], value)
+    def hold_clocks(self, found: HardwareVerdict | UnitVerdict | None) -> None:
+        """Hold the clocks against those that are proven of a pipeline, which takes a sample at each, or of a unit."""
+        if found is None:
+            self.open += _CLOCKS
             return
-        if unit is not None:
-            stated = self.tree["latency_cycles"]
-            kept = isinstance(stated, int) and stated >= unit.given
-            require(kept, f"latency_cycles in the manifest must be at least {unit.given}, not {_cut(stated)}")
-        self.open += [key for key in _CLOCKS if unit is None or key != "latency_cycles"]
+        clocks = (found.clearing, found.latency, 1)
+        if isinstance(found, UnitVerdict):
+            clocks = found.progress.cleared, found.pace.latency, found.pace.interval
+        for key, value in zip(_CLOCKS, clocks, strict=True):
+            _compare(key, self.tree[key], value)
 
     def hold_program(self, found: ProgramText | None) -> None:
         """Hold the schedule against the program that was read from the hardware; None if none was."""

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 
 import pytest
+from tests.verify.parallel.edits import random_edits, swept
 from tests.verify.small_specifications import INSTRUMENT, PLAIN, STEADY, STEADY_INSTRUMENT, WIDE
 from tests.verify.unit.units import SEVERAL, WORN, Unit, unit
 
-from sosmith.hdl.plan.folded_clocks import cycles_per_sample, reset_cycles
+from sosmith.hdl.plan.folded_clocks import cycles_per_sample, latency_cycles, reset_cycles
 from sosmith.verify.graph import RejectedError
 
 # What the generator writes is accepted.
@@ -29,9 +31,10 @@ def test_small_cores(spec: str, architecture: str, channels: int) -> None:
     core = unit(spec, architecture, channels)
     found, program = core.check(), core.core.program
     assert found.states > len(program.instructions)
-    assert found.progress.cleared == reset_cycles(program, channels) + 1
-    if architecture == "folded":
-        assert found.progress.taken >= cycles_per_sample(program, serial=False, channels=channels)
+    serial = architecture == "serial"
+    assert found.progress.cleared == reset_cycles(program, channels)
+    assert found.pace.latency == latency_cycles(program, serial=serial)
+    assert found.pace.interval == cycles_per_sample(program, serial=serial, channels=channels)
 
 
 @pytest.mark.slow
@@ -319,9 +322,37 @@ def test_a_flag_that_the_program_judges_is_that_of_its_sample() -> None:
     )
     assert count == 1
     assert core.rejection(text) == "judged must be copy after a clock, not another value"
-    text, count = re.subn(r"(if \(n\d+\)) settling <= added\[26\];", r"\1 settling <= added[25];", core.text)
+    text, count = re.subn(r"(if \(n\d+\)) settling <= added\[\d+\];", r"\1 settling <= added[3];", core.text)
     assert count == 1
     assert core.rejection(text) == "settling must be judge after a clock, not another value"
+
+
+def _swept(core: Unit, count: int, seed: int, clocks: int) -> Counter[str]:
+    """Edit at random, but for the program: what is accepted must be the same in simulation, or only slower."""
+    words = re.compile(r" *(instructions|words\d+)\[\d+\] = ")
+    edited = (each for each in random_edits(core.text, count, seed) if not words.match(each[2][0]))
+    pace = core.check().pace
+
+    def rejection(text: str) -> str:
+        said = core.rejection(text)
+        return said or ("" if core.check(text).pace == pace else "the clocks must be others")
+
+    return swept(edited, rejection, lambda text: core.seen(text, clocks, seed), core.text)
+
+
+def test_a_dozen_edits() -> None:
+    found = _swept(unit(STEADY), 16, seed=1, clocks=120)
+    assert found["rejected"] > found["accepted"] > 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("spec", "architecture", "channels"),
+    [(STEADY, "folded", 1), (PLAIN, "serial", 1), (SEVERAL, "folded", 3), (STEADY_INSTRUMENT + WORN, "serial", 2)],
+)
+def test_a_hundred_edits(spec: str, architecture: str, channels: int) -> None:
+    found = _swept(unit(spec, architecture, channels), 100, seed=2, clocks=1500)
+    assert found["rejected"] > 2 * found["accepted"] > 0
 
 
 def test_a_text_without_a_unit_is_refused() -> None:
