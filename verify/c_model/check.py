@@ -9,6 +9,7 @@ it shifts a negative number to the right, and a caller that hands in codes and c
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from sosmith.verify.c_model.cursor import Cursor
@@ -95,7 +96,7 @@ class _Model:
     def _nodes(stages: Stages) -> int:
         return sum(len(stage.nodes) for stage in stages.stages)
 
-    def _parameters(self, inputs: tuple[PortEntry, ...] | list[PortEntry], channel: str = "") -> str:
+    def _parameters(self, inputs: Sequence[PortEntry], channel: str = "") -> str:
         codes = ", ".join(f"int64_t {port.name}_code" for port in inputs)
         return f"size_t channel, {codes}" if channel else codes
 
