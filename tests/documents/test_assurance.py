@@ -3,7 +3,7 @@
 import json
 import re
 
-from benchmarks import upsets
+from benchmarks import edge, upsets
 from benchmarks.mutation.record import RECORD as MUTATION
 from benchmarks.mutation.record import markdown
 
@@ -39,3 +39,25 @@ def test_a_silent_upset_would_be_counted() -> None:
     (memories, *_) = [row for row in RECORD if row["kind"] == "memories"]
     (others, *_) = [row for row in RECORD if row["kind"] == "other registers"]
     assert upsets.silent([memories | {"silent": 2}, memories | {"lost": 1}, others | {"silent": 5}]) == 3
+
+
+def test_the_counts_of_the_edge_are_those_of_the_record() -> None:
+    recorded = json.loads(edge.RECORD.read_text(encoding="utf-8"))
+    assert recorded.keys() == edge.PARTS.keys()
+    shown = re.findall(r"(?<=<!-- edge -->\n).*?(?=<!-- end of edge -->)", edge.DOCUMENT.read_text("utf-8"), re.DOTALL)
+    assert shown == [edge.table(recorded)]
+
+
+def test_nothing_was_found_at_the_edge_by_as_many_as_are_asked_for() -> None:
+    recorded = json.loads(edge.RECORD.read_text(encoding="utf-8"))
+    counts = {what: count for rows in recorded.values() for what, count in rows.items()}
+    assert {count for what, count in counts.items() if what.endswith("findings")} == {0}
+    for what in (
+        "host: lies among them, false identities included",
+        "board: hostile messages to its model, with and without registers",
+        "studio: hostile requests, frames and messages",
+        "page of `monitor`: hostile requests, frames and messages",
+    ):
+        assert counts[what] >= 10_000
+    assert counts["kills in all"] >= 1000
+    assert counts[f"environments, of {len(edge.COMMANDS)} calls of commands"] >= 200

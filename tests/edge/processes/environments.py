@@ -247,8 +247,8 @@ def tried(seed: int) -> Environment:
     return Environment(name, tuple(changes), ended.status, found)
 
 
-_LATE = dict.fromkeys(HARMLESS, 0) | dict.fromkeys(HARMFUL, 1) | {"files": 2}
-"""Order of the changes: what forbids the others comes last."""
+_LATE = dict.fromkeys(HARMLESS, 0) | dict.fromkeys(HARMFUL, 1) | {"encoding": -1, "files": 2}
+"""Order of the changes: what needs open streams comes first, what forbids the others last."""
 
 
 @dataclass(frozen=True)
