@@ -62,8 +62,8 @@ class StandardStreams:
         if sys.stdin is None:
             sys.stdin = io.TextIOWrapper(io.FileIO(0, closefd=False), encoding="utf-8")
         if sys.stdout is None:
-            sys.stdout = io.TextIOWrapper(self._stdout, encoding="utf-8", write_through=True)  # type: ignore[type-var]
-        elif sys.stdout is sys.__stdout__:
+            sys.stdout = io.TextIOWrapper(self._stdout, encoding="utf-8", write_through=True)
+        elif isinstance(sys.stdout, io.TextIOWrapper) and sys.stdout is sys.__stdout__:
             self._stdout = _Results(1, "wb", closefd=False)
             sys.stdout = io.TextIOWrapper(
                 io.BufferedWriter(self._stdout),
