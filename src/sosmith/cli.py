@@ -10,6 +10,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from functools import wraps
 from importlib import import_module
 from io import TextIOWrapper
@@ -262,8 +263,10 @@ def main() -> None:
         note(f"error: {error.filename or 'the output'} must be readable and writable, not: {error.strerror}")
         status = ToolError.exit_status
         silence_stdout()
-    if streams.lost and not status:
-        note("error: stdout must be open, not closed: what was printed is lost")
+    with suppress(OSError):  # a reader that has left
+        sys.stdout.flush()
+    if streams.lost is not None and not status:
+        note(f"error: {streams.lost}")
         status = ToolError.exit_status
     sys.exit(status)
 

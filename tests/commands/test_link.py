@@ -207,7 +207,7 @@ def test_monitor_checks_the_board(ramp: Path) -> None:
     with plugged(model_of(instrument_design().core)) as port:
         result = MONITOR.run(port, "--trace", "ramp.csv", "--files", str(ramp.parent / "files"))
     assert isinstance(result.exception, SpecificationError)
-    assert str(result.exception).startswith(f"{expected}: the manifest must be a file that can be read, not: ")
+    assert str(result.exception).startswith(f"{expected}: the manifest must be a readable file, not: ")
 
 
 def test_monitor_needs_samples() -> None:

@@ -133,7 +133,7 @@ UNFIT = {
     ),
     "no report there": (
         ("compare", "none", "none"),
-        "none must be a readable report.json or a folder that holds one, not: no such file or directory",
+        "none: a report.json, or a folder that holds one, must be a readable file, not: no such file or directory",
     ),
     "report that is none": (
         ("compare", "plain.toml", "plain.toml"),

@@ -12,7 +12,7 @@ import pytest
 from tests.commands.command_line import FILTER
 
 LOST = "sosmith: error: stdout must be open, not closed: what was printed is lost\n"
-FULL = "sosmith: error: the output must be readable and writable, not: No space left on device\n"
+FULL = "sosmith: error: stdout must take what is printed, not: No space left on device\n"
 
 
 def shell(line: str, folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -59,6 +59,14 @@ def test_files_are_written_without_any_stream(tmp_path: Path) -> None:
 def test_a_stdout_that_is_full(tmp_path: Path) -> None:
     made = shell("sosmith init --list > /dev/full", tmp_path)
     assert (made.returncode, made.stderr) == (3, FULL)
+
+
+def test_files_that_are_written_after_a_stdout_that_is_full(tmp_path: Path) -> None:
+    record = "time_s,clearance_mm\n" + "".join(f"{86400 * day},{1 + 0.01 * day}\n" for day in range(40))
+    (tmp_path / "wheel.csv").write_text(record)
+    made = shell("sosmith wear wheel.csv --initial 1 --warning 7 --limit 9 --plot a.svg > /dev/full", tmp_path)
+    assert (made.returncode, made.stderr.splitlines()[-2:]) == (3, ["sosmith: wrote a.svg", FULL.rstrip()])
+    assert (tmp_path / "a.svg").read_text().endswith("</svg>\n")
 
 
 @pytest.mark.parametrize("to", ["/dev/full", ">(true)"])

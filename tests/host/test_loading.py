@@ -79,7 +79,7 @@ def test_a_file_that_is_no_set(tmp_path) -> None:  # type: ignore[no-untyped-def
     expected = r"set.json: the set must be a file that `sosmith reload` has written, not another one$"
     with pytest.raises(sosmith.SpecificationError, match=expected):
         client.load(tmp_path / "set.json")
-    with pytest.raises(sosmith.SpecificationError, match=r"none.json: the set must be a file that can be read, not: "):
+    with pytest.raises(sosmith.SpecificationError, match=r"none.json: the set must be a readable file, not: "):
         client.load(tmp_path / "none.json")
 
 

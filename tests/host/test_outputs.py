@@ -208,7 +208,7 @@ def test_the_files_of_a_board_are_found_among_those_of_several(folder: Path, tmp
 
 
 def test_files_that_are_none(folder: Path, tmp_path: Path) -> None:
-    with pytest.raises(SpecificationError, match=r"gauge.json: the manifest must be a file that can be read, not: "):
+    with pytest.raises(SpecificationError, match=r"gauge.json: the manifest must be a readable file, not: "):
         check_files(made_identity(folder), tmp_path)
     (tmp_path / "gauge.json").write_text("[]")
     with pytest.raises(SpecificationError, match=r"gauge.json: the manifest must be JSON, an object, not something"):

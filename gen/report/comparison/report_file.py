@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 import sys
 from collections.abc import Mapping
@@ -11,6 +10,7 @@ from reprlib import repr as shortened
 from typing import Any
 
 from sosmith.model.errors import SpecificationError
+from sosmith.model.foreign_files import read_json
 
 Report = Mapping[str, Any]
 
@@ -82,15 +82,9 @@ def load_report(path: Path) -> dict[str, Any]:
         If it cannot be read or is not a report.
     """
     file = path / "report.json" if path.is_dir() else path
-    try:
-        content = json.loads(file.read_text(encoding="utf-8"), parse_constant=_refuse_constant)
-    except OSError as error:
-        reason = (error.strerror or "unreadable").lower()
-        raise SpecificationError(
-            f"{path} must be a readable report.json or a folder that holds one, not: {reason}"
-        ) from error
-    except (ValueError, RecursionError) as error:  # no JSON, or lists some thousand deep
-        raise SpecificationError(f"{file} must be a report.json of sosmith, not text that is no JSON") from error
+    content = read_json(file, what="a report.json, or a folder that holds one,", parse_constant=_refuse_constant)
+    if content is None:
+        raise SpecificationError(f"{file} must be a report.json of sosmith, not text that is no JSON")
     problem = _problem(content)
     if problem:
         raise SpecificationError(f"{file} must be a report.json of sosmith, not JSON {problem}")

@@ -13,8 +13,9 @@ import zlib
 from collections.abc import Mapping
 from decimal import Decimal
 from fractions import Fraction
+from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 
@@ -34,6 +35,7 @@ MAX_BYTES = 1 << 22
 """Largest size of a file in bytes."""
 
 _MAX_NUMBERS = 4096
+_MAX_ITEM = 32  # bytes of a number: the widest complex ones
 _WAYS = ("sos", "zpk", "ba")
 """Names of arrays, the exact one first: pyfda keeps a filter in all three."""
 
@@ -66,17 +68,16 @@ def _numpy(path: Path, suffix: str) -> Content:
         # Objects could run code when they are read; a filter needs none.
         with path.open("rb") as file, warnings.catch_warnings():
             warnings.simplefilter("ignore")  # about headers of Python 2
+            if suffix == ".npy":
+                return of_rows(path, _matrix(path, _array(path, file)), kind=what)
             loaded = np.load(file, allow_pickle=False)
-            if isinstance(loaded, np.ndarray):
-                return of_rows(path, _matrix(path, loaded), kind=what)
             name = next((name for name in _WAYS if name in loaded.files), None)
             if name is None:
                 raise SpecificationError(f"{path}: arrays must have one named {', '.join(_WAYS)}, not {loaded.files}")
             if sum(part.file_size for part in loaded.zip.infolist()) > MAX_BYTES:
                 raise SpecificationError(f"{path}: arrays must be at most {MAX_BYTES} bytes unpacked, not longer")
-            array = loaded[name]
-            if not isinstance(array, np.ndarray):
-                raise SpecificationError(f"{path}: {name} must be an array, not other bytes")
+            with loaded.zip.open(f"{name}.npy") as part:
+                array = _array(path, part)
     except (ValueError, EOFError, KeyError, TypeError, SyntaxError, NotImplementedError, MemoryError) as error:
         raise SpecificationError(f"{path}: the filter must be {what} of numbers, not: {_first_line(error)}") from None
     except Exception as error:  # zipfile and zlib have errors of their own for damaged archives
@@ -86,6 +87,26 @@ def _numpy(path: Path, suffix: str) -> Content:
     if name == "zpk":
         return _zpk(path, array)
     return of_rows(path, _matrix(path, array), kind=f"{name} in {what}")
+
+
+def _array(path: Path, file: IO[bytes]) -> np.ndarray[Any, Any]:
+    """Read an array, once its header says that it is small: NumPy takes room for all of it before it is read."""
+    content = BytesIO(file.read(MAX_BYTES))
+    version = np.lib.format.read_magic(content)
+    header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    shape, _, kind = header(content)
+    if math.prod(shape) > _MAX_NUMBERS or kind.itemsize > _MAX_ITEM:
+        raise _unfit(path, shape, kind)
+    content.seek(0)
+    array: np.ndarray[Any, Any] = np.lib.format.read_array(content, allow_pickle=False)
+    return array
+
+
+def _unfit(path: Path, shape: tuple[int, ...], kind: np.dtype[Any]) -> SpecificationError:
+    return SpecificationError(
+        f"{path}: the filter must be a matrix of 1 to {_MAX_NUMBERS} real numbers, "
+        f"not {' x '.join(map(str, shape)) or 'one'} of type {str(kind)[:60]}"
+    )
 
 
 def _matlab(path: Path) -> Content:
@@ -174,10 +195,7 @@ def _row(path: Path, row: Any) -> tuple[Fraction, ...]:
 def _matrix(path: Path, array: np.ndarray[Any, Any]) -> list[tuple[Fraction, ...]]:
     """Return a matrix of finite real numbers exactly, one row for a vector."""
     if array.dtype.kind not in "fiu" or not 1 <= array.ndim <= 2 or not 0 < array.size <= _MAX_NUMBERS:
-        raise SpecificationError(
-            f"{path}: the filter must be a matrix of 1 to {_MAX_NUMBERS} real numbers, "
-            f"not {' x '.join(map(str, array.shape)) or 'one'} of type {array.dtype}"
-        )
+        raise _unfit(path, array.shape, array.dtype)
     rows = np.atleast_2d(array)
     if array.dtype.kind == "f" and not np.isfinite(rows).all():
         raise SpecificationError(f"{path}: the filter must have finite numbers, not nan or infinite ones")

@@ -31,12 +31,12 @@ def matrices(content: bytes, max_bytes: int) -> dict[str, _Array]:
     content : bytes
         The file.
     max_bytes : int
-        Largest size of a compressed variable.
+        Largest size of all compressed variables together.
 
     Raises
     ------
     ValueError, struct.error, zlib.error
-        If the content is damaged.
+        If the content is damaged, or unpacks to more.
     NotImplementedError
         If it is of version 7.3.
     """
@@ -47,10 +47,15 @@ def matrices(content: bytes, max_bytes: int) -> dict[str, _Array]:
     if version == 0x0200:
         raise NotImplementedError
     found = {}
+    left = max_bytes
     for element in _elements(content[_HEADER:], order):
         kind, data = element
         if kind == _COMPRESSED:
-            kind, data = next(_elements(zlib.decompressobj().decompress(data, max_bytes), order))
+            unpacked = zlib.decompressobj().decompress(data, left + 1)
+            left -= len(unpacked)
+            if left < 0:
+                raise ValueError(left)
+            kind, data = next(_elements(unpacked, order))
         if kind != _MATRIX:
             raise ValueError(kind)
         name, array = _variable(data, order)

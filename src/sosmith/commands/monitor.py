@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from sosmith.commands.options import BAUD
+from sosmith.commands.standard_streams import check_stdout
 from sosmith.output_paths import output_option
 from sosmith.terminal import live, note, width
 
@@ -140,6 +141,7 @@ def monitor_command(
 def _print_lines(text: str) -> None:
     click.echo(text)
     sys.stdout.flush()
+    check_stdout()
 
 
 def _on_terminal(draw: Callable[[int], RenderableType], stack: ExitStack) -> Callable[[], None]:

@@ -291,7 +291,8 @@ def emulate_command(
         if output is not None:
             trace.write(output)
     if output is None:
-        click.echo(trace.csv(), nl=False)
+        for piece in trace.pieces():
+            click.echo(piece, nl=False)
     else:
         channels = f" of each of {asked.channels} channels" if asked.channels > 1 else ""
         note(f"wrote {output}: {len(trace.time)} samples{channels} at {asked.sample_rate:g} Hz")

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from sosmith.model.errors import ShortfallError, SpecificationError
+from sosmith.model.foreign_files import read_json
 from sosmith.model.link.identity import CONVERTER_FLAGS, Identity
 from sosmith.verify.certificate_file import read_certificate
 
@@ -94,14 +94,7 @@ def _check(identity: Identity, key: str, expected: Any, found: Any) -> None:
 
 
 def _manifest(path: Path) -> dict[str, Any]:
-    try:
-        tree = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise SpecificationError(
-            f"{path}: the manifest must be a file that can be read, not: {error.strerror}"
-        ) from None
-    except ValueError:
-        tree = None
+    tree = read_json(path, what="the manifest")
     if not isinstance(tree, Mapping):
         raise SpecificationError(f"{path}: the manifest must be JSON, an object, not something else")
     return dict(tree)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,6 +11,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from sosmith.model.errors import LinkError, RefusedError, ShortfallError, SpecificationError
+from sosmith.model.foreign_files import read_json
 from sosmith.model.reload.registers import CRC, DESIGN, ID, LAYOUT, MAGIC, STATUS, VERSION, Outcome
 
 PATIENCE = 2.0
@@ -61,12 +61,7 @@ def read_set(source: str | PathLike[str] | Mapping[str, Any]) -> Mapping[str, An
     if isinstance(source, Mapping):
         return source
     path = Path(fspath(source))
-    try:
-        tree = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise SpecificationError(f"{path}: the set must be a file that can be read, not: {error.strerror}") from None
-    except ValueError:
-        tree = None
+    tree = read_json(path, what="the set")
     if not isinstance(tree, dict) or not {"design", "version", "words", "writes"} <= tree.keys():
         raise SpecificationError(f"{path}: the set must be a file that `sosmith reload` has written, not another one")
     return tree

@@ -142,6 +142,9 @@ def _is_here(host: str) -> bool:
         return False
 
 
+_LONGEST = 4096  # characters of a line with credentials
+
+
 def _credentials(path: Path) -> tuple[str, str]:
     """Read ``user:password`` from a file that is its owner's alone."""
     try:
@@ -152,7 +155,7 @@ def _credentials(path: Path) -> tuple[str, str]:
                     f"{path}: the credentials must be readable by their owner only (chmod 600), "
                     f"not have mode {stat.S_IMODE(about.st_mode):o}"
                 )
-            user, colon, password = file.readline().rstrip("\r\n").partition(":")
+            user, colon, password = file.readline(_LONGEST).rstrip("\r\n").partition(":")
     except (OSError, UnicodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "no UTF-8"
         raise SpecificationError(f"{path}: the credentials must be a text that can be read, not: {reason}") from None

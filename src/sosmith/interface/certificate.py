@@ -12,6 +12,7 @@ from sosmith.gen.specification.specification import Specification, from_text, lo
 from sosmith.interface.quantity import Quantity
 from sosmith.interface.second_reader import SECOND_READERS, read_again
 from sosmith.model.errors import SpecificationError
+from sosmith.model.foreign_files import MAX_JSON, read_bytes
 from sosmith.model.text_files import write_files
 from sosmith.verify.around.cic import DecimatorVerdict
 from sosmith.verify.certificate_file import Certificate as Entries
@@ -241,7 +242,7 @@ class Certificate:
             progress,
             stated=None if checked is None else _stated(checked, core),
             folder=None if files is None else Path(fspath(files)),
-            content=self.text().encode() if self.path is None else self.path.read_bytes(),
+            content=self.text().encode() if self.path is None else _content(self.path),
             seconds=seconds,
         )
         scope = dict(found.scope)
@@ -298,3 +299,7 @@ class Certificate:
 
     def __repr__(self) -> str:
         return f"<sosmith.Certificate {self.name}: error at most {self.bound}>"
+
+
+def _content(path: Path) -> bytes:
+    return read_bytes(path, what="the certificate", max_bytes=MAX_JSON)

@@ -1,10 +1,11 @@
-"""Files that commands write: all of them or none, and the examples that come with the package."""
+"""Files that commands read and write, these all or none, and the examples that come with the package."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 from sosmith.gen.specification.examples import DEFAULT, contents, titles
+from sosmith.model.foreign_files import read_text
 from sosmith.model.text_files import check_file, to_json, write_contents, write_file, write_files
 
 __all__ = [
@@ -12,6 +13,7 @@ __all__ = [
     "check_file",
     "contents",
     "default_folder",
+    "read_text",
     "titles",
     "to_json",
     "write_contents",

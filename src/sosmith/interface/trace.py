@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from os import PathLike, fspath
 from pathlib import Path
@@ -56,6 +56,12 @@ class Trace:
             truth=_columns(truths) if len(truths) == len(channels) else None,
             coded=tuple(channels),
         )
+
+    def pieces(self) -> Iterator[str]:
+        """Yield the text of `csv` piece by piece: a long trace need not be in memory as text."""
+        from sosmith.model.traces.trace_file import trace_pieces
+
+        return trace_pieces(self.coded)
 
     def csv(self) -> str:
         """Return the text of a CSV file, with a column for each input; several channels are told apart by another."""

@@ -5,12 +5,13 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
 from sosmith import SosmithError, Specification, SpecificationError
 from sosmith.host.loopback import MessageError
-from sosmith.interface.files import write_file, write_files
+from sosmith.interface.files import read_text, write_file, write_files
 from sosmith.studio.edits import changed
 from sosmith.studio.lane import Lane, warm_up
 
@@ -162,8 +163,8 @@ class Session:
 
     def _save(self, message: dict[str, Any]) -> None:
         try:
-            found = self.file.read_text(encoding="utf-8") if self.file.exists() else None
-        except (OSError, ValueError):
+            found = _read(self.file) if self.file.exists() else None
+        except (OSError, ValueError, SpecificationError):
             found = ""  # it is no specification of ours: ask
         if found not in {None, self._on_disk} and not _typed(message, "overwrite", bool, False):
             self._document(
@@ -182,8 +183,8 @@ class Session:
 
     def _reread(self, message: dict[str, Any]) -> None:
         try:
-            text = self.file.read_text(encoding="utf-8")
-        except (OSError, ValueError):
+            text = _read(self.file)
+        except SpecificationError:
             self._document(problem=f"{self.file}: the specification must be a readable file")
             return
         self._on_disk = text
@@ -378,8 +379,8 @@ def opened(spec: Path | None, output: Path | None, folder: Path) -> Session:
         example = Specification.example()
         return Session(output or Path(f"{example.name}.toml"), example.toml(), None, folder)
     try:
-        text = spec.read_text(encoding="utf-8")
-    except (OSError, ValueError):
+        text = _read(spec)
+    except SpecificationError:
         Specification.load(spec)  # says what is wrong with the file
         raise SpecificationError(f"{spec}: the specification must be a readable file") from None
     if len(text) > MAX_TEXT:
@@ -404,3 +405,9 @@ def _short(text: str, longest: int) -> str:
     except UnicodeEncodeError:  # half a character, which JSON can say
         raise MessageError from None
     return text
+
+
+def _read(file: Path) -> str:
+    """Read a specification with the line ends of its page."""
+    text = read_text(file, what="the specification", max_bytes=4 * MAX_TEXT + 1)  # of any characters, and one too many
+    return StringIO(text, newline=None).read()

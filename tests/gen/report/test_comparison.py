@@ -505,7 +505,8 @@ def test_load_refuses_bytes(tmp_path: Path) -> None:
 
 
 def test_load_refuses_a_missing_file(tmp_path: Path) -> None:
-    for path in (tmp_path, tmp_path / "nowhere"):
-        message = f"{path} must be a readable report.json or a folder that holds one, not: no such file or directory"
+    for path, file in ((tmp_path, tmp_path / "report.json"), (tmp_path / "nowhere",) * 2):
+        message = f"{file}: a report.json, or a folder that holds one, must be a readable file, not: "
+        message += "no such file or directory"
         with pytest.raises(SpecificationError, match=f"^{re.escape(message)}$"):
             load_report(path)
