@@ -18,7 +18,7 @@ from benchmarks.attacks.differences import difference
 from benchmarks.attacks.tools import TOOLS, traces
 from tests.verify.reader.netlists import netlists
 
-from sosmith.interface.certificate import Certificate
+from sosmith.interface.certificate import Certificate, State
 from sosmith.model.errors import ShortfallError, SpecificationError, ToolError
 from sosmith.verify.certificate_file import Certificate as Entries
 from sosmith.verify.certificate_file import certificate_text, read_certificate, sealed
@@ -127,7 +127,7 @@ def _text_verdict(core: Core, text: str) -> str:
         )
     finally:
         path.write_bytes(before)
-    return "accepted" if proof.hardware is not None or proof.program is not None else "read"
+    return "accepted" if proof.scope["hardware"].state is State.PROVEN else "read"
 
 
 def _resealed(tree: Any, folder: Path) -> Entries:
