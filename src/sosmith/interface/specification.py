@@ -71,7 +71,7 @@ class Specification:
         Raises
         ------
         SpecificationError
-            For the first error, with the path of its key, what was expected and what was found.
+            For all errors of the keys, with the path of each, what was expected and what was found.
         """
         if isinstance(source, Mapping):
             return cls(from_tree(exact(source), _UNNAMED))
