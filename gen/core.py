@@ -17,7 +17,7 @@ from sosmith.gen.search import AskedRealization, Response, Search
 from sosmith.gen.specification.choices import AUTO, CORES, ERROR_FEEDBACK
 from sosmith.gen.specification.combinations import asked_by
 from sosmith.gen.specification.specification import Specification
-from sosmith.gen.word_lengths.decimator import Front, front_of
+from sosmith.gen.word_lengths.decimator import PreStage, pre_stage_of
 from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.gen.word_lengths.selection import Progress
 from sosmith.model.dataflow.datapath import Datapath
@@ -103,7 +103,7 @@ def design_core(
     asked = AskedRealization(_known(realization or spec.hardware.realization), source, widths_of)
     response, decimates = response_of(spec, kind, progress)
     _check_realization(spec, asked, response)
-    ahead, budget, calibrates = _ahead(spec, response, _budget(spec, response.front, board), board)
+    ahead, budget, calibrates = _ahead(spec, response, _budget(spec, response.pre_stage, board), board)
     search = Search(
         spec=spec, response=response, asked=asked, budget=budget, ahead=ahead, board=board, progress=progress
     )
@@ -111,7 +111,7 @@ def design_core(
     kinds = candidates(wanted, budget.blocks, asked_by(spec))
     (quantized, reason, architecture), refused = search.first_that_keeps_up(kinds)
     why = reason_for(architecture, budget, asked=wanted != AUTO, board=board, refused=refused)
-    whole = quantized if response.front is None else response.front.counted(quantized)
+    whole = quantized if response.pre_stage is None else response.pre_stage.counted(quantized)
     return CoreDesign(
         spec=spec,
         core=kind,
@@ -151,24 +151,24 @@ def response_of(
         progress("calibration")
         polynomial, fitted = polynomial_of(spec)
     progress("filter design")
-    front, decimates = front_in(spec, kind, polynomial)
+    pre_stage, decimates = pre_stage_in(spec, kind, polynomial)
     inputs = inputs_of(spec, kind)
-    if front is not None:
-        ideal: Filter | None = front.filter
+    if pre_stage is not None:
+        ideal: Filter | None = pre_stage.filter
     else:
         ideal = None if kind == "calibration" else filter_of(spec)
     made = Response(
-        inputs=inputs if front is None else (front.decimator.output,),
+        inputs=inputs if pre_stage is None else (pre_stage.decimator.output,),
         codes=() if fitted is None else calibrated_codes(inputs, fitted),
         polynomial=polynomial,
         fit=fitted,
-        front=front,
+        pre_stage=pre_stage,
         ideal=ideal,
     )
     return made, decimates
 
 
-def _budget(spec: Specification, front: Front | None, board: Board | None) -> Budget:
+def _budget(spec: Specification, pre_stage: PreStage | None, board: Board | None) -> Budget:
     """Return the time and the multiplier blocks that there are for a core."""
     hardware = spec.hardware
     return Budget(
@@ -178,9 +178,9 @@ def _budget(spec: Specification, front: Front | None, board: Board | None) -> Bu
         reload=hardware.reload,
         protect=hardware.protect,
         blocks=blocks_for(hardware.multipliers, board),
-        decimate=1 if front is None else front.decimator.factor,
+        decimate=1 if pre_stage is None else pre_stage.decimator.factor,
         samples_per_clock=hardware.samples_per_clock,
-        hold=front is not None and spec.filter.hold,
+        hold=pre_stage is not None and spec.filter.hold,
     )
 
 
@@ -194,7 +194,7 @@ def _check_realization(spec: Specification, asked: AskedRealization, response: R
         word lengths.
     """
     named = [name for name in (asked.name, asked.widths_of) if name in REALIZATIONS]
-    factor = 1 if response.front is None else response.front.decimator.factor
+    factor = 1 if response.pre_stage is None else response.pre_stage.decimator.factor
     for name in named:
         if factor > 1 and (reason := REALIZATIONS[name].not_decimated):
             raise SpecificationError(
@@ -230,7 +230,9 @@ def chosen_core(spec: Specification, core: str | None) -> str:
     return core or "instrument"
 
 
-def front_in(spec: Specification, core: str, polynomial: Polynomial | None) -> tuple[Front | None, dict[str, str]]:
+def pre_stage_in(
+    spec: Specification, core: str, polynomial: Polynomial | None
+) -> tuple[PreStage | None, dict[str, str]]:
     """Return what stands before the filter of a core that decimates, and why; None and nothing if all samples go in.
 
     Raises
@@ -240,7 +242,7 @@ def front_in(spec: Specification, core: str, polynomial: Polynomial | None) -> t
     """
     if spec.filter.decimate is None or core == "calibration":
         return None, {}
-    front, reason = front_of(
+    pre_stage, reason = pre_stage_of(
         spec.filter,
         spec.sample_rate,
         inputs_of(spec, core),
@@ -249,7 +251,7 @@ def front_in(spec: Specification, core: str, polynomial: Polynomial | None) -> t
         polynomial,
         f"{spec.name}_ahead",
     )
-    return front, {"decimation": reason}
+    return pre_stage, {"decimation": reason}
 
 
 def _ahead(
@@ -264,7 +266,7 @@ def _ahead(
     ShortfallError
         If none keeps up with all samples.
     """
-    datapath = None if response.front is None else response.front.ahead(response.codes)
+    datapath = None if response.pre_stage is None else response.pre_stage.ahead(response.codes)
     if datapath is None:
         return None, budget, {}
     wanted, each = spec.hardware.architecture, replace(budget, decimate=1, hold=False)

@@ -17,7 +17,7 @@ from sosmith.gen.realizations.registry import LOOK_AHEAD, REALIZATIONS
 from sosmith.gen.specification import combinations
 from sosmith.gen.specification.choices import AUTO
 from sosmith.gen.specification.specification import Specification
-from sosmith.gen.word_lengths.decimator import Front
+from sosmith.gen.word_lengths.decimator import PreStage
 from sosmith.gen.word_lengths.objective import FEW_ADDERS
 from sosmith.gen.word_lengths.other_realization import with_realization
 from sosmith.gen.word_lengths.quantize import Plan, least_size, plan, prove
@@ -44,7 +44,7 @@ class Response:
         The calibration; None without one.
     fit : Fit or None
         The fit, if the calibration comes from measurements.
-    front : Front or None
+    pre_stage : PreStage or None
         What stands before the filter; None if all samples go in.
     ideal : Filter or None
         The filter; None of a calibration alone.
@@ -54,7 +54,7 @@ class Response:
     codes: tuple[tuple[int, int], ...]
     polynomial: Polynomial | None
     fit: Fit | None
-    front: Front | None
+    pre_stage: PreStage | None
     ideal: Filter | None
 
 
@@ -177,15 +177,15 @@ class Search:
         """Plan a realization, once for all architectures that are tried."""
         if realization not in self._plans:
             spec, response = self.spec, self.response
-            front, ideal = response.front, response.ideal
+            pre_stage, ideal = response.pre_stage, response.ideal
             self.progress(f"word lengths, {realization}" if ideal is not None else "word lengths")
             self._plans[realization] = plan(
                 name=spec.name,
                 inputs=response.inputs,
                 output=spec.output,
-                max_error=spec.max_error - (0 if front is None else front.error * spec.output.lsb),
+                max_error=spec.max_error - (0 if pre_stage is None else pre_stage.error * spec.output.lsb),
                 ideal=ideal,
-                polynomial=response.polynomial if front is None else None,
+                polynomial=response.polynomial if pre_stage is None else None,
                 realization=realization,
                 steady=spec.hardware.start == "steady",
             )
@@ -201,15 +201,15 @@ class Search:
         ShortfallError
             If the architecture does not take the datapath, or does not keep up.
         """
-        spec, front, codes = self.spec, self.response.front, self.response.codes
+        spec, pre_stage, codes = self.spec, self.response.pre_stage, self.response.codes
         wear = () if spec.wear is None else spec.wear.codes(spec.output)
         # Constants that are loaded may make the filter slower, and the count is not among them.
         spare = 3 if spec.hardware.reload else 1
         flagged = replace(with_settling(datapath, spare * samples_to_settle(datapath)), wear=wear)
-        if front is None:
+        if pre_stage is None:
             whole = replace(flagged, calibrated=codes)
             return fitting(kind, self.budget, whole, self.board, look_ahead=look_ahead)
-        return fitting(kind, self.budget, front.before(flagged, codes), self.board, ahead=self.ahead)
+        return fitting(kind, self.budget, pre_stage.before(flagged, codes), self.board, ahead=self.ahead)
 
     def _may_look_ahead(self, plain: Candidate) -> bool:
         """Say whether look-ahead may take the place of plain loops: if nothing is asked for that excludes it."""

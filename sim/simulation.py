@@ -92,7 +92,7 @@ def simulate(
         made = generate(
             design, directory, lambda step: progress(f"generating {step}", 0, 0), facts=facts, claims=claims
         )
-        source, build_dir, netlist = directory / f"{design.datapath.name}.sv", directory / "simulation", None
+        source, netlist = directory / f"{design.datapath.name}.sv", None
         codes = side_by_side([trace.codes for trace in traces])
         sent = whole_beats(codes, facts.interface.inputs)
         if hardware is not None:
@@ -105,13 +105,12 @@ def simulate(
         else:
             if gates is not None:
                 progress(f"synthesizing for {gates.title}", 0, 0)
-                build_dir = directory / "gates" / gates.name
-                netlist = synthesize(source, design.datapath.name, gates, build_dir)
+                netlist = synthesize(source, design.datapath.name, gates, directory / "gates" / gates.name)
                 source = with_cell_models(netlist, scrambled=not design.spec.hardware.reload)
             bench = SimulatorBench(
                 source=source,
                 interface=facts.interface,
-                build_dir=build_dir,
+                build_dir=directory / "simulation" if gates is None else directory / "gates" / gates.name,
                 simulator=simulator,
                 seed=seed,
                 idle=idle,

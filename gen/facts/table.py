@@ -24,15 +24,18 @@ class Fact:
         Unit of the value as in a specification, "" for a plain number or a text.
     sentence : str
         The rest; stands behind the value.
-    show : callable
-        Makes the text of a number that is no int from value and unit.
+    show : callable or None
+        Makes the text of a number that is no int from value and unit; None for three digits in the unit itself.
+    share : float or None
+        What part of its limit the value is; None where it has no limit.
     """
 
     name: str
     value: float | str | None = None
     unit: str = ""
     sentence: str = ""
-    show: Callable[[float, str], str] = in_own_unit
+    show: Callable[[float, str], str] | None = None
+    share: float | None = None
 
     @property
     def shown(self) -> str:
@@ -41,7 +44,7 @@ class Fact:
             return self.value or ""
         if isinstance(self.value, int):
             return f"{self.value:,} {self.unit}".rstrip()
-        return self.show(self.value, self.unit)
+        return (self.show or in_own_unit)(self.value, self.unit)
 
     @property
     def text(self) -> str:
@@ -53,8 +56,15 @@ class Fact:
         return iter((self.name, self.text))
 
     def as_dict(self) -> dict[str, Any]:
-        """Return name, value, unit and sentence."""
-        return {"name": self.name, "value": self.value, "unit": self.unit, "sentence": self.sentence}
+        """Return all of it, with the value also as text."""
+        return {
+            "name": self.name,
+            "value": self.value,
+            "unit": self.unit,
+            "text": self.shown,
+            "sentence": self.sentence,
+            "share": self.share,
+        }
 
 
 @dataclass(frozen=True)

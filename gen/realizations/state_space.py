@@ -20,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sosmith.gen.realizations.coefficients import Rounding
+from sosmith.gen.realizations.direct_form import pole_side
 from sosmith.gen.realizations.minimum_noise import least_noise, power_of_two_below, unit_gains
 from sosmith.gen.realizations.noise import StateSystem
 from sosmith.model.dataflow.graph import Range
@@ -122,20 +123,16 @@ def _is_first_order(row: Row) -> bool:
 
 
 def _first_order(row: Row) -> StateDesign:
-    side = _side(row)
+    side = pole_side(row)
     distance = float(-1 - side * Fraction(row[4]))
     B = power_of_two_below(math.sqrt(1 - row[4] ** 2))
     C = float(Fraction(row[1]) - Fraction(row[0]) * Fraction(row[4])) / B
     return StateDesign(side, np.array([[distance]]), np.array([B]), np.array([C]), row[0])
 
 
-def _side(row: Row) -> int:
-    return -1 if row[4] > 0 else 1
-
-
 def _about_side(row: Row) -> tuple[int, float, float]:
     """Side s, and A1, A2 of ``d**2 + A1 d + A2``, whose roots are the eigenvalues of M."""
-    side = _side(row)
+    side = pole_side(row)
     a1, a2 = side * Fraction(row[4]), Fraction(row[5])
     return side, float(2 + a1), float(1 + a1 + a2)
 

@@ -5,24 +5,26 @@ This module says what stands on the page, as plain text; the templates make mark
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from sosmith.gen.facts.design_tables import ErrorUnit, budget_table, limit_cycles_table, uncertainty_table
+from sosmith.gen.facts.table import Table
 from sosmith.gen.filter.decimation import SAMPLED
 from sosmith.gen.filter.response import FilterFacts
 from sosmith.gen.filter.step_response import SETTLED, StepResponse
 from sosmith.gen.fpga.synthesis import Netlist
 from sosmith.gen.output.decimation_facts import DecimationFacts
-from sosmith.gen.quantity import LEAST_PART, count, decibels, duration, plain_number, quantity, scale, unit_symbol
+from sosmith.gen.quantity import count, decibels, duration, plain_number, quantity, scale, unit_symbol
 from sosmith.gen.report import plots
 from sosmith.gen.report.behaviour import behaviour
 from sosmith.gen.report.diagram import diagram
 from sosmith.gen.report.evidence import Evidence
+from sosmith.gen.report.headlines import Summary, unbroken
 from sosmith.gen.report.recursion import Recursion
 from sosmith.gen.report.samples import MAX_POINTS, viewer_data
 from sosmith.gen.report.step_plot import step_figure
-from sosmith.gen.report.tiles import ErrorUnit, Summary, amount, tile_rows
 from sosmith.gen.specification.values import listed
 from sosmith.gen.version import __version__
 from sosmith.model.templates import render
@@ -51,31 +53,19 @@ class Figure:
     legend: Sequence[tuple[str, str, str]] = ()
 
 
-@dataclass(frozen=True, kw_only=True)
-class Table:
-    """A table of plain text.
+def _unit(evidence: Evidence) -> ErrorUnit:
+    return ErrorUnit.of(evidence.facts, "\u00a0")
 
-    Attributes
-    ----------
-    head : sequence of str
-        Titles of the columns.
-    rows : sequence of sequence of str
-        Cells of the rows; the first is the row's title, empty where it is that of the row above.
-    numbers, code : collection of int
-        Columns set flush right, and columns set in monospace.
-    """
 
-    head: Sequence[str]
-    rows: Sequence[Sequence[str]]
-    numbers: Collection[int] = ()
-    code: Collection[int] = ()
+def _amount(value: float | None, unit: str) -> str:
+    return unbroken(quantity(value, unit))
 
 
 def _reasons(evidence: Evidence, summary: Summary) -> list[str]:
     """Sentences of the verdict."""
     if not summary["passed"]:
         return list(summary["shortfalls"])
-    unit = ErrorUnit.of(evidence)
+    unit = _unit(evidence)
     error, bound = (unit.amount(value) for value in (summary["error"]["max_abs"], evidence.facts.error_bound))
     ran = "hardware" if evidence.gates is None else f"netlist for the {evidence.gates.board.title}"
     arithmetic = (
@@ -89,7 +79,7 @@ def _of_the_signal(evidence: Evidence, summary: Summary, bound: str) -> str:
     """Tell the error of the signal from that of the arithmetic, which alone decides; empty without a true value."""
     if summary["true_error"] is None:
         return ""
-    off = amount(summary["true_error"]["max_abs"], evidence.facts.unit)
+    off = _amount(summary["true_error"]["max_abs"], evidence.facts.unit)
     causes = [] if evidence.facts.core == "filter" else ["the sensor", "its calibration"]
     causes += [] if evidence.facts.filter is None else ["the delay of the filter", "the noise that passes it"]
     return (
@@ -137,7 +127,7 @@ def _close_up_figure(evidence: Evidence) -> Figure:
         drawing=plots.close_up_figure(evidence, plots.WIDE),
         narrow=plots.close_up_figure(evidence, plots.NARROW),
         caption=f"{count(near.stop - near.start, 'sample')} of the same curves; the dotted line marks the largest "
-        f"error. The output moves in steps of {amount(evidence.facts.lsb, evidence.facts.unit)}.",
+        f"error. The output moves in steps of {_amount(evidence.facts.lsb, evidence.facts.unit)}.",
         legend=[("golden", "broad", "exact calculation"), ("hardware", "dot", "hardware")],
     )
 
@@ -159,7 +149,7 @@ def _looks(evidence: Evidence) -> Figure:
 
 def _error_figure(evidence: Evidence) -> Figure:
     inside, outside = plots.error_limits(evidence)
-    unit = ErrorUnit.of(evidence)
+    unit = _unit(evidence)
     legend = [("hardware", "", "hardware minus exact calculation")]
     legend += [
         (
@@ -193,7 +183,7 @@ def _histogram_figure(evidence: Evidence) -> Figure:
     return Figure(
         title="How often each error occurs",
         drawing=plots.histogram_figure(evidence),
-        caption=f"One LSB is {amount(evidence.facts.lsb, evidence.facts.unit)}. Rounding the output spreads the "
+        caption=f"One LSB is {_amount(evidence.facts.lsb, evidence.facts.unit)}. Rounding the output spreads the "
         "error evenly between the dotted lines at ±½\u00a0LSB; what lies beyond them comes from inside.",
     )
 
@@ -211,48 +201,13 @@ def _alternatives_figure(evidence: Evidence) -> Figure:
 def _alternatives_table(evidence: Evidence, summary: Summary) -> Table:
     found = [(f"{evidence.realization} (this design)", summary["error"]["max_abs"], summary["error"]["rms"])]
     found += [(other.name, other.max_abs, other.rms) for other in evidence.rivals]
-    unit = ErrorUnit.of(evidence)
+    unit = _unit(evidence)
     rows = [
         (name, unit.number(largest), plain_number(largest / evidence.facts.lsb), unit.number(rms))
         for name, largest, rms in found
     ]
     head = ("realization", unit.titled("largest error"), "in LSB", unit.titled("RMS"))
-    return Table(head=head, rows=rows, numbers=(1, 2, 3))
-
-
-def _budget_table(evidence: Evidence) -> Table:
-    seen = {
-        name: value for name, value in evidence.facts.error_parts.items() if value >= evidence.facts.lsb * LEAST_PART
-    }
-    parts = [(name.replace("_", " "), value) for name, value in seen.items()]
-    parts += [("limit", evidence.facts.error_bound), ("allowed by the specification", evidence.facts.max_error)]
-    unit = ErrorUnit.of(evidence)
-    rows = [(name, unit.number(value), plain_number(value / evidence.facts.lsb)) for name, value in parts]
-    return Table(head=("contribution", unit.titled("at most"), "in LSB"), rows=rows, numbers=(1, 2))
-
-
-def _uncertainty_table(found: Mapping[str, Any]) -> Table:
-    at, unit = found["at"], found["unit"]
-    rows = [
-        (
-            one["source"],
-            one["distribution"],
-            f"{plain_number(one['standard_uncertainty'])} {one['unit']}",
-            plain_number(one["sensitivity"]),
-            plain_number(one["contribution"]),
-            _freedom(one["degrees_of_freedom"]),
-        )
-        for one in at["contributions"]
-    ]
-    rows.append(("combined", "", "", "", plain_number(at["combined"]), _freedom(at["degrees_of_freedom"])))
-    factor = f"k = {plain_number(at['coverage_factor'])}"
-    rows.append((f"expanded, {100 * found['probability']:g} %", "", "", factor, plain_number(at["expanded"]), ""))
-    head = ("source", "distribution", "standard uncertainty", "sensitivity", unit, "degrees of freedom")
-    return Table(head=head, rows=rows, numbers=range(2, 6))
-
-
-def _freedom(value: float | None) -> str:
-    return "known" if value is None else plain_number(value)
+    return Table("", rows, head, numbers=(1, 2, 3))
 
 
 def _uncertainty_caption(found: Mapping[str, Any]) -> str:
@@ -266,32 +221,6 @@ def _uncertainty_caption(found: Mapping[str, Any]) -> str:
     return text + (f" Not stated: {', '.join(found['not_stated'])}." if found["not_stated"] else "")
 
 
-def _limit_cycles_table(evidence: Evidence) -> Table:
-    """Tell what each section's rounding can sustain by itself, at the section's own output."""
-    rows, unit = [], ErrorUnit.of(evidence)
-    for found in evidence.facts.limit_cycles:
-        weights = [f"{float(weight):.4g}" for weight in found.lyapunov or ()]
-        rows.append(
-            (
-                found.section,
-                "0, comes to rest" if found.none else unit.number(found.largest),
-                "0" if found.none else plain_number(found.largest / evidence.facts.lsb),
-                unit.number(found.dead_band),
-                plain_number(found.dead_band / evidence.facts.lsb),
-                ", ".join(weights) or "not needed",
-            )
-        )
-    head = (
-        "section",
-        unit.titled("without input, at most"),
-        "in LSB",
-        unit.titled("dead band"),
-        "in LSB",
-        "Lyapunov weights",
-    )
-    return Table(head=head, rows=rows, numbers=range(1, 6))
-
-
 _BANDS = 8
 """Bands of a decimator that are told one by one; the gain falls from band to band."""
 
@@ -303,7 +232,7 @@ def _decimation_table(found: DecimationFacts) -> Table:
         (
             f"{_hertz((band.whole_low,))} to {_hertz((band.whole_high,))}",
             decibels(band.largest_db),
-            amount(band.largest_at, "Hz"),
+            _amount(band.largest_at, "Hz"),
             f"{_hertz((band.low,))} to {_hertz((band.high,))}",
             decibels(band.gain_db),
         )
@@ -314,24 +243,24 @@ def _decimation_table(found: DecimationFacts) -> Table:
         end = _hertz((others[-1].high,))
         rows.append((f"{len(others)} more, up to {end}", decibels(whole), "", f"up to {end}", decibels(part)))
     head = ("from", "gain at most", "comes out at", "into the pass band from", "gain of the decimator at most")
-    return Table(head=head, rows=rows, numbers=(1, 2, 4))
+    return Table("", rows, head, numbers=(1, 2, 4))
 
 
 def _decimation_caption(found: DecimationFacts, unit: str) -> str:
-    worst, rate = amount(found.worst_aliasing, unit), _hertz((found.sample_rate,))
+    worst, rate = _amount(found.worst_aliasing, unit), _hertz((found.sample_rate,))
     held = ", which leaves as many times" if found.held else ""
     before = found.calibration
-    calibrated = "" if before is None else f"Every sample is calibrated first, within {amount(before.error, unit)}. "
+    calibrated = "" if before is None else f"Every sample is calibrated first, within {_amount(before.error, unit)}. "
     what = "the input" if before is None else "the calibration's result"
     return (
         f"{calibrated}{found.factor} samples make one result{held}, by {count(found.stages, 'stage')} of integrators "
         f"and combs of {found.width} bits, and the filter works at {rate}. A sine over the whole range of {what} in "
         f"one of the bands on the right comes out in the pass band with an amplitude of at most {worst}; one at any "
-        f"frequency from half that rate on, wherever it comes out, with at most {amount(found.largest, unit)} "
+        f"frequency from half that rate on, wherever it comes out, with at most {_amount(found.largest, unit)} "
         f"({decibels(found.largest_db)}), where a filter without a decimator has "
         f"{decibels(found.direct_largest_db)}. At {SAMPLED} frequencies in the pass band the gain is "
         f"within {plain_number(found.deviation_db)} dB of that without a decimator, and decimator and filter together "
-        f"delay by {amount(found.delay, 's')}."
+        f"delay by {_amount(found.delay, 's')}."
     )
 
 
@@ -356,7 +285,7 @@ def _response_table(facts: FilterFacts, measures: Mapping[str, float | None]) ->
     radius = measures["largest_pole_radius"]
     rows.append(("sampling frequency", _hertz((facts.sample_rate,))))
     rows.append(("largest pole radius", "—" if radius is None else f"{radius:.7f}"))
-    return Table(head=("with the integer coefficients", ""), rows=rows, numbers=(1,))
+    return Table("", rows, ("with the integer coefficients", ""), numbers=(1,))
 
 
 def _filter_figures(facts: FilterFacts, decimation: DecimationFacts | None) -> dict[str, Figure]:
@@ -364,7 +293,7 @@ def _filter_figures(facts: FilterFacts, decimation: DecimationFacts | None) -> d
     masked = (facts.passband_edge and facts.passband_loss) or (facts.stopband_edge and facts.stopband_loss)
     mask = [("limit", "area", "forbidden by the specification")] if masked else []
     alone = "" if decimation is None else " Of the filter alone, behind the decimator."
-    later = "" if decimation is None else f" That adds {amount(decimation.own_delay, 's')}."
+    later = "" if decimation is None else f" That adds {_amount(decimation.own_delay, 's')}."
     return {
         "gain": Figure(
             title="Gain",
@@ -392,7 +321,7 @@ def _step_figure(step: StepResponse) -> Figure:
     legend = [
         ("hardware", "", "integer coefficients"),
         ("truth", "area", f"within {100 * SETTLED:g} % of the {'end' if step.passes_constants else 'peak'}"),
-        ("limit", "dashed", f"settled after {amount(step.samples_to(SETTLED) / step.sample_rate, 's')}"),
+        ("limit", "dashed", f"settled after {_amount(step.samples_to(SETTLED) / step.sample_rate, 's')}"),
     ]
     if step.overshoot:
         legend.append(("asked", "dot", f"overshoot {plain_number(100 * step.overshoot)} %"))
@@ -437,7 +366,7 @@ def _coefficient_table(evidence: Evidence) -> Table:
                 )
             )
     head = ("section", "", "integer", "fractional bits", "value")
-    return Table(head=head, rows=rows, numbers=(2, 3, 4), code=(1, 2, 4))
+    return Table("", rows, head, numbers=(2, 3, 4), code=(1, 2, 4))
 
 
 def _format_table(evidence: Evidence) -> Table:
@@ -445,9 +374,9 @@ def _format_table(evidence: Evidence) -> Table:
     rows, previous = [], ""
     for row in evidence.facts.formats:
         title = "" if row.stage == previous else row.stage
-        rows.append((title, row.node, row.format, amount(row.low, row.unit), amount(row.high, row.unit)))
+        rows.append((title, row.node, row.format, _amount(row.low, row.unit), _amount(row.high, row.unit)))
         previous = row.stage
-    return Table(head=("stage", "signal", "format", "from", "to"), rows=rows, numbers=(3, 4), code=(2,))
+    return Table("", rows, ("stage", "signal", "format", "from", "to"), numbers=(3, 4), code=(2,))
 
 
 def _netlist_in_words(netlist: Netlist) -> str:
@@ -471,7 +400,7 @@ def _evidence_tables(evidence: Evidence) -> tuple[Table, Table]:
     others = [name for name in evidence.files if name not in certificate]
     derived += [("" if k else "generated files", name, evidence.files[name]) for k, name in enumerate(others)]
     head = ("", "", "SHA-256")
-    return Table(head=head, rows=told, code=(2,)), Table(head=head, rows=derived, code=(2,))
+    return Table("", told, head, code=(2,)), Table("", derived, head, code=(2,))
 
 
 def _evidence_facts(evidence: Evidence) -> list[tuple[str, str]]:
@@ -499,13 +428,13 @@ def _run_facts(evidence: Evidence) -> list[tuple[str, str]]:
 
 
 def render_page(evidence: Evidence, summary: Summary) -> str:
-    """Whole report page; `summary` is what `sosmith.gen.report.report.summarise` makes of `evidence`."""
-    shown = evidence.shown
+    """Return the whole page; `summary` is what `sosmith.gen.report.report.summarise` makes of `evidence`."""
+    shown, facts = evidence.shown, evidence.facts
     found = behaviour(evidence)
     told_by, derived = _evidence_tables(shown)
     parts: dict[str, Any] = {}
     if shown.uncertainty is not None:
-        parts["uncertainty"] = _uncertainty_table(shown.uncertainty)
+        parts["uncertainty"] = uncertainty_table(shown.uncertainty)
         parts["uncertainty_caption"] = _uncertainty_caption(shown.uncertainty)
     if shown.rivals:
         parts["alternatives"] = _alternatives_figure(shown)
@@ -523,7 +452,7 @@ def render_page(evidence: Evidence, summary: Summary) -> str:
         evidence=shown,
         summary=summary,
         reasons=_reasons(evidence, summary),
-        rows=tile_rows(evidence, summary, found),
+        unbroken=unbroken,
         told_by=told_by,
         derived=derived,
         told_facts=_evidence_facts(shown),
@@ -533,8 +462,8 @@ def render_page(evidence: Evidence, summary: Summary) -> str:
         samples=viewer_data(shown, found.transient),
         error=_error_figure(shown),
         histogram=_histogram_figure(shown),
-        budget=_budget_table(shown),
-        limit_cycles=_limit_cycles_table(shown),
+        budget=budget_table(facts.error_parts, facts.max_error, facts.lsb, facts.unit),
+        limit_cycles=limit_cycles_table(facts.limit_cycles, facts),
         realized=[_realized(recursion) for recursion in shown.recursions],
         coefficients=_coefficient_table(shown),
         formats=_format_table(shown),

@@ -14,6 +14,7 @@ from sosmith.gen.quantity import quantity
 from sosmith.gen.report.behaviour import behaviour, behaviour_entry, readings_of
 from sosmith.gen.report.curves import error_over_time, error_spectrum, filter_curve
 from sosmith.gen.report.evidence import Evidence
+from sosmith.gen.report.headlines import headlines
 from sosmith.gen.report.input_ranges import inputs_at_an_end, limited_inputs
 from sosmith.gen.report.mask import mask_shortfalls
 from sosmith.gen.report.page import render_page
@@ -96,8 +97,9 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
         not pass), ``notes``, ``inputs`` (the shares of codes ``at_end`` of the range and of values ``limited`` to it),
         ``provenance.{specification,specification_sha256,
         reference_sha256,trace_sha256,datapath_sha256,cycles_per_sample,cost}`` (see
-        `sosmith.gen.report.provenance.Provenance`) and ``curves.{error,spectrum,filter}`` (see
-        `sosmith.gen.report.curves`). Lengths are in samples or cycles, errors in
+        `sosmith.gen.report.provenance.Provenance`), ``curves.{error,spectrum,filter}`` (see
+        `sosmith.gen.report.curves`) and ``facts`` (the headline figures of the page, in groups: ``name``, ``value``,
+        ``unit``, ``text``, ``sentence``, and ``share`` of the limit). Lengths are in samples or cycles, errors in
         ``error.unit``. What is unknown or not finite is None.
         ``passed`` is true if hardware and integer model agree bit for bit, the largest error is within
         ``error.bound`` and ``max_error``, no value of the trace was outside its
@@ -107,7 +109,8 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
     statistics = error_statistics(run.error)
     measures = None if facts.filter is None else measure_response(facts.filter)
     shortfalls = _shortfalls(evidence, statistics.max_abs, measures)
-    summary = {
+    found = behaviour(evidence)
+    summary: dict[str, Any] = {
         "name": facts.name,
         "core": facts.core,
         "scenario": run.scenario,
@@ -136,7 +139,7 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
             "parts": dict(facts.error_parts),
             "unit": facts.unit,
         },
-        **behaviour_entry(behaviour(evidence)),
+        **behaviour_entry(found),
         "max_error": facts.max_error,
         "lsb": facts.lsb,
         "range": list(facts.range),
@@ -165,6 +168,7 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
             "filter": filter_curve(facts.filter),
         },
     }
+    summary["facts"] = headlines(evidence, summary, found)
     cleaned: dict[str, Any] = _without_infinities(summary)
     return cleaned
 

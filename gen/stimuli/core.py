@@ -43,5 +43,5 @@ def bench_before(spec: Specification, core: str | None = None) -> Bench:
         output=spec.output,
         sample_rate=spec.sample_rate,
         polynomial=made.polynomial,
-        impulse_response=response if made.front is None else made.front.decimator.before(response),
+        impulse_response=response if made.pre_stage is None else made.pre_stage.decimator.before(response),
     )

@@ -35,7 +35,7 @@ _GUESSED_GAIN = 4
 
 
 @dataclass(frozen=True, kw_only=True)
-class Front:
+class PreStage:
     """A decimator, what stands before it, the filter behind it, and why they are so.
 
     Attributes
@@ -108,7 +108,7 @@ class Front:
         )
 
 
-def front_of(
+def pre_stage_of(
     spec: FilterSpec,
     sample_rate: Fraction,
     inputs: tuple[Port, ...],
@@ -116,7 +116,7 @@ def front_of(
     max_error: Fraction,
     polynomial: Polynomial | None = None,
     name: str = "calibration",
-) -> tuple[Front | None, str]:
+) -> tuple[PreStage | None, str]:
     """Choose the decimator before a filter.
 
     Parameters
@@ -138,7 +138,7 @@ def front_of(
 
     Returns
     -------
-    Front or None
+    PreStage or None
         None if "auto" finds that none is better than to filter all samples.
     str
         Why.
@@ -176,7 +176,7 @@ def front_of(
             f"the rounding behind the decimator must take at most half of the error allowed, not {float(rounding):.3g} "
             f"output LSB with {decimator.output.bits} bits: raise output.max_error or output.bits"
         )
-    front = Front(
+    pre_stage = PreStage(
         decimation=found,
         decimator=decimator,
         filter=filter_,
@@ -186,7 +186,7 @@ def front_of(
         gain=gain,
         reason=reason,
     )
-    return front, reason
+    return pre_stage, reason
 
 
 def _rounded(x: Port, found: Decimation, *, coarsest: Fraction, allowed: Fraction) -> Decimator:

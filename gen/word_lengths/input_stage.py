@@ -18,7 +18,7 @@ from sosmith.model.errors import ShortfallError
 from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
 from sosmith.model.sections.horner import HornerPolynomial, Variable
-from sosmith.model.sections.output import Held
+from sosmith.model.sections.output import FirstSample
 from sosmith.model.sections.start import StartStage
 
 _COARSER = 4
@@ -37,13 +37,13 @@ class Start:
 
     Attributes
     ----------
-    held : Held or None
+    held : FirstSample or None
         What is added behind the sections; None if that is 0.
     error : Fraction
         Bound on the error of what is added, in output LSBs; exact.
     """
 
-    held: Held | None
+    held: FirstSample | None
     error: Fraction
 
 
@@ -87,7 +87,7 @@ def starting(stage: InputStage, gain: Fraction, allowed: Fraction) -> InputStage
     return _with_start(stage, gain, *lowest_terms(round(gain * 2**frac), frac))
 
 
-def starting_like(stage: InputStage, gain: Fraction, held: Held | None) -> InputStage:
+def starting_like(stage: InputStage, gain: Fraction, held: FirstSample | None) -> InputStage:
     """Return an input stage with which another filter starts in hardware that adds what is `held`.
 
     Raises
@@ -106,7 +106,7 @@ def starting_like(stage: InputStage, gain: Fraction, held: Held | None) -> Input
 
 
 def _with_start(stage: InputStage, gain: Fraction, integer: int, frac: int) -> InputStage:
-    held = Held(range=stage.output, gain=integer, gain_frac=frac) if integer else None
+    held = FirstSample(range=stage.output, gain=integer, gain_frac=frac) if integer else None
     start = StartStage(x=stage.output, passes=held is not None)
     return replace(
         stage,

@@ -6,10 +6,10 @@ from fractions import Fraction
 
 from sosmith.model.dataflow.graph import Range
 from sosmith.model.port import Port
-from sosmith.model.sections.output import Held, OutputStage
+from sosmith.model.sections.output import FirstSample, OutputStage
 
 
-def output_stage(x: Range, output: Port, held: Held | None = None) -> tuple[OutputStage, Fraction]:
+def output_stage(x: Range, output: Port, held: FirstSample | None = None) -> tuple[OutputStage, Fraction]:
     """Make the last stage for a result in `x`, and bound its error in output LSBs.
 
     The error is half an LSB if anything is rounded, plus the rounding error of the offset. What is `held` is added

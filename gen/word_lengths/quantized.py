@@ -26,7 +26,7 @@ from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
 from sosmith.model.reference.golden import exact_before_filter, exact_chain
 from sosmith.model.sections.horner import HornerStep
-from sosmith.model.sections.output import Held, OutputStage
+from sosmith.model.sections.output import FirstSample, OutputStage
 from sosmith.model.sections.start import PassingStage, StartStage
 
 Array = npt.NDArray[np.float64]
@@ -94,7 +94,7 @@ class Quantized:
         return any(isinstance(stage, StartStage) for stage in self.datapath.stages)
 
     @property
-    def held(self) -> Held | None:
+    def held(self) -> FirstSample | None:
         """The first sample as the last stage adds it; None if it does not."""
         return cast("OutputStage", self.datapath.stages[-1]).held
 
@@ -173,7 +173,7 @@ def assembled(
     )
 
 
-def beside(sections: Sequence[Section], held: Held | None) -> Sequence[Stage]:
+def beside(sections: Sequence[Section], held: FirstSample | None) -> Sequence[Stage]:
     """Return the sections, with what is `held` passing beside them."""
     return sections if held is None else [PassingStage(section=section, held=held.range) for section in sections]
 

@@ -51,10 +51,6 @@ class Scenario:
     default_samples: Callable[[Bench], int]
     make: Callable[[Run], Emulated]
 
-    def default_seconds(self, bench: Bench) -> float:
-        """Return the default duration of the trace in s."""
-        return self.default_samples(bench) / float(bench.sample_rate)
-
 
 def emulate(name: str, bench: Bench, *, seed: int, seconds: float | None = None) -> Trace:
     """Generate the trace of the scenario `name` for a core.

@@ -69,6 +69,11 @@ def fitting(kind: str) -> list[str]:
     return [name for name, summary in SUMMARIES.items() if kind in summary.kinds]
 
 
+def is_scenario_file(source: str) -> bool:
+    """Whether `source` is the path of a scenario file, not a built-in scenario or a trace."""
+    return source not in SUMMARIES and source.lower().endswith(".toml")
+
+
 def check_scenario(name: str, kind: str) -> None:
     """Check that a scenario exists for a kind of core.
 

@@ -10,6 +10,7 @@ from sosmith.gen.stimuli.core import bench_before, bench_of
 from sosmith.instrument.scenarios.catalogue import SCENARIOS, emulate
 from sosmith.instrument.scenarios.file import emulate_file, load_scenario, range_notes
 from sosmith.instrument.scenarios.instrument_signals import least_wear_ramp
+from sosmith.instrument.scenarios.summaries import is_scenario_file
 from sosmith.instrument.scenarios.vehicle_clearance import vehicle_clearance
 from sosmith.model.errors import SpecificationError
 from sosmith.model.traces.trace import Trace
@@ -62,11 +63,6 @@ def traces_for(design: CoreDesign, source: str, *, seed: int, seconds: float | N
         return given if len(given) == len(channels) else tuple(given[0].delayed(k) for k in channels)
     bench = bench_of(design, errors=source == "worst_case_errors")  # an unknown scenario is refused below
     return tuple(emulate(source, bench, seed=seed + k, seconds=seconds).delayed(k) for k in channels)
-
-
-def is_scenario_file(source: str) -> bool:
-    """Whether `source` is the path of a scenario file, not a built-in scenario or a trace."""
-    return source not in SCENARIOS and source.lower().endswith(".toml")
 
 
 def notes_on(design: CoreDesign, source: str) -> tuple[str, ...]:

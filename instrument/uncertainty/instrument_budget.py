@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from sosmith.gen.calibration.fit import Fit, read_measurements
-from sosmith.gen.core import CoreDesign, filter_of, front_in, polynomial_of
+from sosmith.gen.core import CoreDesign, filter_of, polynomial_of, pre_stage_in
 from sosmith.gen.filter.design import Filter, decay_length
 from sosmith.gen.filter.response import complex_response, group_delay
 from sosmith.gen.specification.specification import CalibrationSpec, Specification
 from sosmith.gen.specification.uncertainty import UncertaintySpec
-from sosmith.gen.word_lengths.decimator import Front
+from sosmith.gen.word_lengths.decimator import PreStage
 from sosmith.instrument.calibration.coefficient_covariance import CoefficientUncertainty, of_least_squares
 from sosmith.instrument.uncertainty.budget import SHARE, Budget, Contribution, Kind, of_limits
 from sosmith.instrument.wear.assessment import ClearanceUncertainty
@@ -99,7 +99,7 @@ class Instrument:
         What its coefficients are worth.
     ideal : Filter or None
         The filter; None for a calibration alone.
-    front : Front or None
+    pre_stage : PreStage or None
         What decimates before it; None if all samples go in.
     bound : float
         Bound of the error of the arithmetic, in the output's unit.
@@ -109,7 +109,7 @@ class Instrument:
     polynomial: Polynomial
     known: CoefficientUncertainty
     ideal: Filter | None
-    front: Front | None = None
+    pre_stage: PreStage | None = None
     bound: float
 
     @property
@@ -130,7 +130,7 @@ class Instrument:
         ]
         stated = spec.uncertainty
         if stated is not None and stated.noise is not None:
-            noise = float(stated.noise) * noise_gain(self.ideal, self.front) * one
+            noise = float(stated.noise) * noise_gain(self.ideal, self.pre_stage) * one
             found.append(_of("sensor noise", "normal", noise, "V", by_voltage))
         if stated is not None and stated.temperature is not None:
             found.append(_of("thermocouple", "normal", float(stated.temperature) * one, "°C", by_temperature))
@@ -167,16 +167,18 @@ class Instrument:
 
 
 def _of_motion(instrument: Instrument, ideal: Filter, stated: UncertaintySpec, one: Values) -> list[Contribution]:
-    found, front, unit = [], instrument.front, instrument.spec.output.unit
-    rate = float(instrument.spec.sample_rate if front is None else front.decimation.rate)
+    found, pre_stage, unit = [], instrument.pre_stage, instrument.spec.output.unit
+    rate = float(instrument.spec.sample_rate if pre_stage is None else pre_stage.decimation.rate)
     if stated.clearance_rate is not None:
         delay = float(group_delay(ideal.sos, np.zeros(1), rate)[0])
-        delay = delay if front is None else float(front.decimation.delay(ideal))
+        delay = delay if pre_stage is None else float(pre_stage.decimation.delay(ideal))
         speed = of_limits(float(stated.clearance_rate)) * one
         found.append(_of("delay of a moving reading", "rectangular", speed, f"{unit}/s", delay * one))
     for frequency, amplitude in stated.motion:
         at = np.array([float(frequency)])
-        (gain,) = np.abs(complex_response(ideal.sos, at, rate)) * (1 if front is None else front.decimation.gain(at))
+        (gain,) = np.abs(complex_response(ideal.sos, at, rate)) * (
+            1 if pre_stage is None else pre_stage.decimation.gain(at)
+        )
         rms = float(amplitude) / math.sqrt(2.0) * one
         found.append(_of(f"motion at {float(frequency):g} Hz", "arcsine", rms, unit, float(gain) * one))
     return found
@@ -199,13 +201,13 @@ def instrument_of(spec: Specification, bound: float | None = None, *, filtered: 
     known = _coefficients(spec.calibration, fitted)
     if known is None:
         return None
-    front, _ = front_in(spec, "instrument", polynomial) if filtered else (None, {})
+    pre_stage, _ = pre_stage_in(spec, "instrument", polynomial) if filtered else (None, {})
     return Instrument(
         spec=spec,
         polynomial=polynomial,
         known=known,
-        ideal=None if not filtered else filter_of(spec) if front is None else front.filter,
-        front=front,
+        ideal=None if not filtered else filter_of(spec) if pre_stage is None else pre_stage.filter,
+        pre_stage=pre_stage,
         bound=float(spec.max_error) if bound is None else bound,
     )
 
@@ -273,7 +275,7 @@ def slopes(polynomial: Polynomial, V: Values, T: Values) -> tuple[Values, Values
     return by_voltage, by_temperature
 
 
-def noise_gain(ideal: Filter | None, front: Front | None = None) -> float:
+def noise_gain(ideal: Filter | None, pre_stage: PreStage | None = None) -> float:
     """Return the factor by which the filter changes the standard deviation of white noise; 1 without a filter.
 
     What decimates before it counts too.
@@ -283,7 +285,7 @@ def noise_gain(ideal: Filter | None, front: Front | None = None) -> float:
     impulse = np.zeros(decay_length(ideal.sos))
     impulse[0] = 1.0
     response = sosfilt(ideal.sos, impulse)
-    return math.sqrt(float(np.sum((response if front is None else front.decimator.before(response)) ** 2)))
+    return math.sqrt(float(np.sum((response if pre_stage is None else pre_stage.decimator.before(response)) ** 2)))
 
 
 def budget_in_json(design: CoreDesign) -> dict[str, Any] | None:

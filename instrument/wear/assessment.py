@@ -386,6 +386,33 @@ def last_fall(time: Values, clearance: Values, least: float) -> Fall | None:
     return Fall(size=float(sizes[place]), window=float(time[-1] - (time[place] + time[place + 1]) / 2))
 
 
+def _check_record(time: Values, clearance: Values) -> None:
+    """Refuse a record that is empty, not finite, not in chronological order, or too short for a rate."""
+    if len(time) != len(clearance) or not len(time):
+        raise SpecificationError(
+            f"the record must have a time for each clearance, not {len(time)} for {len(clearance)}"
+        )
+    if not (np.all(np.isfinite(time)) and np.all(np.isfinite(clearance))):
+        raise SpecificationError("the record must hold finite times and clearances, not NaN or infinity")
+    if np.any(np.diff(time) < 0):
+        raise SpecificationError("the record must be in chronological order, not go back in time")
+    if not time[-1] > time[0]:
+        raise SpecificationError("the record must span more than 0 days for a rate of wear, not 0 days")
+
+
+def _recent(time: Values, window: float | None) -> slice:
+    """Return where the last `window` days of the record are; all of it by default."""
+    if window is not None and not 0 < window < math.inf:
+        raise SpecificationError(f"window must be a time above 0 days, not {window:g} days")
+    recent = slice(0 if window is None else int(np.searchsorted(time, time[-1] - window)), None)
+    if not time[-1] > time[recent][0]:
+        before = float(time[-1] - time[time < time[-1]][-1])
+        raise SpecificationError(
+            f"window must be at least {before:.4g} days, from the last reading to one before it, not {window:g} days"
+        )
+    return recent
+
+
 def judge(
     time: Values,
     clearance: Values,
@@ -425,24 +452,8 @@ def judge(
     SpecificationError
         If the record is empty, not finite, not in chronological order, or too short for a rate.
     """
-    if len(time) != len(clearance) or not len(time):
-        raise SpecificationError(
-            f"the record must have a time for each clearance, not {len(time)} for {len(clearance)}"
-        )
-    if not (np.all(np.isfinite(time)) and np.all(np.isfinite(clearance))):
-        raise SpecificationError("the record must hold finite times and clearances, not NaN or infinity")
-    if np.any(np.diff(time) < 0):
-        raise SpecificationError("the record must be in chronological order, not go back in time")
-    if not time[-1] > time[0]:
-        raise SpecificationError("the record must span more than 0 days for a rate of wear, not 0 days")
-    if window is not None and not 0 < window < math.inf:
-        raise SpecificationError(f"window must be a time above 0 days, not {window:g} days")
-    recent = slice(0 if window is None else int(np.searchsorted(time, time[-1] - window)), None)
-    if not time[-1] > time[recent][0]:
-        before = float(time[-1] - time[time < time[-1]][-1])
-        raise SpecificationError(
-            f"window must be at least {before:.4g} days, from the last reading to one before it, not {window:g} days"
-        )
+    _check_record(time, clearance)
+    recent = _recent(time, window)
     times, medians, counts, length = block_medians(time[recent], clearance[recent], block)
     rate = rate_of(times, medians, length, confidence)
     fall = last_fall(times, medians, MIN_FALL * limits.limit)

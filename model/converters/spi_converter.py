@@ -139,10 +139,6 @@ class Converter:
         """Return the timing at a supply in V."""
         return self.fast if supply >= FULL_SUPPLY else self.timing
 
-    def command_for(self, channel: int) -> int:
-        """Return the command that asks for an analog input, from 0."""
-        return self.command | channel << self.channel_place
-
     @property
     def lowest(self) -> int:
         """Smallest reading."""

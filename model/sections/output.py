@@ -15,7 +15,7 @@ from sosmith.model.sections.settling import settling
 
 
 @dataclass(frozen=True, kw_only=True)
-class Held:
+class FirstSample:
     """The first sample, as it arrives beside the filter's output, and the gain with which it is added there.
 
     Attributes
@@ -48,7 +48,7 @@ class OutputStage:
         Range of the input, in output LSBs.
     low, high : int
         Range of the output code; the only saturation in a datapath.
-    held : Held or None
+    held : FirstSample or None
         The first sample of a filter that starts from it; None if none is passed on.
     settling : int
         Number of samples after a start that are flagged as settling; 0 without the flag.
@@ -59,7 +59,7 @@ class OutputStage:
     x: Range
     low: int
     high: int
-    held: Held | None = None
+    held: FirstSample | None = None
     settling: int = 0
     name: str = "output_stage"
 

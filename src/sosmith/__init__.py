@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from sosmith.gen.version import __version__
 
 if TYPE_CHECKING:
-    from sosmith.gen.facts.table import Table
+    from sosmith.gen.facts.table import Fact, Table
     from sosmith.host.board import Board, Results
     from sosmith.host.loading import Loaded
     from sosmith.interface.build import Build
@@ -51,6 +51,7 @@ __all__ = [
     "Comparison",
     "Design",
     "Exploration",
+    "Fact",
     "Filter",
     "Identity",
     "LinkError",

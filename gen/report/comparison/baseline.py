@@ -4,51 +4,34 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
 
-from sosmith.gen.quantity import decibels, number, quantity
+from sosmith.gen.report.comparison import rows
 from sosmith.gen.report.comparison.differences import UNKNOWN
 from sosmith.gen.report.comparison.fairness import fairness
 from sosmith.gen.report.comparison.report_file import Report, fact
-from sosmith.gen.report.comparison.rows import column_names
 from sosmith.model.errors import SpecificationError
 from sosmith.model.suggestion import did_you_mean
 
-Kind = Literal["accuracy", "bounds", "clocks", "cost"]
-
-
-@dataclass(frozen=True)
-class _Figure:
-    key: str
-    title: str
-    kind: Kind
-    show: Callable[[Any, str], str]
-    sign: int = 1  # -1 where more is better
-
-
-def _count(value: float, _unit: str) -> str:
-    return number(value)
-
-
-FIGURES: Mapping[str, _Figure] = {
-    "error": _Figure("error.max_abs", "largest error", "accuracy", quantity),
-    "rms": _Figure("error.rms", "typical error (RMS)", "accuracy", quantity),
-    "sqnr": _Figure("sqnr_db", "signal to error", "accuracy", lambda value, _: decibels(value), -1),
-    "accuracy": _Figure(
-        "accuracy_percent.hardware", "accuracy, hardware", "accuracy", lambda value, _: f"{value:.4f} %", -1
-    ),
-    "true_error": _Figure("true_error.max_abs", "largest error against the true value", "accuracy", quantity),
-    "bound": _Figure("error.bound", "error limit", "bounds", quantity),
-    "cycles": _Figure("provenance.cycles_per_sample", "clock cycles per sample", "clocks", _count),
-    "latency": _Figure("latency_cycles", "latency in clock cycles", "clocks", _count),
-    "lut": _Figure("provenance.cost.luts", "LUT4", "cost", _count),
-    "multipliers": _Figure("provenance.cost.multiplier_blocks", "multiplier blocks", "cost", _count),
-    "registers": _Figure("provenance.cost.register_bits", "register bits", "cost", _count),
-    "instructions": _Figure("provenance.cost.instructions", "instructions", "cost", _count),
-    "words": _Figure("provenance.cost.memory_words", "words of memory", "cost", _count),
+_KEYS = {
+    "error": "error.max_abs",
+    "rms": "error.rms",
+    "sqnr": "sqnr_db",
+    "accuracy": "accuracy_percent.hardware",
+    "true_error": "true_error.max_abs",
+    "bound": "error.bound",
+    "cycles": "provenance.cycles_per_sample",
+    "latency": "latency_cycles",
+    "lut": "provenance.cost.luts",
+    "multipliers": "provenance.cost.multiplier_blocks",
+    "registers": "provenance.cost.register_bits",
+    "instructions": "provenance.cost.instructions",
+    "words": "provenance.cost.memory_words",
 }
+_BY_KEY = {figure.key: figure for figure in rows.FIGURES}
+
+FIGURES: Mapping[str, rows.Figure] = {name: _BY_KEY[key] for name, key in _KEYS.items()}
 """Figures that can be judged, by their names in a tolerance."""
 
 
@@ -188,7 +171,7 @@ def judge(
             for name, figure in FIGURES.items()
             if fact(baseline, figure.key) is not None
         }
-    names = column_names([baseline, *candidates], baseline=True)[1:]
+    names = rows.column_names([baseline, *candidates], baseline=True)[1:]
     return [
         Judgement(
             name=name,
@@ -209,15 +192,16 @@ def _shortfalls(candidate: Report) -> tuple[str, ...]:
 
 def _judged(baseline: Report, candidate: Report, name: str, allowed: Tolerance) -> Judged:
     figure = FIGURES[name]
+    sign = -1 if figure.better is max else 1
     before, after = fact(baseline, figure.key), fact(candidate, figure.key)
     units = baseline["error"]["unit"], candidate["error"]["unit"]
     cells = tuple(
         UNKNOWN if v is None else figure.show(v, unit) for v, unit in zip((before, after), units, strict=True)
     )
-    reason = getattr(fairness([baseline, candidate]), figure.kind)
+    reason = getattr(fairness([baseline, candidate]), figure.group)
     if before is None or after is None:
         reason = reason or f"The {'baseline' if before is None else 'candidate'} does not know it."
-    verdict = "not comparable" if reason else _verdict(figure.sign * before, figure.sign * after, allowed)
+    verdict = "not comparable" if reason else _verdict(sign * before, sign * after, allowed)
     return Judged(
         figure=name,
         title=figure.title,
@@ -226,7 +210,7 @@ def _judged(baseline: Report, candidate: Report, name: str, allowed: Tolerance) 
         tolerance=allowed,
         verdict=verdict,
         reason=reason,
-        same_unit=units[0] == units[1] or figure.kind not in {"accuracy", "bounds"},
+        same_unit=units[0] == units[1] or figure.group not in {"accuracy", "bounds"},
     )
 
 

@@ -45,7 +45,9 @@ Better = Callable[[Sequence[float]], float]
 
 
 @dataclass(frozen=True)
-class _Figure:
+class Figure:
+    """A figure of `report.json`: its group, key and title, how it is shown, and which of several is best."""
+
     group: str
     key: str
     title: str
@@ -70,34 +72,34 @@ def _level(value: float, _unit: str) -> str:
     return decibels(value)
 
 
-_FIGURES = (
-    _Figure("run", "name", "name", _text),
-    _Figure("run", "realization", "realization", _text),
-    _Figure("run", "scenario", "trace", _text),
-    _Figure("run", "samples", "samples", _count),
-    _Figure("run", "simulator", "simulator", _text),
-    _Figure("run", "passed", "verdict", lambda value, _: "passed" if value else "falls short"),
-    _Figure("run", "bit_exact", "equal to the integer model", lambda value, _: "bit for bit" if value else "no"),
-    _Figure("accuracy", "true_error.max_abs", "largest error against the true value", quantity, min, by_all=True),
-    _Figure("accuracy", "true_error.rms", "typical error against the true value (RMS)", quantity, min, by_all=True),
-    _Figure("accuracy", "error.max_abs", "largest error", quantity, min),
-    _Figure("accuracy", "error.max_lsb", "largest error in LSB", lambda value, _: f"{plain_number(value)} LSB"),
-    _Figure("accuracy", "error.rms", "typical error (RMS)", quantity, min),
-    _Figure("accuracy", "sqnr_db", "signal to error", _level, max),
-    _Figure("accuracy", "accuracy_percent.hardware", "accuracy, hardware", _percent, max),
-    _Figure("accuracy", "accuracy_percent.golden", "accuracy, exact calculation", _percent),
-    _Figure("accuracy", "accuracy_percent.unfiltered", "accuracy without the filter", _percent),
-    _Figure("bounds", "error.bound", "error limit", quantity, min),
-    _Figure("clocks", "provenance.cycles_per_sample", "clock cycles per sample", _count, min),
-    _Figure("clocks", "latency_cycles", "latency in clock cycles", _count, min),
-    _Figure("cost", "provenance.cost.source", "origin of the cost", _text),
-    _Figure("cost", "provenance.cost.luts", "LUT4", _count, min),
-    _Figure("cost", "provenance.cost.multiplier_blocks", "multiplier blocks", _count, min),
-    _Figure("cost", "provenance.cost.register_bits", "register bits", _count, min),
-    _Figure("cost", "provenance.cost.instructions", "instructions", _count, min),
-    _Figure("cost", "provenance.cost.memory_words", "words of memory", _count, min),
-    _Figure("simulation", "cycles_per_sample", "clock cycles per sample, with waiting", lambda v, _: plain_number(v)),
-    _Figure("simulation", "cycles_per_second", "simulated clock cycles per second", lambda v, _: quantity(v, "")),
+FIGURES = (
+    Figure("run", "name", "name", _text),
+    Figure("run", "realization", "realization", _text),
+    Figure("run", "scenario", "trace", _text),
+    Figure("run", "samples", "samples", _count),
+    Figure("run", "simulator", "simulator", _text),
+    Figure("run", "passed", "verdict", lambda value, _: "passed" if value else "falls short"),
+    Figure("run", "bit_exact", "equal to the integer model", lambda value, _: "bit for bit" if value else "no"),
+    Figure("accuracy", "true_error.max_abs", "largest error against the true value", quantity, min, by_all=True),
+    Figure("accuracy", "true_error.rms", "typical error against the true value (RMS)", quantity, min, by_all=True),
+    Figure("accuracy", "error.max_abs", "largest error", quantity, min),
+    Figure("accuracy", "error.max_lsb", "largest error in LSB", lambda value, _: f"{plain_number(value)} LSB"),
+    Figure("accuracy", "error.rms", "typical error (RMS)", quantity, min),
+    Figure("accuracy", "sqnr_db", "signal to error", _level, max),
+    Figure("accuracy", "accuracy_percent.hardware", "accuracy, hardware", _percent, max),
+    Figure("accuracy", "accuracy_percent.golden", "accuracy, exact calculation", _percent),
+    Figure("accuracy", "accuracy_percent.unfiltered", "accuracy without the filter", _percent),
+    Figure("bounds", "error.bound", "error limit", quantity, min),
+    Figure("clocks", "provenance.cycles_per_sample", "clock cycles per sample", _count, min),
+    Figure("clocks", "latency_cycles", "latency in clock cycles", _count, min),
+    Figure("cost", "provenance.cost.source", "origin of the cost", _text),
+    Figure("cost", "provenance.cost.luts", "LUT4", _count, min),
+    Figure("cost", "provenance.cost.multiplier_blocks", "multiplier blocks", _count, min),
+    Figure("cost", "provenance.cost.register_bits", "register bits", _count, min),
+    Figure("cost", "provenance.cost.instructions", "instructions", _count, min),
+    Figure("cost", "provenance.cost.memory_words", "words of memory", _count, min),
+    Figure("simulation", "cycles_per_sample", "clock cycles per sample, with waiting", lambda v, _: plain_number(v)),
+    Figure("simulation", "cycles_per_second", "simulated clock cycles per second", lambda v, _: quantity(v, "")),
 )
 
 _ALWAYS = ("run",)
@@ -116,7 +118,7 @@ def compare(reports: Sequence[Report]) -> list[Row]:
         raise ValueError(f"reports must hold at least two reports, not {len(reports)}")
     fair = fairness(reports)
     reasons = {"accuracy": fair.accuracy, "bounds": fair.bounds, "clocks": fair.clocks, "cost": fair.cost}
-    rows = {figure: _row(reports, figure, fair=not reasons.get(figure.group)) for figure in _FIGURES}
+    rows = {figure: _row(reports, figure, fair=not reasons.get(figure.group)) for figure in FIGURES}
     return [row for figure, row in rows.items() if row.group in _ALWAYS or _is_known(row, by_all=figure.by_all)]
 
 
@@ -124,7 +126,7 @@ def _is_known(row: Row, *, by_all: bool) -> bool:
     return (all if by_all else any)(value is not None for value in row.values)
 
 
-def _row(reports: Sequence[Report], figure: _Figure, *, fair: bool) -> Row:
+def _row(reports: Sequence[Report], figure: Figure, *, fair: bool) -> Row:
     if figure.key == "provenance.cost.source":
         boards = [fact(report, "provenance.cost.board") for report in reports]
         values = tuple(fact(report, figure.key) for report in reports)

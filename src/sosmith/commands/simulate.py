@@ -34,6 +34,7 @@ from sosmith.interface.choices import (
     check_vectors,
     did_you_mean,
     fitting,
+    is_scenario_file,
 )
 from sosmith.interface.files import default_folder, write_file, write_files
 from sosmith.model.errors import SpecificationError
@@ -276,7 +277,7 @@ def emulate_command(
         print_tables([Table(f"Scenarios for {asked.name}", rows, ("name", "description"))])
         note("a scenario file can be given instead of a name: sosmith init --list names examples")
         return
-    if scenario not in fitting(kind) and not _is_scenario_file(scenario):
+    if scenario not in fitting(kind) and not is_scenario_file(scenario):
         known = fitting(kind)
         raise SpecificationError(
             f"the scenario must be one of {', '.join(known)}, or a file whose name ends in .toml, not "
@@ -362,10 +363,6 @@ def _kind(spec: Specification, core: str | None) -> str:
     return "filter" if spec.checked.calibration is None or core == "filter" else "instrument"
 
 
-def _is_scenario_file(source: str) -> bool:
-    return source not in SCENARIOS and source.lower().endswith(".toml")
-
-
 def _is_file(source: str) -> bool:
     """Tell whether a trace comes from a file: by its suffix, or because the file exists."""
     return source not in SCENARIOS and (source.lower().endswith((".csv", ".toml")) or Path(source).exists())
@@ -373,7 +370,7 @@ def _is_file(source: str) -> bool:
 
 def _write_measurements(spec: Path, source: str | None, seed: int, output: Path | None) -> None:
     """Write the measurements taken by hand in a scenario's depot, as CSV."""
-    if source is None or not _is_scenario_file(source):
+    if source is None or not is_scenario_file(source):
         raise SpecificationError(f"--measurements must come with a scenario file (TOML), not {source or 'without one'}")
     from sosmith.interface.specification import Specification
 

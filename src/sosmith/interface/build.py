@@ -9,14 +9,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from sosmith.gen.facts.table import Table
+from sosmith.gen.facts.table import Table, View
 from sosmith.gen.fpga.boards import find_board
 from sosmith.gen.output.board_build import BoardBuild
 from sosmith.model.errors import ShortfallError, ToolError
 
 
 @dataclass(frozen=True, eq=False)
-class Build:
+class Build(View):
     """The results of `Design.build`.
 
     Attributes
@@ -91,8 +91,9 @@ class Build:
         """What the design takes of the FPGA, and how fast it could run."""
         return build_table(self.summary)
 
-    def _repr_html_(self) -> str:
-        return self.table.html()
+    def tables(self) -> list[Table]:
+        """Return `table` alone."""
+        return [self.table]
 
     def __repr__(self) -> str:
         timing = "timing closes" if self.passed else "timing does not close"

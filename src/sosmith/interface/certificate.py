@@ -8,6 +8,8 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
 
+from sosmith.gen.facts.design_tables import budget_table
+from sosmith.gen.facts.table import Table, View
 from sosmith.gen.specification.specification import Specification, from_text, load
 from sosmith.interface.quantity import Quantity
 from sosmith.interface.second_reader import SECOND_READERS, read_again
@@ -54,7 +56,7 @@ def _check_second_reader(name: str | None, files: str | PathLike[str] | None) ->
 
 
 @dataclass(frozen=True)
-class Proof:
+class Proof(View):
     """Result of proving a certificate.
 
     Attributes
@@ -63,8 +65,8 @@ class Proof:
         Bound on the difference between hardware and exact result, for all inputs in range.
     budget : dict of str to Quantity
         Parts of the bound, which add up to it.
-    allowed : Quantity
-        What the specification allows.
+    allowed, lsb : Quantity
+        What the specification allows, and one LSB of the output.
     nodes : int
         Number of operations whose range was checked.
     ranges : int
@@ -74,6 +76,7 @@ class Proof:
     bound: Quantity
     budget: dict[str, Quantity]
     allowed: Quantity
+    lsb: Quantity
     nodes: int
     ranges: int
     agreement: Agreement | None = None
@@ -99,6 +102,10 @@ class Proof:
     def missing(self) -> dict[str, Part]:
         """The parts that were asked for and are not proven as a whole; empty if everything is."""
         return {name: part for name, part in self.scope.items() if part.is_missing}
+
+    def tables(self) -> list[Table]:
+        """Return what the bound is made of, and what is allowed."""
+        return [budget_table(self.budget, self.allowed, self.lsb, self.bound.unit)]
 
     def as_dict(self) -> dict[str, Any]:
         """Return all of it in JSON types."""
@@ -267,6 +274,7 @@ class Certificate:
             bound=Quantity(float(verdict.bound * lsb), unit),
             budget={part: Quantity(float(value * lsb), unit) for part, value in verdict.budget.items()},
             allowed=Quantity(float(self.entries.max_error), unit),
+            lsb=Quantity(float(lsb), unit),
             nodes=verdict.nodes,
             ranges=verdict.ranges,
             agreement=found.agreement,

@@ -17,7 +17,7 @@ from sosmith.gen.specification.choices import CORES, ERROR_FEEDBACK, REALIZATION
 from sosmith.gen.specification.verilog_names import identifier_from
 from sosmith.instrument.calibration.acceptance import DEFAULT_RANGES
 from sosmith.instrument.calibration.acceptance import METHODS as FIT_METHODS
-from sosmith.instrument.scenarios.summaries import SUMMARIES, check_scenario, fitting
+from sosmith.instrument.scenarios.summaries import SUMMARIES, check_scenario, fitting, is_scenario_file
 from sosmith.instrument.spectrum.settings import COVERAGE, DETRENDS, PASSBAND_LOSS, TOLERANCE, WINDOWS
 from sosmith.instrument.vehicle.choices import LEVELS, MODELS, TRACK_NAMES
 from sosmith.instrument.wear.record_columns import CLEARANCES, TIMES
@@ -56,6 +56,7 @@ __all__ = [
     "did_you_mean",
     "fitting",
     "identifier_from",
+    "is_scenario_file",
     "picture_format",
 ]
 

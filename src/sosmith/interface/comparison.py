@@ -8,7 +8,7 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
 
-from sosmith.gen.facts.table import Table
+from sosmith.gen.facts.table import Table, View
 from sosmith.gen.report.comparison.baseline import Judgement, judge, read_tolerances
 from sosmith.gen.report.comparison.choice import Choice, choose
 from sosmith.gen.report.comparison.differences import Difference, differences
@@ -27,7 +27,7 @@ Source = Report | Mapping[str, Any] | str | PathLike[str]
 
 
 @dataclass(frozen=True)
-class Comparison:
+class Comparison(View):
     """Accuracy reports side by side, as returned by `compare`."""
 
     reports: tuple[Mapping[str, Any], ...] = field(repr=False)
@@ -78,9 +78,10 @@ class Comparison:
         """Return the comparison as GitHub-flavoured Markdown."""
         return comparison_markdown(self.reports, self.judgements)
 
-    def _repr_html_(self) -> str:
-        rows: list[Sequence[str]] = [(row.title, *row.cells) for row in self.rows if row.key != "name"]
-        return Table("Accuracy reports", rows, ("", *self.names)).html()
+    def tables(self) -> list[Table]:
+        """Return `rows` as a table."""
+        rows = [(row.title, *row.cells) for row in self.rows if row.key != "name"]
+        return [Table("Accuracy reports", rows, ("", *self.names))]
 
     def __repr__(self) -> str:
         return f"<sosmith.Comparison of {', '.join(self.names)}>"

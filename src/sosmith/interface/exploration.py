@@ -9,7 +9,7 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sosmith.gen.facts.table import Table
+from sosmith.gen.facts.table import Table, View
 from sosmith.gen.fpga.boards import SYNTHESIZED, find_board
 from sosmith.gen.quantity import number, quantity
 from sosmith.gen.specification.exact_values import exact
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Exploration:
+class Exploration(View):
     """Designs with their figures, as returned by `explore`."""
 
     outcome: Outcome = field(repr=False)
@@ -127,9 +127,6 @@ class Exploration:
             f"{_counted(len(self.points), 'combination')}: {_counted(len(designs), 'design')}, of which {passed:,} "
             f"{'passes' if passed == 1 else 'pass'} and {front:,} {'is' if front == 1 else 'are'} on the front",
         ]
-
-    def _repr_html_(self) -> str:
-        return "".join(table.html() for table in self.tables())
 
     def __repr__(self) -> str:
         return f"<sosmith.Exploration {self.outcome.name}: {len(self.points)} points, {len(self.front)} on the front>"

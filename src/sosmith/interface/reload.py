@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from sosmith.gen.facts.table import Table
+from sosmith.gen.facts.table import Table, View
 from sosmith.gen.reload.register_writes import reload_json
 from sosmith.gen.reload.reload import Swap, check_swap, own_set, set_for
 from sosmith.interface.specification import Specification
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Reload:
+class Reload(View):
     """A set of coefficients that a running core may load, from `Design.reload`.
 
     Attributes
@@ -81,3 +81,7 @@ class Reload:
         rows.append(("load", f"version {tree['version']}, {tree['words']:,} words, CRC 0x{crc:08X}"))
         rows.append(("for the design", f"0x{tree['design']:08X}"))
         return Table(f"{made.spec.name}: the set may be loaded", rows)
+
+    def tables(self) -> list[Table]:
+        """Return `table` alone."""
+        return [self.table]

@@ -10,15 +10,15 @@ import numpy as np
 import numpy.typing as npt
 
 from sosmith.gen.core import CoreDesign
-from sosmith.gen.facts.table import Table
+from sosmith.gen.facts.table import Table, View
 from sosmith.gen.report.evidence import Evidence
+from sosmith.gen.report.headlines import report_table
 from sosmith.gen.report.report import write_report
 from sosmith.interface.quantity import Quantity
-from sosmith.interface.tables.report import report_table
 
 
 @dataclass(frozen=True, eq=False)
-class Report:
+class Report(View):
     """The results of `Design.simulate`.
 
     Arrays hold one sample per row, shape (samples,) for one channel and (samples, channels) for several.
@@ -106,8 +106,9 @@ class Report:
         """Verdict, the measurement, the arithmetic and the speed."""
         return report_table(self.summary)
 
-    def _repr_html_(self) -> str:
-        return self.table.html()
+    def tables(self) -> list[Table]:
+        """Return `table` alone."""
+        return [self.table]
 
     def __repr__(self) -> str:
         verdict = "passed" if self.passed else "falls short"

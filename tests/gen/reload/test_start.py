@@ -29,7 +29,7 @@ from sosmith.model.dataflow.graph import Range
 from sosmith.model.errors import ShortfallError
 from sosmith.model.polynomial import Polynomial
 from sosmith.model.reload.constants import with_ranges
-from sosmith.model.sections.output import Held
+from sosmith.model.sections.output import FirstSample
 
 
 @cache
@@ -132,14 +132,14 @@ def test_the_error_of_a_set_counts_first_samples_of_others() -> None:
 
 def test_a_gain_that_the_hardware_cannot_give_is_refused() -> None:
     stage = InputStage(stages=(), output=Range(0, -128, 127), error=Fraction(0))
-    plain_gain = Held(range=stage.output, gain=1, gain_frac=0)
+    plain_gain = FirstSample(range=stage.output, gain=1, gain_frac=0)
     for gain, held, have in ((2, plain_gain, "1"), (0, plain_gain, "1"), (1, None, "0")):
         with pytest.raises(
             ShortfallError, match=f"^the gain at zero frequency must be {have}, as the hardware has it, not {gain}$"
         ):
             starting_like(stage, Fraction(gain), held)
-    made = starting_like(stage, Fraction(3, 4), Held(range=stage.output, gain=5, gain_frac=3))
-    assert made.start == Start(held=Held(range=stage.output, gain=6, gain_frac=3), error=Fraction(0))
+    made = starting_like(stage, Fraction(3, 4), FirstSample(range=stage.output, gain=5, gain_frac=3))
+    assert made.start == Start(held=FirstSample(range=stage.output, gain=6, gain_frac=3), error=Fraction(0))
 
 
 @pytest.mark.parametrize("architecture", ["parallel", "folded"])

@@ -20,9 +20,8 @@ from sosmith.gen.filter.step_response import step_response
 from sosmith.gen.output.core_facts import SettlingFacts
 from sosmith.gen.report.behaviour import behaviour
 from sosmith.gen.report.evidence import Evidence
+from sosmith.gen.report.headlines import report_table
 from sosmith.gen.report.report import summarise
-from sosmith.gen.report.tiles import tile_rows
-from sosmith.interface.tables.report import report_table
 
 FIRST_ORDER = np.array([[0.1, 0.0, 0.0, 1.0, -0.9, 0.0]])
 """y(n) = 0.9 y(n-1) + 0.1 x(n): a step leaves 0.9**(n+1) to go."""
@@ -42,11 +41,11 @@ def words() -> str:
 
 def tiles_of(run: Evidence) -> str:
     """Words of the tiles of `run`."""
-    rows = tile_rows(run, summarise(run), behaviour(run))
-    lines = (
-        " ".join([row.title, *(" ".join([tile.name, tile.value, *tile.asides]) for tile in row.tiles)]) for row in rows
-    )
-    return " ".join(lines).replace("\u00a0", " ")
+    words = []
+    for group in summarise(run)["facts"]:
+        words.append(group["title"])
+        words += [fact[key] for fact in group["facts"] for key in ("name", "text", "sentence")]
+    return " ".join(words)
 
 
 # the step response
@@ -164,7 +163,7 @@ def test_figures_of_the_speed_agree() -> None:
 def test_errors_have_one_unit(words: str) -> None:
     """A limit of 200 nm sets it for tile, legend and tables."""
     assert "122 nm" in words
-    assert "contribution at most in nm in LSB output 122 0.500" in words
+    assert "part at most in nm in LSB output 122 0.5000" in words
     assert "df1 400,000 1,638 100,000" in words
 
 
@@ -193,18 +192,19 @@ def test_the_table_says_the_same(capsys: pytest.CaptureFixture[str], monkeypatch
     shown = [line.strip() for line in capsys.readouterr().out.splitlines()]
     order = [re.split(r"\s{2,}", line)[0] for line in shown if re.search(r"\S\s{2,}\S", line)]
     assert order == [
-        "error against the true value",
-        "accuracy, the paper's measure",
-        "delay of the filter",
-        "settling time to 1 %",
-        "hardware equals integer model",
-        "error of the arithmetic",
-        "signal to error",
-        "df1 at the same widths",
-        "simulated by",
+        "Largest error against the true value",
+        "Accuracy",
+        "Delay",
+        "Settling time",
+        "Largest error of the arithmetic",
+        "Typical error (RMS)",
+        "Samples equal to the integer model",
+        "Signal to error",
+        "Largest error with df1 at the same widths",
+        "Speed",
     ]
     assert any("2.76 s" in line for line in shown)
-    assert any(line.endswith("9,007 clocks in 1.50 s") for line in shown)
+    assert any("9,007 clock cycles with verilator in 1.50 s; the whole" in line for line in shown)
 
 
 @pytest.mark.parametrize("date", ["2026-13-01", "today", "2026-1-1"])

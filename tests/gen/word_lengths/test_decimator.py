@@ -15,7 +15,7 @@ from sosmith.gen.output.core_facts import core_facts
 from sosmith.gen.output.decimation_facts import direct_design, rate_costs
 from sosmith.gen.output.manifest import manifest
 from sosmith.gen.specification.specification import from_text
-from sosmith.gen.word_lengths.decimator import front_of
+from sosmith.gen.word_lengths.decimator import pre_stage_of
 from sosmith.gen.word_lengths.quantized import DECIMATION
 from sosmith.instrument.scenarios.traces import traces_for
 from sosmith.interface.design import Design
@@ -153,16 +153,16 @@ def test_a_board_wants_a_result_for_each_sample(tmp_path: Path) -> None:
 def test_an_input_as_wide_as_can_be() -> None:
     spec = locomotive_spec("16")
     x = Port.from_range("x", 32, Fraction(0), Fraction(16))
-    front, _ = front_of(spec.filter, spec.sample_rate, (x,), spec.output, spec.max_error)
-    assert front is not None
-    assert front.decimator.output.bits == 32
+    pre_stage, _ = pre_stage_of(spec.filter, spec.sample_rate, (x,), spec.output, spec.max_error)
+    assert pre_stage is not None
+    assert pre_stage.decimator.output.bits == 32
     sharp = Port.from_range("y", 32, Fraction(0), Fraction(16))
     sentence = (
         "the rounding behind the decimator must take at most half of the error allowed, not 0.791 output LSB with "
         "32 bits: raise output.max_error or output.bits"
     )
     with refused(sentence, ShortfallError):
-        front_of(spec.filter, spec.sample_rate, (x,), sharp, Fraction(16, 2**32))
+        pre_stage_of(spec.filter, spec.sample_rate, (x,), sharp, Fraction(16, 2**32))
 
 
 def test_a_factor_that_lets_too_much_fold_is_refused() -> None:

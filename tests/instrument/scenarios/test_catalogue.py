@@ -78,7 +78,7 @@ def test_same_seed_same_trace_of_reasonable_length(name: str, bench: str) -> Non
     again = emulate(name, BENCHES[bench], seed=7)
     np.testing.assert_array_equal(trace.codes, again.codes)
     assert MIN_SAMPLES <= len(trace) <= MAX_SAMPLES
-    assert len(trace) == round(SCENARIOS[name].default_seconds(BENCHES[bench]) * BENCHES[bench].sample_rate)
+    assert len(trace) == SCENARIOS[name].default_samples(BENCHES[bench])
     assert (trace.name, trace.seed) == (name, 7)
     random = name not in {"worst_case", "worst_case_errors", "step", "sweep"}
     assert random == bool(np.any(trace.codes != emulate(name, BENCHES[bench], seed=8).codes))

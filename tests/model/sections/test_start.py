@@ -8,7 +8,7 @@ from tests.gen.word_lengths.filters import butterworth, plain
 
 from sosmith.model.dataflow.graph import Range
 from sosmith.model.sections import start
-from sosmith.model.sections.output import Held, OutputStage
+from sosmith.model.sections.output import FirstSample, OutputStage
 from sosmith.model.sections.start import PassingStage, StartStage
 
 RANGES = [Range(3, -128, 127), Range(0, 0, 255), Range(5, 17, 90), Range(0, -90, -17), Range(-2, 0, 3)]
@@ -39,7 +39,7 @@ def test_passes_a_value_beside_a_section_that_is_otherwise_the_same() -> None:
 
 @pytest.mark.parametrize(("gain", "frac", "expected"), [(1, 0, [26, 100]), (3, 2, [22, 100]), (-1, 0, [-6, 84])])
 def test_is_added_with_its_gain_before_the_output_is_limited(gain: int, frac: int, expected: list[int]) -> None:
-    held = Held(range=Range(1, 0, 32), gain=gain, gain_frac=frac)
+    held = FirstSample(range=Range(1, 0, 32), gain=gain, gain_frac=frac)
     stage = OutputStage(offset=0, offset_frac=0, x=Range(2, -400, 400), low=-128, high=100, held=held)
     assert stage.graph.run([[4 * 10, 2 * 16], [4 * 100, 2 * 16]]) == [[code] for code in expected]
 

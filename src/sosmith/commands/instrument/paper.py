@@ -29,7 +29,7 @@ def paper(output: Path | None, as_json: bool) -> None:
     with show_progress() as step:
         made = Paper()
         step("computing")
-        table = made.table
+        tables = made.tables()
         if output is not None:
             step("drawing")
             files = made.files()
@@ -38,6 +38,6 @@ def paper(output: Path | None, as_json: bool) -> None:
     if as_json:
         print_json(made.figures())
     elif output is None:
-        print_tables([table])
+        print_tables(tables)
     if output is not None:
         note(f"wrote {output} and its pictures in {output.parent / 'images'}")

@@ -98,7 +98,7 @@ def wear_command(
     if as_json:
         print_json(found.as_dict())
     else:
-        print_tables([found.table])
+        print_tables(found.tables())
     if plot is not None and drawn is not None:
         write_file(plot, drawn)
         note(f"wrote {plot}")

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from rich.markup import escape
 
-from sosmith.commands.tables.console import TableConsole, print_all
+from sosmith.commands.tables.console import TableConsole, plain, print_all
 from sosmith.interface.certificate import Agreement, Entries, HardwareVerdict, ProgramVerdict, Proof
-from sosmith.interface.quantity import Quantity
-from sosmith.interface.tables.design import budget_table
 
 
 def print_proof(certificate: Entries, proof: Proof) -> None:
     """Print the proven error budget, and the number of ranges checked."""
     console = TableConsole()
-    unit = plain(proof.bound.unit)
     ranges = f"{proof.nodes} nodes within their ranges, {proof.ranges} by peak gains: nothing inside overflows"
-    print_all([budget_table(proof.budget, Quantity(proof.allowed, unit), float(certificate.output.lsb))])
+    print_all(proof.tables())
     console.print(f"[bold green]proven[/]: {escape(plain(certificate.name))}, {ranges}")
     if proof.agreement is not None:
         console.print(f"[bold green]as specified[/]: {_agreement(proof.agreement)}")
@@ -67,11 +64,6 @@ def _print_scope(console: TableConsole, proof: Proof) -> None:
         if part.asked:
             colour = "green" if part.state.value == "proven" else "yellow"
             console.print(f"[bold {colour}]{part.state.value.replace('_', ' ')}[/]: {name}: {escape(plain(part.why))}")
-
-
-def plain(text: str) -> str:
-    """Return a text from a file without characters that control a terminal."""
-    return "".join(character if character.isprintable() else "?" for character in text)
 
 
 def _print_hardware(console: TableConsole, what: str, found: HardwareVerdict) -> None:

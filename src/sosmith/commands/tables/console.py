@@ -101,15 +101,24 @@ def new_table(title: str, columns: list[str]) -> Table:
     return table
 
 
+def plain(text: str) -> str:
+    """Return a text, which may be from a file, without characters that control a terminal."""
+    return "".join(character if character.isprintable() else "?" for character in text)
+
+
+def _shown(text: str) -> str:
+    return escape("\n".join(map(plain, text.split("\n"))))
+
+
 def print_all(tables: Iterable[Facts]) -> None:
     """Print what the interface says in tables."""
     console = TableConsole()
     for facts in tables:
-        table = new_table(f"{escape(facts.title)}{_VERDICTS[facts.passed]}", [escape(name) for name in facts.head])
+        table = new_table(f"{_shown(facts.title)}{_VERDICTS[facts.passed]}", [_shown(name) for name in facts.head])
         for first, *rest in facts.rows:
             style = facts.styles.get(first)
-            heading = escape(first) if style is None else f"[{style}]{escape(first)}[/]"
-            table.add_row(heading, *map(escape, rest))
+            heading = _shown(first) if style is None else f"[{style}]{_shown(first)}[/]"
+            table.add_row(heading, *map(_shown, rest))
         console.print(table)
         for sentence in facts.notes:
-            console.print(escape(sentence), highlight=False)
+            console.print(_shown(sentence), highlight=False)

@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import Any
 
-from sosmith.gen.facts.table import Table
+from sosmith.gen.facts.table import Table, View
 from sosmith.instrument.paper.comparison import LABELS
 from sosmith.instrument.paper.document import paper_files, paper_json, summary_rows
 from sosmith.instrument.paper.figures import read_paper_figures
 
 
-class Paper:
+class Paper(View):
     """The printed figures beside ours."""
 
     def __init__(self) -> None:
         self._printed = read_paper_figures()
 
-    @cached_property
-    def table(self) -> Table:
-        """How many figures of each part are reproduced, near, different or not comparable."""
+    def tables(self) -> list[Table]:
+        """Return how many figures of each part are reproduced, near, different or not comparable."""
         rows = [row[:-1] for row in summary_rows(self._printed)]
-        return Table("The paper's figures compared with ours", rows, ("", *LABELS))
+        return [Table("The paper's figures compared with ours", rows, ("", *LABELS))]
 
     def files(self) -> dict[str, str]:
         """Return the complete comparison as a Markdown file ``paper.md``, and its pictures in ``images/``."""

@@ -8,7 +8,7 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
 
-from sosmith.gen.facts.table import Table
+from sosmith.gen.facts.table import Table, View
 from sosmith.instrument.uncertainty.instrument_budget import instrument_of
 from sosmith.instrument.wear.assessment import WearLimits, WearReport, judge
 from sosmith.instrument.wear.record_file import WearRecord, moment_text, read_wear_record
@@ -20,7 +20,7 @@ __all__ = ["Wear", "WearLimits"]
 
 
 @dataclass(frozen=True, eq=False)
-class Wear:
+class Wear(View):
     """The wear by a record of clearances.
 
     Attributes
@@ -102,11 +102,10 @@ class Wear:
 
         return wear_plot(self.record.time, self.record.clearance, self.report, file_format, dated=self.record.dated)
 
-    @property
-    def table(self) -> Table:
-        """Wear, rate and remaining life, with their intervals."""
+    def tables(self) -> list[Table]:
+        """Return wear, rate and remaining life, with their intervals."""
         rows = list(_rows(self.record, self.report, self.channel))
-        return Table(f"Wear by {self.record.path.name}: {self.report.state}", rows)
+        return [Table(f"Wear by {self.record.path.name}: {self.report.state}", rows)]
 
     def as_dict(self) -> dict[str, Any]:
         """Return all results in JSON types, with the unit in each key."""

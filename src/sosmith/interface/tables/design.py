@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from sosmith.gen.architectures.architecture import Architecture
 from sosmith.gen.calibration.fit import Fit, read_measurements
+from sosmith.gen.facts.design_tables import budget_table, limit_cycles_table, uncertainty_table
 from sosmith.gen.facts.table import Table
 from sosmith.gen.filter.decimation import SAMPLED
-from sosmith.gen.output.core_facts import CoreFacts, LimitCycleFacts, SectionFacts
+from sosmith.gen.output.core_facts import CoreFacts, SectionFacts
 from sosmith.gen.output.decimation_facts import DecimationFacts, RateCosts
-from sosmith.gen.quantity import LEAST_PART, quantity
+from sosmith.gen.quantity import quantity
 from sosmith.gen.specification.specification import Specification
 from sosmith.gen.specification.wear_limits import WearSpec
 from sosmith.instrument.calibration.uncertainty import of_polynomial
-from sosmith.instrument.uncertainty.budget import SHARE
-from sosmith.instrument.uncertainty.instrument_budget import InstrumentBudget
-from sosmith.interface.quantity import Quantity
+from sosmith.instrument.uncertainty.instrument_budget import budget_json
 from sosmith.model.dataflow.program import Program
 from sosmith.model.port import Port
 
@@ -33,20 +31,19 @@ Rows = list[Sequence[str]]
 def design_tables(design: Design, *, details: bool = False) -> list[Table]:
     """Say what a design is, and how its error bound comes about; its sections, limit cycles and schedule as details."""
     facts, output = design.facts, design.facts.output
-    made, lsb = design.core, design.facts.lsb
     tables = [
         Table(f"{facts.name}: {facts.core}", _overview(design)),
-        budget_table(design.budget, design.specification.max_error, facts.lsb),
+        budget_table(design.budget, facts.max_error, facts.lsb, facts.unit),
     ]
     if facts.decimation is not None:
         tables.append(_rates(design.rate_costs, output.unit, facts.channels))
     if not details:
         return tables
     if design.uncertainty is not None:
-        tables.append(_uncertainty(design.uncertainty))
+        tables.append(uncertainty_table(budget_json(design.uncertainty)))
     if facts.sections:
-        tables += [_sections(facts.sections), _limit_cycles(facts.limit_cycles, lsb)]
-    ahead = made.architecture.ahead
+        tables += [_sections(facts.sections), limit_cycles_table(facts.limit_cycles, facts)]
+    ahead = design.core.architecture.ahead
     before = None if ahead is None or ahead.program is None else _schedule(ahead.program, " in the calibration")
     own = None if facts.program is None else _schedule(facts.program)
     return tables + [table for table in (before, own) if table is not None]
@@ -220,60 +217,5 @@ def _schedule(program: Program, where: str = "") -> Table:
     return Table(title, rows, ("from", "clocks", "value", "words"))
 
 
-def _limit_cycles(cycles: Sequence[LimitCycleFacts], lsb: float) -> Table:
-    rows: Rows = []
-    for found in cycles:
-        largest = "none, proven" if found.none else f"up to {found.largest / lsb:.4g}"
-        weights = ", ".join(f"{float(weight):.4g}" for weight in found.lyapunov or ())
-        rows.append((found.section, largest, f"{found.dead_band / lsb:.4g}", weights or "not needed"))
-    title = "Limit cycles: what a section's own rounding can sustain, in output LSB"
-    return Table(title, rows, ("section", "without input", "dead band", "Lyapunov weights"))
-
-
-def _uncertainty(found: InstrumentBudget) -> Table:
-    """Say what a reading's uncertainty is made of, at the point where it is largest."""
-    at, budget, unit = found.worst, found.budget, found.unit
-    rows: Rows = []
-    for one in budget.contributions:
-        per = "" if one.unit == unit else " s" if one.unit == f"{unit}/s" else f" {unit}/{one.unit}"
-        rows.append(
-            (
-                one.source,
-                one.kind,
-                f"{one.uncertainty[at]:.3g} {one.unit}",
-                f"{one.sensitivity[at]:.3g}{per}",
-                f"{one.contribution[at]:.3g}",
-                _freedom(one.freedom),
-            )
-        )
-    rows.append(("combined", "", "", "", f"{budget.combined[at]:.3g}", _freedom(budget.freedom[at])))
-    factor = f"k = {budget.factor[at]:.3g}"
-    rows.append(("expanded", f"{100 * SHARE:g} %", "", factor, f"{budget.expanded[at]:.3g}", ""))
-    where = f"{found.clearance[at]:.3g} {unit} ({found.voltage[at]:.3g} V, {found.temperature[at]:.3g} °C)"
-    return Table(
-        f"Uncertainty of a reading at {where}, where it is largest",
-        rows,
-        ("source", "distribution", "u", "sensitivity", unit, "freedom"),
-        {"combined": "bold", "expanded": "bold"},
-    )
-
-
-def _freedom(value: float) -> str:
-    return f"{value:.3g}" if math.isfinite(value) else "known"
-
-
 UNKNOWN = "not stated; the bound below is that of the arithmetic alone"
 """What stands for the uncertainty of a reading where the calibration's own is not known."""
-
-
-def budget_table(budget: Mapping[str, Quantity], allowed: Quantity, lsb: float) -> Table:
-    """Say what an error bound is made of, the parts that count, and what is allowed, in its unit and in LSB."""
-    seen = {part: value for part, value in budget.items() if value >= lsb * LEAST_PART}
-    parts = [*seen.items(), ("sum", sum(budget.values())), ("allowed", allowed)]
-    of_what = " of the arithmetic" if "calibration" in budget else ""
-    return Table(
-        f"Error budget{of_what}, proven for all inputs in range",
-        [(part, f"{float(value):.3g}", f"{float(value) / lsb:.4f}") for part, value in parts],
-        ("part", allowed.unit or "full scale 1", "output LSB"),
-        {"sum": "bold"},
-    )
