@@ -45,7 +45,9 @@ def table(record: dict[str, Any]) -> str:
     """Return the counts as a table in Markdown."""
     lines = ["| | count |", "|---|---:|"]
     lines += [f"| {words} | {record['counts'].get(key, 0):,} |" for key, words in _ROWS.items()]
-    lines.append(f"| findings: a tool sees something else, a claim is another one, a traceback, more than a minute | {len(record['findings'])} |")
+    lines.append(
+        f"| findings: a tool sees something else, a claim is another one, a traceback, more than a minute | {len(record['findings'])} |"
+    )
     lines.append(f"| slowest verdict | {record['slowest']:.0f} s |")
     return "".join(f"{line}\n" for line in lines)
 
@@ -80,7 +82,10 @@ def campaign(texts: int, certificates: int, jobs: int, keep: Path | None = None)
             total.add(outcome)
             for finding in outcome.findings:
                 print(finding, file=sys.stderr, flush=True)
-    return {key: dict(sorted(value.items())) if isinstance(value, Counter) else value for key, value in asdict(total).items()}
+    return {
+        key: dict(sorted(value.items())) if isinstance(value, Counter) else value
+        for key, value in asdict(total).items()
+    }
 
 
 def main() -> None:

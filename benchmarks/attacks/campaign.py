@@ -151,7 +151,9 @@ def _ask_the_tools(core: Core, accepted: Sequence[str], right: Source, folder: P
         outcome.counts[f"traces, {tool}"] += len(accepted)
         for text, trace in zip(accepted, found[tool], strict=True):
             if trace != wanted or "x" in trace:
-                outcome.findings.append(f"{core.kind}: {tool} sees {trace}, not {wanted}, in {difference(core.text, text)}")
+                outcome.findings.append(
+                    f"{core.kind}: {tool} sees {trace}, not {wanted}, in {difference(core.text, text)}"
+                )
 
 
 def _read_again(core: Core, read: Sequence[str], outcome: Outcome) -> None:
@@ -167,7 +169,9 @@ def _read_again(core: Core, read: Sequence[str], outcome: Outcome) -> None:
                 seen += netlists([text], NAME)
             except ToolError as error:
                 seen.append(None)
-                outcome.findings.append(f"{core.kind}: Yosys refuses {difference(core.text, text)}: {str(error)[-200:]}")
+                outcome.findings.append(
+                    f"{core.kind}: Yosys refuses {difference(core.text, text)}: {str(error)[-200:]}"
+                )
     for text, netlist in zip(read, seen, strict=True):
         if netlist is None:
             continue
@@ -228,7 +232,9 @@ def differing(before: Any, after: Any) -> list[str]:
     """Return the places where an accepted certificate says something else that counts."""
     if before.keys() == after.keys() and _same_claims(before, after):
         return []
-    here, there = ({place: certificates.at(tree, place) for place in certificates.leaves(tree)} for tree in (before, after))
+    here, there = (
+        {place: certificates.at(tree, place) for place in certificates.leaves(tree)} for tree in (before, after)
+    )
     places = sorted({place for place in here.keys() | there.keys() if here.get(place) != there.get(place)}, key=str)
     return [
         f"{'.'.join(map(str, place))}: {str(there.get(place))[:60]} in place of {str(here.get(place))[:60]}"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import json
 import random
 import re
 from collections.abc import Callable, Iterator
@@ -87,15 +86,40 @@ def _bomb(rng: random.Random, value: Any) -> Any:
 
 
 def _word(rng: random.Random, value: str) -> str:
-    others = ["", "zero", "steady", "parallel", "folded", "serial", "online", "none", "detect", "add", "subtract", "delay"]
-    spoilt = ["\x1b[2K", "../" + value, value + " ", value.upper(), value * 3, "\u202e", value[:-1], "x" * 3_000, "\ud800"]
+    others = [
+        "",
+        "zero",
+        "steady",
+        "parallel",
+        "folded",
+        "serial",
+        "online",
+        "none",
+        "detect",
+        "add",
+        "subtract",
+        "delay",
+    ]
+    spoilt = [
+        "\x1b[2K",
+        "../" + value,
+        value + " ",
+        value.upper(),
+        value * 3,
+        "\u202e",
+        value[:-1],
+        "x" * 3_000,
+        "\ud800",
+    ]
     return rng.choice(others + spoilt)
 
 
 def _words(rng: random.Random, tree: Tree) -> None:
     """Change a digit or a word of the specification in the certificate."""
     words = tree["about"]["specification"]
-    pattern, new = rng.choice([(r"\d", "0123456789"), (r"\w+", ["x", "true", "1"]), (r"\n", ["", "\n[wear]\n", "\n= 1\n"])])
+    pattern, new = rng.choice(
+        [(r"\d", "0123456789"), (r"\w+", ["x", "true", "1"]), (r"\n", ["", "\n[wear]\n", "\n= 1\n"])]
+    )
     places = list(re.finditer(pattern, words))
     place = rng.choice(places)
     tree["about"]["specification"] = words[: place.start()] + rng.choice(list(new)) + words[place.end() :]
@@ -125,7 +149,9 @@ def _structure(rng: random.Random, tree: Tree) -> None:
     elif action == "move":
         found[key + "_"] = found.pop(key)
     else:
-        found[rng.choice(["operands", "parameter", "low", "x", "start", "hold", "reload"])] = rng.choice([0, 1, "0", [], {}, True])
+        found[rng.choice(["operands", "parameter", "low", "x", "start", "hold", "reload"])] = rng.choice(
+            [0, 1, "0", [], {}, True]
+        )
 
 
 def _node(rng: random.Random, tree: Tree) -> None:
@@ -137,7 +163,9 @@ def _node(rng: random.Random, tree: Tree) -> None:
     if action == 0 and node.get("operands"):
         node["operands"][rng.randrange(len(node["operands"]))] = rng.randrange(len(nodes))
     elif action == 1:
-        node["op"] = rng.choice(["add", "subtract", "shift", "scale", "floor", "truncate", "clamp", "bound", "delay", "constant"])
+        node["op"] = rng.choice(
+            ["add", "subtract", "shift", "scale", "floor", "truncate", "clamp", "bound", "delay", "constant"]
+        )
     elif action == 2:
         node["parameter"] = node.get("parameter", 0) + rng.choice([-1, 1, 2])
     elif action == 3:
@@ -164,7 +192,9 @@ def _files(rng: random.Random, tree: Tree) -> None:
     chosen = rng.choice(files)
     action = rng.randrange(4)
     if action == 0:
-        chosen["name"] = rng.choice(["../tiny.sv", "/etc/passwd", "tiny.SV", "tiny.sv ", "", "tiny.v", chosen["name"][:-1]])
+        chosen["name"] = rng.choice(
+            ["../tiny.sv", "/etc/passwd", "tiny.SV", "tiny.sv ", "", "tiny.v", chosen["name"][:-1]]
+        )
     elif action == 1:
         chosen["sha256"] = "0" * 64
     elif action == 2:
@@ -207,5 +237,7 @@ def spoilt_layout(text: str, seed: str) -> str:
     """Return the text of a certificate that is another one, or none, as JSON."""
     rng = random.Random(seed)
     at_ = rng.randrange(len(text))
-    new = rng.choice(["", " ", "\n", "{", "[" * 2_000, "1.0", "NaN", "1e5", '"x": 1, ', "//", "\0", "\ufeff", "\\u0000"])
+    new = rng.choice(
+        ["", " ", "\n", "{", "[" * 2_000, "1.0", "NaN", "1e5", '"x": 1, ', "//", "\0", "\ufeff", "\\u0000"]
+    )
     return text[:at_] + new + text[at_ + rng.randrange(2) :]

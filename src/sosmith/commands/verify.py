@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 
 import click
@@ -37,6 +38,13 @@ _NOT_ALL = 4
     type=click.Choice(["yosys"]),
     help="With --files, compare what is read with what this front end sees, every register bit by bit.",
 )
+@click.option("--rocq", is_flag=True, help="Have the kernel of the proof assistant Rocq check claims as well.")
+@click.option(
+    "--export",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Write what Rocq checks into this folder, with a Makefile for another machine.",
+)
 @click.option("--partial", is_flag=True, help="Exit with 0 where nothing is wrong, though a part is not proven.")
 @click.option(
     "--time-limit",
@@ -54,6 +62,8 @@ def verify(
     rebuild: bool,
     core: str | None,
     second_reader: str | None,
+    rocq: bool,
+    export: Path | None,
     partial: bool,
     time_limit: float,
     as_json: bool,
@@ -84,13 +94,21 @@ def verify(
                 second_reader=second_reader,
                 seconds=time_limit,
             )
+            written = [] if export is None else read.export_rocq(export)
+            checked = read.check_in_rocq(step, seconds=time_limit) if rocq else None
         except ShortfallError as error:
             raise ShortfallError(f"{certificate}: {error}") from None
     if as_json:
-        print_json({"name": read.name, **proof.as_dict()})
+        kernel = {
+            "rocq": None if checked is None else asdict(checked),
+            "rocq_files": [str(path) for path in written],
+        }
+        print_json({"name": read.name, **proof.as_dict(), **kernel})
     else:
         from sosmith.commands.tables.certificate import print_proof
+        from sosmith.commands.tables.rocq import print_rocq
 
         print_proof(read.entries, proof)
-    if proof.missing and not partial:
+        print_rocq(checked, written)
+    if (proof.missing or (checked is not None and checked.unchecked)) and not partial:
         click.get_current_context().exit(_NOT_ALL)

@@ -21,6 +21,7 @@ from sosmith.verify.certificate_file import Certificate as Entries
 from sosmith.verify.certificate_file import certificate_text, read_certificate
 from sosmith.verify.parallel.check import HardwareVerdict
 from sosmith.verify.program.check import ProgramVerdict
+from sosmith.verify.rocq.check import RocqVerdict, check_in_rocq, rocq_texts
 from sosmith.verify.specified.stated_specification import Agreement
 from sosmith.verify.verdict.door import Stated, judge
 from sosmith.verify.verdict.generated_files import about_of, check_texts
@@ -35,6 +36,7 @@ __all__ = [
     "Part",
     "ProgramVerdict",
     "Proof",
+    "RocqVerdict",
     "State",
 ]
 
@@ -286,6 +288,40 @@ class Certificate:
             rebuilt=again,
             scope=scope,
         )
+
+    def check_in_rocq(
+        self, progress: Progress = lambda step, done, total: None, *, seconds: float = 600.0
+    ) -> RocqVerdict:
+        """Have the kernel of the proof assistant Rocq check claims of the certificate.
+
+        Parameters
+        ----------
+        progress : callable
+        seconds : float
+            Time that this may take, in s; 0 for any.
+
+        Raises
+        ------
+        ShortfallError
+            If a claim is not accepted, or not within the time.
+        ToolError
+            If `coqc` is missing or fails.
+        """
+        return check_in_rocq(self.entries, progress, seconds=seconds)
+
+    def export_rocq(self, folder: str | PathLike[str]) -> list[Path]:
+        """Write what Rocq checks into a folder, with a Makefile for a machine that has Rocq alone; return the paths.
+
+        Raises
+        ------
+        ShortfallError
+            If the certificate's claims cannot be written as theorems.
+        SpecificationError
+            If a file cannot be written.
+        ToolError
+            If the disk is full.
+        """
+        return list(write_files(Path(fspath(folder)), rocq_texts(self.entries)))
 
     def text(self) -> str:
         """Return the content of its file as JSON, identical on every run."""

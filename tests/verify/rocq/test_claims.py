@@ -1,0 +1,80 @@
+"""Theorems on the gains of sections: accepted to the last unit of the grid, and refused with one unit less."""
+
+import re
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+from tests.verify.rocq.small import GRID, needs_coqc, small, with_gain
+
+from sosmith.gen.realizations.registry import REALIZATIONS
+from sosmith.verify.certificate_file import Certificate
+from sosmith.verify.graph import RejectedError, Transfer
+from sosmith.verify.rocq.check import DATA, rocq_texts
+from sosmith.verify.rocq.claims import Claim, gain_claims
+from sosmith.verify.rocq.kernel import STANDARD, run_kernel
+from sosmith.verify.rocq.linear import LinearStage
+
+
+def checked(made: Certificate, claims: list[Claim], folder: Path) -> set[str]:
+    """Have Rocq check these theorems; return the axioms."""
+    texts = rocq_texts(made)
+    head = texts[f"{DATA}.v"].partition("(* section")[0]
+    texts[f"{DATA}.v"] = head + "".join(f"{claim.text}Print Assumptions {claim.name}.\n" for claim in claims)
+    for name, text in texts.items():
+        (folder / name).write_text(text)
+    return set(run_kernel(folder, claims, DATA).axioms)
+
+
+def refusal(claim: Claim) -> str:
+    return f"^Rocq must accept {re.escape(f'{claim.name} ({claim.words})')}, and says: .*$"
+
+
+@needs_coqc
+def test_claims_are_accepted_and_one_unit_less_is_refused(tmp_path: Path) -> None:
+    made = small()
+    less = with_gain(made, 1, recursion_gain=made.claims.sections[1].recursion_gain - GRID)
+    accepted, refused = list(gain_claims(made))[:2], list(gain_claims(less))[2]
+    assert refused.name == "recursion_gain_1"
+    with pytest.raises(RejectedError, match=refusal(refused)):
+        checked(made, [*accepted, refused], tmp_path)
+
+
+@needs_coqc
+@pytest.mark.slow
+@pytest.mark.parametrize("realization", REALIZATIONS)
+def test_every_claim_of_every_realization(realization: str, tmp_path: Path) -> None:
+    made = small(realization)
+    claims = list(gain_claims(made))
+    assert checked(made, claims, tmp_path) <= STANDARD
+    for index, entry in enumerate(made.claims.sections):
+        less = with_gain(made, index, recursion_gain=entry.recursion_gain - GRID, peak_gain=entry.peak_gain - GRID)
+        name = f"recursion_gain_{index}"
+        refused = next(claim for claim in gain_claims(less) if claim.name == name)
+        with pytest.raises(RejectedError, match=refusal(refused)):
+            checked(made, [refused], tmp_path)
+        peaks = [claim for claim in gain_claims(less) if claim.name.startswith(f"peak_gain_{index}")]
+        with pytest.raises(RejectedError, match=r"^Rocq must accept peak_gain_"):
+            checked(made, peaks, tmp_path)
+
+
+@pytest.mark.sweep(2)
+@pytest.mark.parametrize("realization", REALIZATIONS)
+def test_the_linear_model_is_that_of_the_verifier(realization: str) -> None:
+    """Two ways to the same polynomials: recursion of Faddeev and LeVerrier here, determinants there."""
+    for stage in small(realization).stages:
+        if stage.role == "section":
+            here, there = LinearStage(stage), Transfer(stage)
+            assert [str(value) for value in here.denominator] == [str(value) for value in there.denominator.coeffs()]
+            for source in there.inputs:
+                for output in stage.outputs:
+                    unit = Fraction(2) ** (stage.nodes[source[1]].frac - stage.nodes[output].frac)
+                    made = [value * unit for value in here.numerator(output, ("node", source[1], 0))]
+                    assert [str(value) for value in made] == [str(x) for x in there.numerator(source, output).coeffs()]
+
+
+def test_gains_of_other_sections_are_refused() -> None:
+    made = small()
+    fewer = made.model_copy(update={"claims": made.claims.model_copy(update={"sections": ()})})
+    with pytest.raises(RejectedError, match=r"^gains must be given of section0, section1, not nothing$"):
+        list(gain_claims(fewer))

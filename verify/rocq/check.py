@@ -1,0 +1,117 @@
+"""The door to Rocq: from a certificate to theorems that its kernel has accepted, and what is not among them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from sosmith.model.errors import ToolError
+from sosmith.verify.certificate_file import Certificate
+from sosmith.verify.rocq.claims import Claim, gain_claims
+from sosmith.verify.rocq.kernel import LIBRARY, THEORIES, run_kernel, theory_texts
+
+DATA = "Claims"
+"""Name of the file with a certificate's own theorems."""
+
+_HEAD = f"""\
+(* Written from a certificate: its claims as theorems. The theories beside it say what they mean. *)
+Require Import ZArith List. Import ListNotations.
+From {LIBRARY} Require Import {" ".join(THEORIES)}.
+Open Scope Z_scope.
+"""
+
+_MAKEFILE = f"""\
+# Checks the claims with Rocq (coqc of version 8.16 or later) and prints the axioms that each rests on.
+FILES = {" ".join(f"{name}.v" for name in (*THEORIES, DATA))}
+
+all:
+\tfor file in $(FILES); do coqc -Q . {LIBRARY} $$file || exit 1; done
+
+clean:
+\trm -f *.vo *.vok *.vos *.glob .*.aux
+
+.PHONY: all clean
+"""
+
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class RocqVerdict:
+    """What Rocq's kernel accepted of a certificate.
+
+    Attributes
+    ----------
+    version : str
+        Of Rocq.
+    claims : dict of str to str
+        What each theorem says, by its name.
+    axioms : tuple of str
+        What they rest on: at most the axioms of the standard library's real numbers.
+    unchecked : tuple of str
+        What of the certificate Rocq did not check.
+    """
+
+    version: str
+    claims: dict[str, str]
+    axioms: tuple[str, ...]
+    unchecked: tuple[str, ...]
+
+
+def rocq_texts(certificate: Certificate) -> dict[str, str]:
+    """Return theories, theorems and a Makefile by their file names.
+
+    Raises
+    ------
+    RejectedError
+        If the certificate's claims cannot be written as theorems.
+    """
+    return _texts(list(gain_claims(certificate)))
+
+
+def check_in_rocq(
+    certificate: Certificate, progress: Progress = lambda step, done, total: None, *, seconds: float = 0.0
+) -> RocqVerdict:
+    """Have Rocq's kernel check a certificate's claims.
+
+    Parameters
+    ----------
+    certificate : Certificate
+        As read from its file.
+    progress : callable
+        Called with the step, the number of theorems accepted, and of all.
+    seconds : float
+        Time that this may take, in s; 0 for any.
+
+    Raises
+    ------
+    RejectedError
+        If a claim is not accepted, or not within the time.
+    ToolError
+        If `coqc` is missing or fails.
+    """
+    progress("theorems", 0, 0)
+    claims = list(gain_claims(certificate))
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        try:
+            for file, text in _texts(claims).items():
+                (folder / file).write_text(text, encoding="utf-8")
+        except OSError as error:
+            raise ToolError(f"{folder}: the theories must be written there, which failed: {error.strerror}") from None
+        accepted = run_kernel(folder, claims, DATA, seconds, lambda done, total: progress("Rocq", done, total))
+    words = {claim.name: claim.words for claim in claims}
+    return RocqVerdict(accepted.version, words, accepted.axioms, _unchecked(certificate))
+
+
+def _texts(claims: list[Claim]) -> dict[str, str]:
+    parts = [f"(* {claim.words}. *)\n{claim.text}Print Assumptions {claim.name}.\n" for claim in claims]
+    return theory_texts() | {f"{DATA}.v": "\n".join([_HEAD, *parts]), "Makefile": _MAKEFILE}
+
+
+def _unchecked(certificate: Certificate) -> tuple[str, ...]:
+    """Name what no theorem is about."""
+    del certificate
+    return ("ranges", "error budget")
