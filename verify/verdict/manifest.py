@@ -60,9 +60,11 @@ class Manifest:
         if found is None:
             self.open += _CLOCKS
             return
-        clocks = (found.clearing, found.latency, 1)
+        clocks: tuple[int, int, int]
         if isinstance(found, UnitVerdict):
             clocks = found.progress.cleared, found.pace.latency, found.pace.interval
+        else:
+            clocks = found.clearing, found.latency, 1
         for key, value in zip(_CLOCKS, clocks, strict=True):
             _compare(key, self.tree[key], value)
 
