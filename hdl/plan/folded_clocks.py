@@ -22,9 +22,9 @@ def taken_cycles(program: Program, *, serial: bool, protect: str = "none") -> in
     if protect != "none":
         return latency_cycles(program, serial=serial, protect=protect)
     takes = [number for number, instruction in enumerate(program.instructions) if instruction.opcode is Opcode.TAKE]
-    before = program.instructions[: takes[-1]]
-    clocks = sum(map(program.serial_cycles_of, before)) if serial else len(before)
-    return clocks + (SERIAL_DEPTH if serial else FOLDED_DEPTH - 1)
+    if not serial:
+        return takes[-1] + FOLDED_DEPTH - 1
+    return sum(map(program.serial_cycles_of, program.instructions[: takes[-1] + 1])) + SERIAL_DEPTH - 1
 
 
 def overlaps(program: Program, *, serial: bool, channels: int = 1, reload: bool = False, protect: str = "none") -> bool:

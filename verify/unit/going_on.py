@@ -17,6 +17,8 @@ class Pace(NamedTuple):
     ----------
     progress : Progress
         Within how many clocks it takes a sample and gives its result.
+    first : int
+        Most clocks after a reset before the one in which a sample on offer is taken.
     latency : int
         Most clocks from the edge at which a sample is found to the edge at which its result leaves.
     interval : int
@@ -24,6 +26,7 @@ class Pace(NamedTuple):
     """
 
     progress: Progress
+    first: int
     latency: int
     interval: int
 
@@ -85,6 +88,7 @@ def pace(control: Control, clearing: int, digits: Callable[[int], int]) -> Pace:
     everywhere = [(number, 0) for number in range(len(control.nodes))]
     return Pace(
         Progress(_most(everywhere, taking), _most(map(left, accepted), giving), clearing),
+        clearing + _most([(0, 0)], taking) - 1,
         _most(map(left, begun), giving),
         _most([(step.after, 0) for step in begun if step.event.ready], beginning),
     )
