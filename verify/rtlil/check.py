@@ -134,8 +134,8 @@ class _Pair:
             for place in range(len(register.next)):
                 if (name, place) not in held:
                     self.open.append(f"bit {place} of the register {name} of {self._name}")
-        for bit, place in found.items():
-            self._check_next(bit, place)
+        for bit, there in found.items():
+            self._check_next(bit, there)
         self._check_memories()
         for name, wire in wires.items():
             if wire.direction == "output" and wire.width:

@@ -53,7 +53,12 @@ class RtlilLogic:
         names: Mapping[str, Mapping[str, str]],
     ) -> None:
         self.module, self.gates, self._names, self._plain = module, gates, names, names[name]
-        self._drivers: dict[Place, tuple[str, object, int]] = {}
+        self._driven: set[Place] = set()
+        self._connected: dict[Place, Bit] = {}
+        self._set: dict[Place, Case] = {}
+        self._from_instance: dict[Place, tuple[str, str, int]] = {}
+        self._from_cell: dict[Place, tuple[str, int]] = {}
+        self._held: dict[Place, tuple[str, int]] = {}
         self._done: dict[str, Literals] = {}
         self._known: dict[Place, int] = {}
         self._open: set[object] = set()
@@ -62,19 +67,21 @@ class RtlilLogic:
         self.given: dict[str, list[Bit]] = {}
         for target, value in module.connects:
             for one, other in zip(target, value, strict=True):
-                self._drive(one, "connect", other, 0)
+                self._connected[self._drive(one)] = other
         for case in module.processes:
             for bit in case.targets():
-                self._drive(bit, "process", case, 0)
+                self._set[self._drive(bit)] = case
         for label, cell in module.cells.items():
             self._add_cell(label, cell, directions)
 
-    def _drive(self, bit: Bit, kind: str, by: object, place: int) -> None:
+    def _drive(self, bit: Bit) -> Place:
+        """Note that a bit is driven, which must be that of a net, and return it."""
         require(isinstance(bit, tuple), "what is driven in the RTLIL must be a net")
         assert isinstance(bit, tuple)
-        require(bit not in self._drivers, f"bit {bit[1]} of {bit[0]} of the RTLIL must be driven once")
+        require(bit not in self._driven, f"bit {bit[1]} of {bit[0]} of the RTLIL must be driven once")
         require(self.module.wires[bit[0]].direction != "input", f"the input {bit[0]} of the RTLIL must not be driven")
-        self._drivers[bit] = kind, by, place
+        self._driven.add(bit)
+        return bit
 
     def _add_cell(self, name: str, cell: Cell, directions: Mapping[str, Mapping[str, str]]) -> None:
         if cell.kind.startswith("\\"):
@@ -85,20 +92,20 @@ class RtlilLogic:
             for port, bits in cell.ports.items():
                 if directions[kind][port] == "output":
                     for place, bit in enumerate(bits):
-                        self._drive(bit, "instance", (plain, self._names[kind][port]), place)
+                        self._from_instance[self._drive(bit)] = plain, self._names[kind][port], place
                 else:
                     self.given[f"{plain}.{self._names[kind][port]}"] = bits
             return
         output = {"$dff": "Q", "$memrd_v2": "DATA", "$memwr_v2": "", "$meminit_v2": ""}.get(cell.kind, "Y")
-        kind = "cell" if cell.kind not in _STORES else "held"
+        drivers = self._held if cell.kind in _STORES else self._from_cell
         for place, bit in enumerate(cell.ports[output] if output else []):
-            self._drive(bit, kind, name, place)
+            drivers[self._drive(bit)] = name, place
 
     # What is held.
 
     def registers(self) -> dict[Place, tuple[str, int]]:
         """Return the bits that are held, by what holds them: a cell and the place in it."""
-        return {bit: (str(by), place) for bit, (kind, by, place) in self._drivers.items() if kind == "held"}
+        return self._held
 
     def hold(self, bit: Place, literal: int) -> None:
         """Let a bit that is held stand for a literal."""
@@ -110,7 +117,7 @@ class RtlilLogic:
 
     def is_driven(self, bit: Place) -> bool:
         """Whether anything drives a bit."""
-        return bit in self._drivers
+        return bit in self._driven
 
     def restart(self) -> None:
         """Forget what was computed from what is held."""
@@ -119,8 +126,8 @@ class RtlilLogic:
 
     def next_of(self, bit: Place) -> int:
         """Return what a bit that is held takes over at a clock."""
-        _, by, place = self._drivers[bit]
-        cell = self.module.cells[str(by)]
+        name, place = self._held[bit]
+        cell = self.module.cells[name]
         if cell.kind == "$dff":
             require(cell.number("CLK_POLARITY") == 1, "registers of the RTLIL must take the rising edge")
             return self.bit(cell.ports["D"][place])
@@ -136,10 +143,10 @@ class RtlilLogic:
     def root(self, bit: Bit) -> Bit:
         """Follow connections to the bit that one is."""
         seen = set()
-        while isinstance(bit, tuple) and bit in self._drivers and self._drivers[bit][0] == "connect":
+        while isinstance(bit, tuple) and bit in self._connected:
             require(bit not in seen, f"bit {bit[1]} of {bit[0]} of the RTLIL must not be itself")
             seen.add(bit)
-            bit = self._drivers[bit][1]  # type: ignore[assignment]
+            bit = self._connected[bit]
         return bit
 
     def clocks(self) -> set[str]:
@@ -222,31 +229,29 @@ class RtlilLogic:
         if bit not in self._known:
             require(bit not in self._open, f"bit {bit[1]} of {bit[0]} of the RTLIL must not depend on itself")
             self._open.add(bit)
-            self._known[bit] = self._driven(bit)
+            self._known[bit] = self._found(bit)
             self._open.discard(bit)
         return self._known[bit]
 
-    def _driven(self, bit: Place) -> int:
+    def _found(self, bit: Place) -> int:
         if self.module.wires[bit[0]].direction == "input":
             return self.gates.variable(("input", self._plain[bit[0]], bit[1]))
-        require(bit in self._drivers, f"bit {bit[1]} of {bit[0]} of the RTLIL must be driven to be used")
-        kind, by, place = self._drivers[bit]
-        if kind == "connect":
-            return self.bit(by)  # type: ignore[arg-type]
-        if kind == "instance":
-            name, port = by  # type: ignore[misc]
-            return self.gates.variable(("instance", name, port, place))
-        if kind == "process":
-            assert isinstance(by, Case)
-            return self._case(by, bit, None)
-        if kind == "held":
-            cell = self.module.cells[str(by)]
-            if cell.kind == "$memrd_v2" and cell.number("CLK_ENABLE") == 0:
-                return self._read(cell)[place]
+        require(bit in self._driven, f"bit {bit[1]} of {bit[0]} of the RTLIL must be driven to be used")
+        if bit in self._connected:
+            return self.bit(self._connected[bit])
+        if bit in self._from_instance:
+            return self.gates.variable(("instance", *self._from_instance[bit]))
+        if bit in self._set:
+            return self._case(self._set[bit], bit, None)
+        name, place = (self._held if bit in self._held else self._from_cell)[bit]
+        cell = self.module.cells[name]
+        if cell.kind == "$memrd_v2" and cell.number("CLK_ENABLE") == 0:
+            return self._read(cell)[place]
+        if bit in self._held:
             return self.gates.variable(("unnamed", bit))
-        if by not in self._done:
-            self._done[str(by)] = self._computed(self.module.cells[str(by)])
-        return self._done[str(by)][place]
+        if name not in self._done:
+            self._done[name] = self._computed(cell)
+        return self._done[name][place]
 
     def _case(self, case: Case, bit: Place, before: int | None) -> int:
         """Return what a bit is after a case; `before` is what it was, None if it was not set."""
