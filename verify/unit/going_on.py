@@ -21,11 +21,14 @@ class Pace(NamedTuple):
         Most clocks from the edge at which a sample is found to the edge at which its result leaves.
     interval : int
         Most clocks from one sample to the next, if there always is one, of a channel that exists.
+    opening : int
+        Most clocks from the edge at which a sample is found to the one at which it is taken.
     """
 
     progress: Progress
     latency: int
     interval: int
+    opening: int
 
 
 _Place = tuple[int, int]
@@ -87,6 +90,7 @@ def pace(control: Control, clearing: int, digits: Callable[[int], int]) -> Pace:
         Progress(_most(everywhere, taking), _most(map(left, accepted), giving), clearing),
         _most(map(left, begun), giving),
         _most([(step.after, 0) for step in begun if step.event.ready], beginning),
+        _most([(step.after, 0) for step in begun if not step.event.accepted], taking),
     )
 
 

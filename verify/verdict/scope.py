@@ -177,9 +177,10 @@ def _rtlil(proofs: Proofs) -> Part:
     if found.open:
         more = f" and {len(found.open) - 3} more" if len(found.open) > 3 else ""
         return Part(State.PARTIAL, f"not shown to be as in the SystemVerilog: {', '.join(found.open[:3])}{more}")
+    modules = f"{found.modules} module{'s' * (found.modules > 1)}"
     return Part(
         State.PROVEN,
-        f"the {found.register_bits} bits of registers, the memories and the outputs of its {found.modules} modules "
+        f"the {found.register_bits} bits of registers, the memories and the outputs of its {modules} "
         "do what they do in the SystemVerilog",
     )
 
