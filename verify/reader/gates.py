@@ -34,6 +34,10 @@ class Gates:
             self._inputs.append(inputs)
         return found
 
+    def inputs(self, literal: int) -> tuple[int, int] | None:
+        """Return the literals that the gate of a literal takes; None for a variable or constant."""
+        return self._inputs[literal >> 1]
+
     # Gates.
 
     def both(self, a: int, b: int) -> int:

@@ -17,18 +17,18 @@ class Pace(NamedTuple):
     ----------
     progress : Progress
         Within how many clocks it takes a sample and gives its result.
-    first : int
-        Most clocks after a reset before the one in which a sample on offer is taken.
     latency : int
         Most clocks from the edge at which a sample is found to the edge at which its result leaves.
     interval : int
         Most clocks from one sample to the next, if there always is one, of a channel that exists.
+    opening : int
+        Most clocks from the edge at which a sample is found to the one at which it is taken.
     """
 
     progress: Progress
-    first: int
     latency: int
     interval: int
+    opening: int
 
 
 _Place = tuple[int, int]
@@ -88,9 +88,9 @@ def pace(control: Control, clearing: int, digits: Callable[[int], int]) -> Pace:
     everywhere = [(number, 0) for number in range(len(control.nodes))]
     return Pace(
         Progress(_most(everywhere, taking), _most(map(left, accepted), giving), clearing),
-        clearing + _most([(0, 0)], taking) - 1,
         _most(map(left, begun), giving),
         _most([(step.after, 0) for step in begun if step.event.ready], beginning),
+        _most([(step.after, 0) for step in begun if not step.event.accepted], taking),
     )
 
 

@@ -20,6 +20,7 @@ from sosmith.verify.parallel.check import HardwareVerdict, check_hardware
 from sosmith.verify.program.check import ProgramVerdict, check_program
 from sosmith.verify.program.text import ProgramText, read_program
 from sosmith.verify.reader.source import read_source
+from sosmith.verify.rtlil.check import check_rtlil
 from sosmith.verify.specified.calibration_fit import Refit, check_fit
 from sosmith.verify.specified.stated_specification import Agreement, check_specification
 from sosmith.verify.specified.words import words_of
@@ -172,7 +173,9 @@ def _files_proven(
     progress("C model", 0, 0)
     source, header = (unicode_text(folder / f"{certificate.name}.{end}") for end in "ch")
     model = check_c_model(source, header, certificate, item)
-    return replace(proofs, unheld=tuple(manifest.open), model=model), decimator
+    progress("RTLIL", 0, 0)
+    rtlil = check_rtlil(core_text(folder / f"{certificate.name}.il"), modules)
+    return replace(proofs, unheld=tuple(manifest.open), model=model, rtlil=rtlil), decimator
 
 
 def _program_of(certificate: Certificate, text: str) -> ProgramText:

@@ -62,7 +62,7 @@ class Manifest:
             return
         clocks: tuple[int, int, int]
         if isinstance(found, UnitVerdict):
-            clocks = found.pace.first, found.pace.latency, found.pace.interval
+            clocks = found.progress.cleared + found.pace.opening, found.pace.latency, found.pace.interval
         else:
             clocks = found.clearing, found.latency, 1
         for key, value in zip(_CLOCKS, clocks, strict=True):

@@ -10,6 +10,7 @@ from sosmith.verify.c_model.check import ModelVerdict
 from sosmith.verify.certificate_file import Certificate, ItemEntry
 from sosmith.verify.parallel.check import HardwareVerdict
 from sosmith.verify.program.check import ProgramVerdict
+from sosmith.verify.rtlil.check import RtlilVerdict
 from sosmith.verify.specified.stated_specification import Agreement
 from sosmith.verify.unit.check import UnitVerdict
 
@@ -47,6 +48,7 @@ class Proofs:
     """Fields of the manifest that nothing was held against."""
     unit: UnitVerdict | None = None
     model: ModelVerdict | None = None
+    rtlil: RtlilVerdict | None = None
 
 
 def scope_of(
@@ -110,7 +112,7 @@ def _hardware(item: ItemEntry | None, proofs: Proofs | None, *, is_decimated: bo
         return dict.fromkeys(_OF_FILES, Part(State.NOT_READ, "no files were given", asked=False))
     parts = {
         "c_model": _c_model(proofs),
-        "rtlil": Part(State.NOT_READ, "its text is held by its SHA-256 alone"),
+        "rtlil": _rtlil(proofs),
     }
     parts["manifest"] = _manifest(item, proofs)
     kinds = [proofs.program, proofs.hardware, proofs.calibration]
@@ -165,6 +167,21 @@ def _c_model(proofs: Proofs) -> Part:
         State.PROVEN,
         f"its statements compute the {proofs.model.nodes} nodes of the graphs and the flags, without overflow; a "
         "compiler is assumed that rounds down where it shifts negative numbers to the right",
+    )
+
+
+def _rtlil(proofs: Proofs) -> Part:
+    found = proofs.rtlil
+    if found is None:
+        return Part(State.NOT_READ, "its text is held by its SHA-256 alone")
+    if found.open:
+        more = f" and {len(found.open) - 3} more" if len(found.open) > 3 else ""
+        return Part(State.PARTIAL, f"not shown to be as in the SystemVerilog: {', '.join(found.open[:3])}{more}")
+    modules = f"{found.modules} module{'s' * (found.modules > 1)}"
+    return Part(
+        State.PROVEN,
+        f"the {found.register_bits} bits of registers, the memories and the outputs of its {modules} "
+        "do what they do in the SystemVerilog",
     )
 
 

@@ -100,7 +100,7 @@ def item(**fields: Any) -> Callable[[Tree], None]:
 def test_what_is_right_is_accepted_and_what_is_missing_is_named(copy: Callable[..., Path]) -> None:
     found = proof(forge(copy(PARALLEL)), spec=True)
     assert found.hardware is not None
-    assert set(found.missing) == {"manifest", "flags", "rtlil"}
+    assert set(found.missing) == {"manifest", "flags"}
     assert found.scope["hardware"].state is found.scope["filter"].state is State.PROVEN
 
 
@@ -198,6 +198,13 @@ def test_the_c_model_is_read(name: str, old: str, new: str, copy: Callable[..., 
     folder = copy(PARALLEL)
     changed(folder, name, old, new)
     with pytest.raises(RejectedError, match=r"of the C model must compute|of plain.h must go on with"):
+        proof(forge(folder))
+
+
+def test_the_rtlil_is_compared_with_the_systemverilog(copy: Callable[..., Path]) -> None:
+    folder = copy(PARALLEL)
+    changed(folder, "plain.il", "cell $and ", "cell $or ")
+    with pytest.raises(RejectedError, match=r"must be the same in the RTLIL as in the SystemVerilog$"):
         proof(forge(folder))
 
 

@@ -19,6 +19,8 @@ from sosmith.verify.graph import RejectedError
 from sosmith.verify.parallel.check import HardwareVerdict
 from sosmith.verify.program.text import read_program
 from sosmith.verify.progress import Progress
+from sosmith.verify.unit.check import UnitVerdict
+from sosmith.verify.unit.going_on import Pace
 from sosmith.verify.verdict.manifest import Manifest, read_manifest
 
 Tree = dict[str, Any]
@@ -186,22 +188,26 @@ def test_clocks_are_those_that_are_proven(key: str, clocks: int, core: Callable[
     tree = parallel.read(parallel.manifest).tree
     found = HardwareVerdict(20, 2, 4, tree["latency_cycles"], 2, tree["reset_cycles"])
     read = parallel.read(parallel.manifest)
-    read.hold_clocks(found, None)
+    read.hold_clocks(found)
     assert key not in read.open
     with pytest.raises(RejectedError, match=rf"^{key} in the manifest must be \d+, .*$"):
-        parallel.read(parallel.changed(key, lambda right: right + clocks)).hold_clocks(found, None)
-    read.hold_clocks(None, None)
+        parallel.read(parallel.changed(key, lambda right: right + clocks)).hold_clocks(found)
+    read.hold_clocks(None)
     assert key in read.open
 
 
-def test_the_latency_of_a_unit_is_a_limit(core: Callable[[str], Core]) -> None:
-    read = core("folded").read(core("folded").manifest)
-    stated = read.tree["latency_cycles"]
-    read.hold_clocks(None, Progress(9, stated, 5))
-    assert "latency_cycles" not in read.open
-    assert {"reset_cycles", "cycles_per_sample"} <= set(read.open)
-    with pytest.raises(RejectedError, match=rf"^latency_cycles .* must be at least {stated + 1}, not {stated}$"):
-        read.hold_clocks(None, Progress(9, stated + 1, 5))
+@pytest.mark.parametrize("key", ["reset_cycles", "latency_cycles", "cycles_per_sample"])
+def test_clocks_are_those_of_a_proven_unit(key: str, core: Callable[[str], Core]) -> None:
+    """A sample is taken some clocks after it is found, which the clocks after a reset count too."""
+    folded = core("folded")
+    tree = folded.read(folded.manifest).tree
+    progress = Progress(23, tree["latency_cycles"] - 4, tree["reset_cycles"] - 4)
+    found = UnitVerdict(90, 35, Pace(progress, tree["latency_cycles"], tree["cycles_per_sample"], 4))
+    read = folded.read(folded.manifest)
+    read.hold_clocks(found)
+    assert key not in read.open
+    with pytest.raises(RejectedError, match=rf"^{key} in the manifest must be {tree[key]}, .*, not {tree[key] + 1}$"):
+        folded.read(folded.changed(key, lambda right: right + 1)).hold_clocks(found)
 
 
 @pytest.mark.parametrize("key", ["digit_bits", "accumulator_bits", "words", "instructions"])
