@@ -46,12 +46,15 @@ class Agreement:
         Whether the calibration is fitted to measurements: its coefficients are then not in the specification.
     measurements : int
         Number of measurements that it was fitted to again; 0 if it was not.
+    not_compared : tuple of str
+        Keys of the specification that nothing was held against, in its order.
     """
 
     core: str
     distance: Fraction | None
     fitted: bool
     measurements: int = 0
+    not_compared: tuple[str, ...] = ()
 
 
 def check_specification(certificate: Certificate, text: str, margin: Fraction, folder: Path = Path()) -> Agreement:

@@ -41,6 +41,7 @@ from sosmith.verify.verdict.item import (
     check_stated,
     core_of,
     file_names,
+    not_compared,
     whole_core,
 )
 from sosmith.verify.verdict.limits import SECONDS, limited
@@ -148,6 +149,7 @@ def _held_against(
         refit = check_fit(check_measurements(about, stated.measurements), certificate.ideal.polynomial or ())
         agreement = replace(agreement, measurements=refit.rows)
     tree = words_of(stated.text)
+    agreement = replace(agreement, not_compared=not_compared(tree))
     if item is not None:
         check_stated(certificate, item, tree, refit)
     found = core_of(certificate)

@@ -168,6 +168,23 @@ def wear_limits(table: Mapping[str, Any]) -> list[tuple[Fraction, Fraction]]:
     return [(each + warning, end) for each, end in zip(initial, ends, strict=True)]
 
 
+_COMPARED = {
+    "": {"name", "sample_rate", "channels", "input", "output", "calibration", "filter", "wear", "hardware"},
+    "calibration": {"coefficients", "data"},
+    "hardware": {"architecture", "protect", "reload", "samples_per_clock", "start"},
+}
+"""Keys of a specification's tables that are held against something; those of other tables are all compared."""
+
+
+def not_compared(tree: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the keys of a specification that nothing is held against, but for those that leave the choice open."""
+    found = [key for key in tree if key not in _COMPARED[""]]
+    for name in ("calibration", "hardware"):
+        table = table_of(tree, name)
+        found += [f"{name}.{key}" for key in table if key not in _COMPARED[name] and table[key] != "auto"]
+    return tuple(found)
+
+
 def whole_core(tree: Mapping[str, Any]) -> str:
     """Return what a specification describes as a whole."""
     if "calibration" not in tree:

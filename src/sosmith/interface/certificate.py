@@ -130,6 +130,7 @@ class Proof(View):
                 "core": agreement.core,
                 "filter_distance": None if distance is None else float(distance),
                 "calibration_from_measurements": agreement.fitted,
+                "not_compared": list(agreement.not_compared),
             },
             "files_compared": self.files,
             "program_instructions": None if self.program is None else self.program.instructions,

@@ -259,3 +259,10 @@ def test_a_calibration_is_fitted_again(copy: Callable[..., Path]) -> None:
 def test_what_is_flagged_is_what_is_specified(fields: Tree, sentence: str, copy: Callable[..., Path]) -> None:
     with pytest.raises(RejectedError, match=f"^{sentence}$"):
         proof(forge(copy(MEASURED, "calibration"), item(**fields)), spec=True)
+
+
+def test_words_that_nothing_is_held_against_are_named(copy: Callable[..., Path]) -> None:
+    text = PARALLEL + 'hardware.realization = "df1"\nhardware.clock = 1000000\nhardware.pipeline = "auto"\n'
+    agreement = proof(next(copy(text).glob("*.certificate.json")), spec=True).agreement
+    assert agreement is not None
+    assert agreement.not_compared == ("hardware.realization", "hardware.clock")

@@ -86,4 +86,7 @@ def _agreement(agreement: Agreement) -> str:
         parts.append(fitted)
     if agreement.distance is not None:
         parts.append(f"filter within a peak gain of {float(agreement.distance):.1e} of its words")
-    return f"{', '.join(parts[:-1])} and {parts[-1]}" if len(parts) > 1 else parts[0]
+    compared = f"{', '.join(parts[:-1])} and {parts[-1]}" if len(parts) > 1 else parts[0]
+    if agreement.not_compared:
+        compared += f"; not compared: {escape(plain(', '.join(agreement.not_compared)))}"
+    return compared
