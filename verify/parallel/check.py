@@ -13,8 +13,8 @@ The core is read from its SystemVerilog, which is what tools synthesize, and not
    source, sink and reset do (`sosmith.verify.parallel.control`).
 2. What a register holds is a form of its own sample, and it is loaded exactly when a sample moves there; a register of
    a recursion holds the code of a DELAY node, by induction over the clocks (`sosmith.verify.parallel.pipeline`).
-3. What leaves is the output of the graph, extended to whole bytes, with the flags input_at_rail, output_saturated and
-   settling, and 0 for flags that the core does not have.
+3. What leaves is the output of the graph, extended to whole bytes, with its flags, and 0 for those that the core does
+   not have.
 
 Sums and products are those of the hardware, modulo the width of each net; extensions by a sign or by zeros, and bits
 that are left out, change a value unless its range says otherwise. The only ranges are those of the certificate, which
@@ -29,30 +29,27 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from sosmith.verify.certificate_file import Certificate, Operation
+from sosmith.verify.certificate_file import Certificate
 from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.parallel.channels import DEST, find_channels
 from sosmith.verify.parallel.control import find_control
 from sosmith.verify.parallel.evaluation import Evaluation
 from sosmith.verify.parallel.fault import fault
+from sosmith.verify.parallel.flags import flags_of, wear_limits
 from sosmith.verify.parallel.forms import Forms
-from sosmith.verify.parallel.graph_codes import GraphCodes, LanePorts
+from sosmith.verify.parallel.graph_codes import GraphCodes
 from sosmith.verify.parallel.netlist import Netlist, flattened
 from sosmith.verify.parallel.pipeline import DATA, Pipeline
 from sosmith.verify.parallel.split import split
-from sosmith.verify.program.normal_form import Form, constant, plus
 from sosmith.verify.progress import Progress
 from sosmith.verify.reader.source import read_modules
 from sosmith.verify.reader.syntax import Module
-from sosmith.verify.specified.words import words_of
 
 CLOCK = "aclk"
 OUTPUT, FLAGS, OUTPUT_DEST = "m_axis_tdata", "m_axis_tuser", "m_axis_tdest"
 _PORTS = frozenset(
     {CLOCK, "aresetn", DATA, "s_axis_tvalid", "s_axis_tready", OUTPUT, FLAGS, "m_axis_tvalid", "m_axis_tready"}
 )
-_AT_RAIL, _OUTSIDE, _SATURATED, _WEAR, _SETTLING, _NONE = 0, 1, 2, (3, 4), 5, (6, 7)
-"""Bits of the flags of a sample; those of `_NONE` are 0 without protection."""
 _FLAG_BITS = 8
 
 _DEEPEST = 20_000
@@ -176,7 +173,7 @@ def _checked(netlist: Netlist, certificate: Certificate, channels: int, inside: 
     pipeline = Pipeline(netlist, control, graph, forms, certificate, inside.told)
     try:
         pipeline.check_states()
-        _check_output(pipeline.buffered(), netlist, pipeline, graph, certificate)
+        _check_output(pipeline.buffered(), netlist, pipeline, graph, certificate, prefix)
         if channels > 1:
             dest = pipeline.buffered().net(OUTPUT_DEST)
             right = pipeline.same(dest, pipeline.channel, netlist.widths[OUTPUT_DEST])
@@ -190,15 +187,19 @@ def _checked(netlist: Netlist, certificate: Certificate, channels: int, inside: 
 
 
 def _check_output(
-    logic: Evaluation, netlist: Netlist, pipeline: Pipeline, graph: GraphCodes, certificate: Certificate
+    logic: Evaluation,
+    netlist: Netlist,
+    pipeline: Pipeline,
+    graph: GraphCodes,
+    certificate: Certificate,
+    prefix: str,
 ) -> None:
     """Check what leaves the core while `m_axis_tvalid` is 1."""
     width = -(-certificate.output.bits // 8) * 8
     for name, each in ((OUTPUT, width), (FLAGS, _FLAG_BITS)):
         wanted = each * len(graph.lanes)
         require(netlist.widths[name] == wanted, f"the port {name} must have {wanted} bits, not {netlist.widths[name]}")
-    told = pipeline.told
-    unused = [place for place in _unused(certificate) if place >= len(told)]
+    limits = None if certificate.about is None else wear_limits(pipeline, netlist, certificate, prefix)
     for number, lane in enumerate(graph.lanes):
         label = graph.nodes[lane.output].label
         data = logic.net(OUTPUT, width * number, width)
@@ -206,50 +207,10 @@ def _check_output(
         require(pipeline.same(data, graph.seen(lane.output, ""), width), f"{what} must be {label}, not another value")
         for bit in range(_FLAG_BITS * number, _FLAG_BITS * (number + 1)):
             logic.net(FLAGS, bit, 1)  # of the sample whose beat it leaves with, also where nothing is said of its value
-        for place, flag, value in (
-            (_AT_RAIL, "input_at_rail", told[0] if told else _at_rail(graph, lane, certificate)),
-            *([(_OUTSIDE, "outside_calibration", told[1])] if len(told) > 1 else []),
-            (_SATURATED, "output_saturated", _saturated(graph, lane)),
-            (_SETTLING, "settling", {} if lane.settling is None else graph.forms.negative(graph.codes[lane.settling])),
-        ):
-            bit = _FLAG_BITS * number + place
+        for flag in flags_of(graph, lane, certificate, pipeline.told, limits):
+            bit = _FLAG_BITS * number + flag.place
+            why = f", as the ports and {label} say" if flag.name else ""
             require(
-                pipeline.same(logic.net(FLAGS, bit, 1), value, 1),
-                f"bit {bit} of {FLAGS} must be {flag}, as the ports and {label} say, not another value",
+                pipeline.same(logic.net(FLAGS, bit, 1), flag.value, 1),
+                f"bit {bit} of {FLAGS} must be {flag.name or '0, as there is no such flag'}{why}, not another value",
             )
-        for place in unused:
-            bit = _FLAG_BITS * number + place
-            none = pipeline.same(logic.net(FLAGS, bit, 1), {}, 1)
-            require(none, f"bit {bit} of {FLAGS} must be 0, as there is no such flag, not another value")
-
-
-def _unused(certificate: Certificate) -> list[int]:
-    """Return the bits of flags that a core does not have; if the specification is not there, it may have wear."""
-    found = [*_NONE]
-    if certificate.ideal.polynomial is None:
-        found.append(_OUTSIDE)
-    if certificate.about is not None and "wear" not in words_of(certificate.about.specification):
-        found += _WEAR
-    return sorted(found)
-
-
-def _at_rail(graph: GraphCodes, lane: LanePorts, certificate: Certificate) -> Form:
-    """Whether an input has its lowest or its highest code."""
-    forms, inside = graph.forms, constant(1)
-    for node, port in zip(lane.inputs, certificate.inputs, strict=True):
-        code = graph.codes[node]
-        above = forms.negative(plus(constant(port.lowest), code, -1))
-        below = forms.negative(plus(code, constant(port.highest), -1))
-        inside = forms.times(inside, forms.times(above, below))
-    return plus(constant(1), inside, -1)
-
-
-def _saturated(graph: GraphCodes, lane: LanePorts) -> Form:
-    """Whether the output was limited to its range."""
-    node = graph.nodes[lane.output]
-    if node.entry.op is not Operation.CLAMP:
-        return {}
-    of = graph.seen(node.operands[0], node.stage)
-    below = graph.forms.negative(plus(of, constant(node.entry.low), -1))
-    above = graph.forms.negative(plus(constant(node.entry.high), of, -1))
-    return plus(below, above)

@@ -102,6 +102,8 @@ class Pipeline:
     ----------
     told : list of Form
         These flags.
+    forms : Forms
+        The atoms.
     """
 
     def __init__(
@@ -113,7 +115,7 @@ class Pipeline:
         certificate: Certificate,
         told: int = 0,
     ) -> None:
-        self._netlist, self._control, self._graph, self._forms = netlist, control, graph, forms
+        self._netlist, self._control, self._graph, self.forms = netlist, control, graph, forms
         self.told = [forms.variable(("told", place), 0, 1) for place in range(told)]
         self._fields = _fields(graph, certificate, netlist.widths[DATA], self.told)
         self._dependence = Dependence(netlist, control.cuts)
@@ -174,6 +176,8 @@ class Pipeline:
             return self.held(name) if known else self._unknown(name, frame)
 
         def word(name: str, address: Form) -> Form:
+            if not self._netlist.memories[name].statements and address == self.channel:
+                return self.constant_word(name)
             unknown = self._unknown(name, frame)
             found = None if self.memories is None else self.memories.word(name, address, position, unknown)
             return unknown if found is None else found
@@ -182,6 +186,10 @@ class Pipeline:
             return self._field(low, width) if name == DATA and position == self._source else None
 
         return self.logic(content, word, fields=fields)
+
+    def constant_word(self, name: str) -> Form:
+        """Return the word of a memory that never changes, for the channel of a sample."""
+        return self.forms.variable(("constant", name), 0, (1 << self._netlist.memories[name].width) - 1)
 
     def in_front(self, known: Mapping[str, Form], opened: str) -> Evaluation:
         """Return the logic as it is while the input buffer holds a sample, where some registers hold what is `known`.
@@ -209,7 +217,7 @@ class Pipeline:
         """Return the logic where registers and inputs hold what `content` says, and memories what `word` does."""
         cuts = self._control.cuts - {opened}
         return Evaluation(
-            self._netlist, self._forms, content, self._graph.shortened, word=word, cuts=cuts, fields=fields
+            self._netlist, self.forms, content, self._graph.shortened, word=word, cuts=cuts, fields=fields
         )
 
     def held(self, name: str) -> Form:
@@ -238,7 +246,7 @@ class Pipeline:
         """Whether two words are proven to be the same, if need be by opening what stages hand on."""
         found: tuple[Form, Form] | None = self._graph.shortened(a, width), self._graph.shortened(b, width)
         for _ in range(_MOST_OPENED):
-            if found is None or same_word(self._forms, *found, width):
+            if found is None or same_word(self.forms, *found, width):
                 break
             found = self._graph.opened(*found)
         else:
@@ -449,7 +457,7 @@ class Pipeline:
         """Return bits of the input that lie within one field."""
         for field in self._fields:
             if field.offset <= low and low + width <= field.offset + field.width:
-                return self._forms.floor(shifted(field.word, field.offset - low))
+                return self.forms.floor(shifted(field.word, field.offset - low))
         return None
 
     def _state(self, state: State, position: int, case: Case) -> Form | None:
@@ -477,7 +485,7 @@ class Pipeline:
     def _unknown(self, name: str, frame: int) -> Form:
         memory = self._netlist.memories.get(name)
         width = self._netlist.widths[name] if memory is None else memory.width
-        return self._forms.variable(("unknown", name, frame), 0, (1 << width) - 1)
+        return self.forms.variable(("unknown", name, frame), 0, (1 << width) - 1)
 
     @contextmanager
     def _once(self, name: str) -> Iterator[None]:

@@ -148,6 +148,7 @@ class Contexts:
             width = self._netlist.widths[name] if bits.width is None else bits.width
             return frozenset({Slice(name, bits.low, width)})
         if name not in self._reached:
+            self._reached[name] = frozenset()  # within a loop, which `Evaluation` refuses
             values = [driver.value for driver in self._netlist.drivers.get(name, ())]
             self._reached[name] = frozenset(self.slices(values))
         return self._reached[name]

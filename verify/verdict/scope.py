@@ -155,7 +155,7 @@ def _unit(proofs: Proofs) -> tuple[Part, Part]:
 def _flags(proofs: Proofs, *, is_decimated: bool) -> Part:
     if proofs.unit is None and proofs.hardware is None:
         return Part(State.NOT_READ, "what the unit makes of its flags is not proven")
-    if is_decimated or proofs.unit is None:
+    if is_decimated:
         return Part(State.PARTIAL, "all but outside_calibration, wear_warning and wear_critical")
     return Part(State.PROVEN, "each is judged by the codes that the certificate states, and leaves with its sample")
 

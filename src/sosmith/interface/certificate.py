@@ -216,8 +216,9 @@ class Certificate:
         files : path
             Folder with the generated files: their SHA-256 must be those in the certificate, and no byte of the
             certificate's own file may have been changed. From the SystemVerilog, the program of a folded or serial
-            core, and all hardware of a parallel one, is proven to compute the certificate's graph for all inputs and
-            states; online cores are not, nor cores with loadable constants or protection. A decimator, how it is wired
+            core with the unit that runs it, and all hardware of a parallel one, is proven to compute the certificate's
+            graph for all inputs and states; online cores are not, nor cores with loadable constants or protection, nor
+            the unit beside a decimator. A decimator, how it is wired
             to a calibration before it, and what holds results behind it, is proven register by register.
         rebuild : bool
             Whether to generate all files again, from `spec` or the specification's text in the certificate, and compare

@@ -100,7 +100,7 @@ def item(**fields: Any) -> Callable[[Tree], None]:
 def test_what_is_right_is_accepted_and_what_is_missing_is_named(copy: Callable[..., Path]) -> None:
     found = proof(forge(copy(PARALLEL)), spec=True)
     assert found.hardware is not None
-    assert set(found.missing) == {"manifest", "flags"}
+    assert set(found.missing) == {"manifest"}
     assert found.scope["hardware"].state is found.scope["filter"].state is State.PROVEN
 
 

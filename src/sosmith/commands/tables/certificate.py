@@ -71,7 +71,7 @@ def _print_hardware(console: TableConsole, what: str, found: HardwareVerdict) ->
     console.print(
         f"[bold green]{what}[/]: the SystemVerilog computes these graphs, each sample {found.latency} clocks "
         f"later, in {found.registers} registers{memories}, {found.states} of them states: for all inputs, stalls "
-        "and resets, but for the flags outside_calibration, wear_warning and wear_critical"
+        "and resets"
     )
 
 
