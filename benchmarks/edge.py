@@ -94,8 +94,8 @@ def kills(share: int) -> Rows:
     """Kill all that writes."""
     rows, findings = dict[str, int](), list[str]()
     for name, writer, count in (
-        *((name, writer, 140) for name, writer in QUICK.items()),
-        *((name, WHOLE[name], {"generate": 20, "explore": 20}.get(name, 8)) for name in WHOLE),
+        *((name, writer, 160) for name, writer in QUICK.items()),
+        *((name, WHOLE[name], {"generate": 20, "explore": 10}.get(name, 4)) for name in WHOLE),
     ):
         longest = duration(writer)
         found = [killed(writer, seed, longest) for seed in range(_FIRST, _FIRST + max(count // share, 1))]

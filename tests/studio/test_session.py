@@ -292,3 +292,21 @@ def test_measurements_become_the_calibration(tmp_path: Path) -> None:
 def test_what_no_page_says_is_refused(session: Session, message: Any) -> None:
     with pytest.raises(MessageError):
         session.handle(message, "page")
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"filter.order.x": 1},
+        {"name.x.y": 1},
+        {"sample_rate": "x", "filter.order": 3},
+        {"filter": 1, "filter.order": 2},
+        {"filter.passband_edge": [None]},
+        {"sample_rate": 10**400, "filter.order": 1},
+    ],
+    ids=str,
+)
+def test_changes_that_cannot_be_made_leave_the_text_as_it_is(session: Session, changes: dict[str, Any]) -> None:
+    before = state(session)["document"]["text"]
+    session.handle({"do": "change", "n": 1, "changes": changes}, "page")
+    assert state(session)["document"]["text"] == before

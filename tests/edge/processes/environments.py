@@ -11,7 +11,7 @@ import signal
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import chdir
 from dataclasses import dataclass
 from functools import cache
@@ -31,7 +31,7 @@ COMMANDS = {
     "design": (None, "design plain.toml"),
     "design --json": (None, "design plain.toml --json"),
     "generate": ("out", "generate plain.toml -o out"),
-    "verify": (None, "verify made/plain.certificate.json"),
+    "verify": (None, "verify plain.certificate.json"),
     "combinations": (None, "combinations"),
     "emulate": ("out.csv", "emulate plain.toml noise -o out.csv"),
     "compare": ("out.html", "compare report.json report.json -o out.html"),
@@ -49,6 +49,8 @@ SECONDS, MEMORY = 120.0, 600.0
 """Most of a command, on however busy a machine, and most of its memory in MB."""
 
 NOBODY = 65_534
+
+CERTIFICATE = "plain.certificate.json"
 
 LINKED = "linked.txt"
 """A file that an output may be a link to."""
@@ -217,10 +219,10 @@ class Environment:
     findings: tuple[str, ...]
 
 
-def tried(seed: int) -> Environment:
-    """Run a command in an environment that the seed draws; every third has only changes that change nothing."""
+def tried(seed: int, names: Sequence[str] = tuple(COMMANDS)) -> Environment:
+    """Run one of these commands in an environment that the seed draws; every third has only harmless changes."""
     rng = random.Random(seed)
-    name = list(COMMANDS)[seed % len(COMMANDS)]
+    name = names[seed // 3 % len(names)]
     changes = rng.sample(HARMLESS, rng.randint(1, 4))
     if seed % 3:
         changes = [rng.choice(HARMFUL), *changes[:2]]
@@ -229,7 +231,7 @@ def tried(seed: int) -> Environment:
     wanted = good(name)
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
-        prepare(folder)
+        prepare(folder, line)
         before = contents(folder)
         place = Place(folder, output, rng)
 
@@ -265,12 +267,12 @@ def good(name: str) -> Good:
     output, line = COMMANDS[name]
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
-        prepare(folder)
+        prepare(folder, line)
         with chdir(folder):
             Invocation(line.split()[0]).run(*line.split()[1:])
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
-        prepare(folder)
+        prepare(folder, line)
 
         def act() -> None:
             os.chdir(folder)
@@ -286,29 +288,32 @@ def run(line: str) -> None:
     cli.main()
 
 
-def prepare(folder: Path) -> None:
-    """Put the inputs of all commands into a folder that others may read."""
+def prepare(folder: Path, line: str) -> None:
+    """Put the inputs of a command into a folder that others may read."""
     folder.chmod(0o755)
     for path, text in _inputs().items():
-        (folder / path).parent.mkdir(exist_ok=True)
         (folder / path).write_text(text, encoding="utf-8")
+    if CERTIFICATE in line:
+        (folder / CERTIFICATE).write_text(_certificate(), encoding="utf-8")
     write_csv(folder / "a.csv", readings(40))
 
 
 @cache
 def _inputs() -> dict[str, str]:
-    with tempfile.TemporaryDirectory() as scratch:
-        made = Path(scratch) / "plain.toml"
-        made.write_text(FILTER, encoding="utf-8")
-        Invocation("generate").good(str(made), "-o", scratch)
-        certificate = (Path(scratch) / "plain.certificate.json").read_text(encoding="utf-8")
     return {
         "plain.toml": FILTER,
         "report.json": to_json(report()),
         "trace.csv": "x_code\n1\n",
         LINKED: "what was there before",
-        "made/plain.certificate.json": certificate,
     }
+
+
+@cache
+def _certificate() -> str:
+    with tempfile.TemporaryDirectory() as scratch:
+        (Path(scratch) / "plain.toml").write_text(FILTER, encoding="utf-8")
+        Invocation("generate").good(f"{scratch}/plain.toml", "-o", scratch)
+        return (Path(scratch) / CERTIFICATE).read_text(encoding="utf-8")
 
 
 def contents(folder: Path) -> dict[str, bytes]:

@@ -62,8 +62,10 @@ class Ended:
     peak: float
 
 
-def forked(act: Callable[[], object], *, kill_after: float | None = None) -> Ended:
-    """Let a child do something, in a session of its own; kill it after so many seconds, or if it hangs.
+def forked(
+    act: Callable[[], object], *, kill_after: float | None = None, once: Callable[[], bool] = lambda: True
+) -> Ended:
+    """Let a child do something, in a session of its own; kill it so many seconds after `once` is true, or if it hangs.
 
     An exception ends it with status 70, after its traceback, a `SystemExit` as it ends any process. What it has
     started must end with it.
@@ -81,7 +83,9 @@ def forked(act: Callable[[], object], *, kill_after: float | None = None) -> End
     if not pid:
         _run(act, writer)
     os.close(writer)
-    ended = _waited_for(pid, begun + (PATIENCE if kill_after is None else kill_after))
+    while not (once() or _has_ended(pid)) and time.monotonic() < begun + PATIENCE:
+        time.sleep(0.0005)
+    ended = _waited_for(pid, begun + PATIENCE if kill_after is None else time.monotonic() + kill_after)
     seconds = time.monotonic() - begun
     end = time.monotonic() + GONE
     while running(pid):
@@ -128,6 +132,10 @@ def _waited_for(pid: int, end: float) -> tuple[int, int]:
             _, status, used = os.wait4(pid, 0)
             return os.waitstatus_to_exitcode(status), used.ru_maxrss
         time.sleep(min(left, 0.002))
+
+
+def _has_ended(pid: int) -> bool:
+    return os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None
 
 
 def running(session: int) -> list[int]:

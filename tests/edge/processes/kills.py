@@ -29,13 +29,17 @@ class Killed:
 
 
 def killed(writer: Writer, seed: int, longest: float) -> Killed:
-    """Let a child write, kill it at a moment drawn by the seed within `longest` seconds, and look at what is left."""
+    """Let a child write, kill it at a moment drawn by the seed within `longest` seconds, and look at what is left.
+
+    For odd seeds the seconds begin when the first thing is acknowledged, for even ones with the child.
+    """
     with tempfile.TemporaryDirectory() as scratch:
         folder, done = Path(scratch), Ledger()
         writer.prepare(folder)
         after = moment(random.Random(seed), longest)
         try:
-            ended = forked(lambda: writer.write(folder, done), kill_after=after)
+            once = (lambda: done[0] > 0) if seed % 2 and writer.longest is not None else (lambda: True)
+            ended = forked(lambda: writer.write(folder, done), kill_after=after, once=once)
             findings = tuple(writer.faults(folder, done))
         except Exception as error:
             return Killed(at_work=True, findings=(f"{type(error).__name__}: {error}",))

@@ -10,7 +10,10 @@ from tests.edge.processes.writers import QUICK, WHOLE
 FAST = 4
 
 
-@pytest.mark.parametrize("name", QUICK)
+SLOWER = {"recording in Parquet"}  # its package alone takes a second to import
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name in SLOWER)) for name in QUICK])
 def test_killed_at_any_moment(name: str) -> None:
     longest = duration(QUICK[name])
     found = [killed(QUICK[name], seed, longest) for seed in range(FAST)]
