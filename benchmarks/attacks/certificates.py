@@ -1,9 +1,9 @@
 """Edits of a certificate: numbers, words, structure and layout, with all digests made right again."""
 
+# ruff: noqa: E501
 from __future__ import annotations
 
 import copy
-import json
 import random
 import re
 from collections.abc import Callable, Iterator
@@ -52,12 +52,13 @@ def _is_integer(value: Any) -> bool:
     return isinstance(value, int) and not isinstance(value, bool)
 
 
-def _is_rational(value: Any) -> bool:
+def is_rational(value: Any) -> bool:
+    """Whether a value is a rational number as a text."""
     return isinstance(value, str) and re.fullmatch(r"-?\d+(/\d+)?", value) is not None
 
 
 def _is_word(value: Any) -> bool:
-    return isinstance(value, str) and not _is_rational(value) and re.fullmatch(r"[0-9a-f]{64}", value) is None
+    return isinstance(value, str) and not is_rational(value) and re.fullmatch(r"[0-9a-f]{64}", value) is None
 
 
 def _near(rng: random.Random, value: int) -> int:
@@ -87,15 +88,40 @@ def _bomb(rng: random.Random, value: Any) -> Any:
 
 
 def _word(rng: random.Random, value: str) -> str:
-    others = ["", "zero", "steady", "parallel", "folded", "serial", "online", "none", "detect", "add", "subtract", "delay"]
-    spoilt = ["\x1b[2K", "../" + value, value + " ", value.upper(), value * 3, "\u202e", value[:-1], "x" * 3_000, "\ud800"]
+    others = [
+        "",
+        "zero",
+        "steady",
+        "parallel",
+        "folded",
+        "serial",
+        "online",
+        "none",
+        "detect",
+        "add",
+        "subtract",
+        "delay",
+    ]
+    spoilt = [
+        "\x1b[2K",
+        "../" + value,
+        value + " ",
+        value.upper(),
+        value * 3,
+        "\u202e",
+        value[:-1],
+        "x" * 3_000,
+        "\ud800",
+    ]
     return rng.choice(others + spoilt)
 
 
 def _words(rng: random.Random, tree: Tree) -> None:
     """Change a digit or a word of the specification in the certificate."""
     words = tree["about"]["specification"]
-    pattern, new = rng.choice([(r"\d", "0123456789"), (r"\w+", ["x", "true", "1"]), (r"\n", ["", "\n[wear]\n", "\n= 1\n"])])
+    pattern, new = rng.choice(
+        [(r"\d", "0123456789"), (r"\w+", ["x", "true", "1"]), (r"\n", ["", "\n[wear]\n", "\n= 1\n"])]
+    )
     places = list(re.finditer(pattern, words))
     place = rng.choice(places)
     tree["about"]["specification"] = words[: place.start()] + rng.choice(list(new)) + words[place.end() :]
@@ -125,7 +151,9 @@ def _structure(rng: random.Random, tree: Tree) -> None:
     elif action == "move":
         found[key + "_"] = found.pop(key)
     else:
-        found[rng.choice(["operands", "parameter", "low", "x", "start", "hold", "reload"])] = rng.choice([0, 1, "0", [], {}, True])
+        found[rng.choice(["operands", "parameter", "low", "x", "start", "hold", "reload"])] = rng.choice(
+            [0, 1, "0", [], {}, True]
+        )
 
 
 def _node(rng: random.Random, tree: Tree) -> None:
@@ -137,7 +165,9 @@ def _node(rng: random.Random, tree: Tree) -> None:
     if action == 0 and node.get("operands"):
         node["operands"][rng.randrange(len(node["operands"]))] = rng.randrange(len(nodes))
     elif action == 1:
-        node["op"] = rng.choice(["add", "subtract", "shift", "scale", "floor", "truncate", "clamp", "bound", "delay", "constant"])
+        node["op"] = rng.choice(
+            ["add", "subtract", "shift", "scale", "floor", "truncate", "clamp", "bound", "delay", "constant"]
+        )
     elif action == 2:
         node["parameter"] = node.get("parameter", 0) + rng.choice([-1, 1, 2])
     elif action == 3:
@@ -164,7 +194,9 @@ def _files(rng: random.Random, tree: Tree) -> None:
     chosen = rng.choice(files)
     action = rng.randrange(4)
     if action == 0:
-        chosen["name"] = rng.choice(["../tiny.sv", "/etc/passwd", "tiny.SV", "tiny.sv ", "", "tiny.v", chosen["name"][:-1]])
+        chosen["name"] = rng.choice(
+            ["../tiny.sv", "/etc/passwd", "tiny.SV", "tiny.sv ", "", "tiny.v", chosen["name"][:-1]]
+        )
     elif action == 1:
         chosen["sha256"] = "0" * 64
     elif action == 2:
@@ -175,8 +207,8 @@ def _files(rng: random.Random, tree: Tree) -> None:
 
 CLASSES: dict[str, list[Edit]] = {
     "integers": [_leaf(_is_integer, _near), _leaf(_is_integer, _far)],
-    "rationals": [_leaf(_is_rational, _rational)],
-    "size": [_leaf(lambda value: _is_integer(value) or _is_rational(value), _bomb)],
+    "rationals": [_leaf(is_rational, _rational)],
+    "size": [_leaf(lambda value: _is_integer(value) or is_rational(value), _bomb)],
     "words": [_leaf(_is_word, _word)],
     "truths": [_leaf(lambda value: isinstance(value, bool), lambda rng, value: not value)],
     "specification": [_words],
@@ -207,5 +239,7 @@ def spoilt_layout(text: str, seed: str) -> str:
     """Return the text of a certificate that is another one, or none, as JSON."""
     rng = random.Random(seed)
     at_ = rng.randrange(len(text))
-    new = rng.choice(["", " ", "\n", "{", "[" * 2_000, "1.0", "NaN", "1e5", '"x": 1, ', "//", "\0", "\ufeff", "\\u0000"])
+    new = rng.choice(
+        ["", " ", "\n", "{", "[" * 2_000, "1.0", "NaN", "1e5", '"x": 1, ', "//", "\0", "\ufeff", "\\u0000"]
+    )
     return text[:at_] + new + text[at_ + rng.randrange(2) :]

@@ -4,6 +4,7 @@ Each edit is drawn at random and may leave the text as it was. None of them know
 the tools are asked.
 """
 
+# ruff: noqa: E501
 from __future__ import annotations
 
 import random
@@ -174,8 +175,10 @@ def _long(rng: random.Random, text: str) -> str:
             lambda: f"  assign z = 4096'd{'9' * count};",
             lambda: f"  wire {'z' * count};",
             lambda: "  reg [7:0] z [999999999:0];",
-            lambda: "  reg z [7:0];\n  initial begin : z_held\n    integer i;\n"
-            "    for (i = 0; i < 999999999; i = i + 1) z[i] = 1'h0;\n  end",
+            lambda: (
+                "  reg z [7:0];\n  initial begin : z_held\n    integer i;\n"
+                "    for (i = 0; i < 999999999; i = i + 1) z[i] = 1'h0;\n  end"
+            ),
             lambda: "\n".join(f"  wire z{k};" for k in range(count)),
         ]
     )()
