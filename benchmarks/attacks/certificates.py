@@ -1,5 +1,6 @@
 """Edits of a certificate: numbers, words, structure and layout, with all digests made right again."""
 
+# ruff: noqa: E501
 from __future__ import annotations
 
 import copy
@@ -51,12 +52,13 @@ def _is_integer(value: Any) -> bool:
     return isinstance(value, int) and not isinstance(value, bool)
 
 
-def _is_rational(value: Any) -> bool:
+def is_rational(value: Any) -> bool:
+    """Whether a value is a rational number as a text."""
     return isinstance(value, str) and re.fullmatch(r"-?\d+(/\d+)?", value) is not None
 
 
 def _is_word(value: Any) -> bool:
-    return isinstance(value, str) and not _is_rational(value) and re.fullmatch(r"[0-9a-f]{64}", value) is None
+    return isinstance(value, str) and not is_rational(value) and re.fullmatch(r"[0-9a-f]{64}", value) is None
 
 
 def _near(rng: random.Random, value: int) -> int:
@@ -205,8 +207,8 @@ def _files(rng: random.Random, tree: Tree) -> None:
 
 CLASSES: dict[str, list[Edit]] = {
     "integers": [_leaf(_is_integer, _near), _leaf(_is_integer, _far)],
-    "rationals": [_leaf(_is_rational, _rational)],
-    "size": [_leaf(lambda value: _is_integer(value) or _is_rational(value), _bomb)],
+    "rationals": [_leaf(is_rational, _rational)],
+    "size": [_leaf(lambda value: _is_integer(value) or is_rational(value), _bomb)],
     "words": [_leaf(_is_word, _word)],
     "truths": [_leaf(lambda value: isinstance(value, bool), lambda rng, value: not value)],
     "specification": [_words],

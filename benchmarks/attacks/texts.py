@@ -4,6 +4,7 @@ Each edit is drawn at random and may leave the text as it was. None of them know
 the tools are asked.
 """
 
+# ruff: noqa: E501
 from __future__ import annotations
 
 import random
@@ -197,9 +198,9 @@ CLASSES: dict[str, Sequence[Edit]] = {
     ],
     "characters": [
         within(r" ", "\\t", "\\v", "\\f", "\\r", "\\r\\n", "\\0", "\xa0", "\u2028", "\u200b", "\x1b", "\x7f", "\x85"),
-        within(r"\n", "\\r\\n", "\\r", "\\n\\r", "\\v", "\\f", "\\x1a\\n", "\u2029"),
+        within(r"\n", "\\r\\n", "\\r", "\\n\\r", "\\v", "\\f", "\x1a\\n", "\u2029"),
         within(r"\A", "\ufeff", "\\0", "\x04"),
-        within(_WORD, r"\g<0>\u0301", r"\g<0>é", "\u0430"),
+        within(_WORD, "\\g<0>\u0301", "\\g<0>é", "\u0430"),
         within(r"(?=\n)", " // a\\r  assign a = b;", "\\\\", "\\\\ "),
     ],
     "comments": [
