@@ -699,7 +699,7 @@ def test_a_bound_of_zero_is_told(off: int) -> None:
     assert summary["error"]["bound"] == 0
     assert summary["passed"] is not bool(off)
     page = render_page(run, summary)
-    assert f"{off} LSB · proven limit 0\u00a0nm" in page.replace(".00 LSB", " LSB")
+    assert f"{off}\u00a0LSB, the proven limit 0\u00a0nm" in page.replace(".00\u00a0LSB", "\u00a0LSB")
     if off:
         assert summary["shortfalls"][0] == "The largest error is 244 nm, over the limit of 0 mm."
     else:
