@@ -17,7 +17,7 @@ from sosmith.model.errors import ToolError
 from sosmith.verify.graph import RejectedError
 from sosmith.verify.rocq.claims import Claim
 
-THEORIES = ("Streams", "PeakGain")
+THEORIES = ("Streams", "PeakGain", "Graph", "Ranges", "Linear")
 """The general theories, in the order in which they are compiled."""
 
 LIBRARY = "Sosmith"
