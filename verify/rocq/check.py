@@ -9,6 +9,7 @@ from tempfile import TemporaryDirectory
 
 from sosmith.model.errors import ToolError
 from sosmith.verify.certificate_file import Certificate, Operation, StageEntry
+from sosmith.verify.rocq.bound import bound_claim, why_no_bound
 from sosmith.verify.rocq.cascade import cascade_of
 from sosmith.verify.rocq.claims import Claim, gain_claims
 from sosmith.verify.rocq.flat import flattened
@@ -17,13 +18,6 @@ from sosmith.verify.rocq.ranges import graph_definitions, range_claims
 
 DATA = "Claims"
 """Name of the file with a certificate's own theorems."""
-
-_HEAD = f"""\
-(* Written from a certificate: its claims as theorems. The theories beside it say what they mean. *)
-Require Import ZArith List. Import ListNotations.
-From {LIBRARY} Require Import {" ".join(THEORIES)}.
-Open Scope Z_scope.
-"""
 
 _MAKEFILE = f"""\
 # Checks the claims with Rocq (coqc of version 8.16 or later) and prints the axioms that each rests on.
@@ -71,7 +65,7 @@ def rocq_texts(certificate: Certificate) -> dict[str, str]:
     RejectedError
         If the certificate's claims cannot be written as theorems.
     """
-    return _texts(*_theorems(certificate)[:2])
+    return _texts(*theorems(certificate)[:2])
 
 
 def check_in_rocq(
@@ -96,7 +90,7 @@ def check_in_rocq(
         If `coqc` is missing or fails.
     """
     progress("theorems", 0, 0)
-    definitions, claims, unchecked = _theorems(certificate)
+    definitions, claims, unchecked = theorems(certificate)
     with TemporaryDirectory() as name:
         folder = Path(name)
         try:
@@ -109,16 +103,34 @@ def check_in_rocq(
     return RocqVerdict(accepted.version, words, accepted.axioms, unchecked)
 
 
-def _theorems(certificate: Certificate) -> tuple[str, list[Claim], tuple[str, ...]]:
+def head(theories: Sequence[str] = THEORIES) -> str:
+    """Return how a file of theorems begins that requires these theories."""
+    return f"""\
+(* Written from a certificate: its claims as theorems. The theories beside it say what they mean. *)
+Require Import ZArith Reals List. Import ListNotations.
+From {LIBRARY} Require Import {" ".join(theories)}.
+Open Scope Z_scope.
+"""
+
+
+def theorems(certificate: Certificate) -> tuple[str, list[Claim], tuple[str, ...]]:
     """Return definitions, all theorems in their order, and what none of them is about."""
-    unchecked = ["error budget and bound"]
     claims = list(gain_claims(certificate))
     why = _why_no_ranges(certificate.stages)
     if why is not None:
-        return "", claims, (f"ranges: {why}", *unchecked)
+        return "", claims, (f"ranges: {why}", "error bound: no ranges are proven")
     graph = flattened(certificate)
     cascade = cascade_of(graph) if certificate.claims.sections else None
     claims += range_claims(graph, cascade)
+    unchecked = [
+        "parts of the error budget, each on its own",
+        "the ideal filter: its coefficients are those of the certificate",
+    ]
+    why = why_no_bound(certificate)
+    if why is not None or cascade is None:
+        unchecked = [f"error bound: {why}", *unchecked[1:]]
+    else:
+        claims.append(bound_claim(certificate, cascade))
     if certificate.decimation is not None:
         unchecked.append("decimator and what is before it")
     return graph_definitions(graph), claims, tuple(unchecked)
@@ -138,4 +150,4 @@ def _why_no_ranges(stages: Sequence[StageEntry]) -> str | None:
 
 def _texts(definitions: str, claims: list[Claim]) -> dict[str, str]:
     parts = [f"(* {claim.words}. *)\n{claim.text}Print Assumptions {claim.name}.\n" for claim in claims]
-    return theory_texts() | {f"{DATA}.v": "\n".join([_HEAD, definitions, *parts]), "Makefile": _MAKEFILE}
+    return theory_texts() | {f"{DATA}.v": "\n".join([head(), definitions, *parts]), "Makefile": _MAKEFILE}

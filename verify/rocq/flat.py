@@ -61,7 +61,8 @@ def flattened(certificate: Certificate) -> FlatGraph:
     RejectedError
         If a stage has not as many inputs as the one before it has outputs.
     """
-    offsets, feeds = [0], [[]]
+    offsets: list[int] = [0]
+    feeds: list[list[int]] = [[]]
     for index, stage in enumerate(certificate.stages):
         if index:
             before = certificate.stages[index - 1]

@@ -116,20 +116,31 @@ def _decided(cascade: Cascade, section: SectionForms) -> Witness:
 
 
 def _fits(cascade: Cascade, section: SectionForms, target: int, chosen: Witness) -> bool:
-    """Whether `range_fits` of the theories holds."""
+    forms = section.forms[target].items()
+    driven = [(reach(cascade.graph, source), [int(value) for value in over]) for source, over in forms]
+    return fits(driven, chosen, node_at(cascade.graph, target))
+
+
+def fits(driven: Sequence[tuple[Range, Sequence[int]]], chosen: Witness, within: Range, times: int = 1) -> bool:
+    """Whether `range_fits` of the theories holds.
+
+    Parameters
+    ----------
+    driven : sequence of pairs
+        Range and numerator of each source.
+    chosen : Witness
+    within : tuple of int
+        Where the sum must stay, `times` which it is taken.
+    """
     h = fmpz_poly(chosen.values)
     left = chosen.whole - chosen.rest
     if left <= 0:
         return False
-    responses = []
-    for source, over in section.forms[target].items():
-        made = (h * fmpz_poly([int(value) for value in over])).coeffs()
-        responses.append((_reach(cascade.graph, source), [int(value) for value in made]))
+    responses = [(ends, [int(value) for value in (h * fmpz_poly(list(over))).coeffs()]) for ends, over in driven]
     up = largest(_summed([[max(g * low, g * high) for g in response] for (low, high), response in responses]))
     down = largest(_summed([[max(-g * low, -g * high) for g in response] for (low, high), response in responses]))
     more, whole = chosen.rest * max(up, down), chosen.whole * left
-    node = node_at(cascade.graph, target)
-    return up * left + more <= node[1] * whole and down * left + more <= -node[0] * whole
+    return times * (up * left + more) <= within[1] * whole and times * (down * left + more) <= -within[0] * whole
 
 
 def _summed(lists: Sequence[Sequence[int]]) -> list[int]:
@@ -146,7 +157,8 @@ def node_at(graph: FlatGraph, node: int) -> Range:
     raise RejectedError(f"the graph must have a node {node}")
 
 
-def _reach(graph: FlatGraph, source: Source) -> Range:
+def reach(graph: FlatGraph, source: Source) -> Range:
+    """Return the range of a source."""
     kind, node, bits = source
     most = (1 << bits) - 1
     if kind == "node":
