@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from sosmith.model.errors import ToolError
-from sosmith.verify.certificate_file import Certificate
+from sosmith.verify.certificate_file import Certificate, Operation, StageEntry
+from sosmith.verify.rocq.bound import bound_claim, why_no_bound
+from sosmith.verify.rocq.cascade import cascade_of
 from sosmith.verify.rocq.claims import Claim, gain_claims
+from sosmith.verify.rocq.flat import flattened
 from sosmith.verify.rocq.kernel import LIBRARY, THEORIES, run_kernel, theory_texts
+from sosmith.verify.rocq.ranges import graph_definitions, range_claims
 
 DATA = "Claims"
 """Name of the file with a certificate's own theorems."""
-
-_HEAD = f"""\
-(* Written from a certificate: its claims as theorems. The theories beside it say what they mean. *)
-Require Import ZArith List. Import ListNotations.
-From {LIBRARY} Require Import {" ".join(THEORIES)}.
-Open Scope Z_scope.
-"""
 
 _MAKEFILE = f"""\
 # Checks the claims with Rocq (coqc of version 8.16 or later) and prints the axioms that each rests on.
@@ -68,7 +65,7 @@ def rocq_texts(certificate: Certificate) -> dict[str, str]:
     RejectedError
         If the certificate's claims cannot be written as theorems.
     """
-    return _texts(list(gain_claims(certificate)))
+    return _texts(*theorems(certificate)[:2])
 
 
 def check_in_rocq(
@@ -93,25 +90,64 @@ def check_in_rocq(
         If `coqc` is missing or fails.
     """
     progress("theorems", 0, 0)
-    claims = list(gain_claims(certificate))
+    definitions, claims, unchecked = theorems(certificate)
     with TemporaryDirectory() as name:
         folder = Path(name)
         try:
-            for file, text in _texts(claims).items():
+            for file, text in _texts(definitions, claims).items():
                 (folder / file).write_text(text, encoding="utf-8")
         except OSError as error:
             raise ToolError(f"{folder}: the theories must be written there, which failed: {error.strerror}") from None
         accepted = run_kernel(folder, claims, DATA, seconds, lambda done, total: progress("Rocq", done, total))
     words = {claim.name: claim.words for claim in claims}
-    return RocqVerdict(accepted.version, words, accepted.axioms, _unchecked(certificate))
+    return RocqVerdict(accepted.version, words, accepted.axioms, unchecked)
 
 
-def _texts(claims: list[Claim]) -> dict[str, str]:
+def head(theories: Sequence[str] = THEORIES) -> str:
+    """Return how a file of theorems begins that requires these theories."""
+    return f"""\
+(* Written from a certificate: its claims as theorems. The theories beside it say what they mean. *)
+Require Import ZArith Reals List. Import ListNotations.
+From {LIBRARY} Require Import {" ".join(theories)}.
+Open Scope Z_scope.
+"""
+
+
+def theorems(certificate: Certificate) -> tuple[str, list[Claim], tuple[str, ...]]:
+    """Return definitions, all theorems in their order, and what none of them is about."""
+    claims = list(gain_claims(certificate))
+    why = _why_no_ranges(certificate.stages)
+    if why is not None:
+        return "", claims, (f"ranges: {why}", "error bound: no ranges are proven")
+    graph = flattened(certificate)
+    cascade = cascade_of(graph) if certificate.claims.sections else None
+    claims += range_claims(graph, cascade)
+    unchecked = [
+        "parts of the error budget, each on its own",
+        "the ideal filter: its coefficients are those of the certificate",
+    ]
+    why = why_no_bound(certificate)
+    if why is not None or cascade is None:
+        unchecked = [f"error bound: {why}", *unchecked[1:]]
+    else:
+        claims.append(bound_claim(certificate, cascade))
+    if certificate.decimation is not None:
+        unchecked.append("decimator and what is before it")
+    return graph_definitions(graph), claims, tuple(unchecked)
+
+
+def _why_no_ranges(stages: Sequence[StageEntry]) -> str | None:
+    """Why theorems cannot be written for the ranges of these stages; None if they can."""
+    for stage in stages:
+        if stage.role == "start":
+            return "a filter that starts from its first sample"
+        for node in stage.nodes if stage.role != "section" else ():
+            of = stage.nodes[node.operands[0]] if node.op is Operation.BOUND else node
+            if of.low < node.low or of.high > node.high:
+                return f"{stage.name} limits a range by something else than peak gains"
+    return None
+
+
+def _texts(definitions: str, claims: list[Claim]) -> dict[str, str]:
     parts = [f"(* {claim.words}. *)\n{claim.text}Print Assumptions {claim.name}.\n" for claim in claims]
-    return theory_texts() | {f"{DATA}.v": "\n".join([_HEAD, *parts]), "Makefile": _MAKEFILE}
-
-
-def _unchecked(certificate: Certificate) -> tuple[str, ...]:
-    """Name what no theorem is about."""
-    del certificate
-    return ("ranges", "error budget")
+    return theory_texts() | {f"{DATA}.v": "\n".join([head(), definitions, *parts]), "Makefile": _MAKEFILE}

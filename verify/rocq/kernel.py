@@ -17,7 +17,7 @@ from sosmith.model.errors import ToolError
 from sosmith.verify.graph import RejectedError
 from sosmith.verify.rocq.claims import Claim
 
-THEORIES = ("Streams", "PeakGain")
+THEORIES = ("Streams", "PeakGain", "Graph", "Ranges", "Linear", "Bound")
 """The general theories, in the order in which they are compiled."""
 
 LIBRARY = "Sosmith"
@@ -64,6 +64,7 @@ def run_kernel(
     name: str,
     seconds: float = 0.0,
     progress: Callable[[int, int], None] = lambda done, total: None,
+    theories: Sequence[str] = THEORIES,
 ) -> Accepted:
     """Compile the theories and `name`.v in a folder that holds them.
 
@@ -76,6 +77,8 @@ def run_kernel(
         Time that all of it may take, in s; 0 for any.
     progress : callable
         Called with the number of theorems accepted so far, and of all.
+    theories : sequence of str
+        Those that `name`.v requires, in the order in which they are compiled.
 
     Raises
     ------
@@ -89,7 +92,7 @@ def run_kernel(
         raise ToolError(_MISSING)
     end = time.monotonic() + seconds if seconds else None
     shown = subprocess.run([compiler, "--print-version"], capture_output=True, text=True, check=False).stdout.split()
-    for theory in THEORIES:
+    for theory in theories:
         said, status = _compile(compiler, folder, f"{theory}.v", end)
         if status:
             raise ToolError(f"coqc must compile the theory {theory}.v, and says: {_brief(said)}")

@@ -10,9 +10,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import accumulate
-from typing import Any
+from typing import cast
 
-from flint import fmpz_poly
+from flint import acb, fmpz_poly
 
 from sosmith.verify.graph import RejectedError
 
@@ -59,7 +59,7 @@ def witness(under: Sequence[int], *, extra: int = 0) -> Witness:
     RejectedError
         If the response does not die away.
     """
-    roots: list[Any] = fmpz_poly(list(under)).complex_roots()  # pairs of a root and its multiplicity
+    roots = cast("list[tuple[acb, int]]", fmpz_poly(list(under)).complex_roots())
     radius = max((1 / abs(complex(root)) for root, _ in roots), default=0.0)
     if radius >= 1:
         raise RejectedError("the poles must lie inside the unit circle")

@@ -89,14 +89,15 @@ Qed.
 (* 2. Ranges. Each input has its own range, which need not contain 0; then sums up to some sample may be beyond the whole
    sum, so the largest of all counts. y times q is within low .. high. *)
 Definition opposite (b : Z * Z) : Z * Z := (- snd b, - fst b)%Z.
+Definition range_fits (r K : Z) (g : list (list Z)) (b below : list (Z * Z)) (q low high : Z) : bool :=
+  let up := largest (all_tops g b) in
+  let down := largest (all_tops g below) in
+  let most := Z.max up down in
+  ((0 <=? q) && (q * (up * (K - r) + r * most) <=? high * (K * (K - r)))
+   && (q * (down * (K - r) + r * most) <=? - low * (K * (K - r))))%Z.
 Definition range_holds (D h : list Z) (K : Z) (N : list (list Z)) (b : list (Z * Z)) (q low high : Z) : bool :=
   let r := norm1 (rest D h K) in
-  let g := map (mul h) N in
-  let up := largest (all_tops g b) in
-  let down := largest (all_tops g (map opposite b)) in
-  let most := Z.max up down in
-  ((0 <=? q) && (r <? K) && (q * (up * (K - r) + r * most) <=? high * (K * (K - r)))
-   && (q * (down * (K - r) + r * most) <=? - low * (K * (K - r))))%Z.
+  ((r <? K)%Z && range_fits r K (map (mul h) N) b (map opposite b) q low high).
 
 Definition negated (u : sequence) : sequence := fun n => - u n.
 Lemma total_negated N : forall u n, total N (map negated u) n = - total N u n.
@@ -119,9 +120,9 @@ Theorem range (D h : list Z) (K : Z) (N : list (list Z)) (b : list (Z * Z)) (q l
   forall (y : sequence) (u : list sequence), (forall n, conv D y n = total N u n) -> Forall2 within u b ->
   forall n, IZR low <= IZR q * y n <= IZR high.
 Proof.
-  unfold range_holds. intros C y u H Hu n.
-  apply andb_prop in C. destruct C as [C C4]. apply andb_prop in C. destruct C as [C C3].
-  apply andb_prop in C. destruct C as [C1 C2].
+  unfold range_holds, range_fits. intros C y u H Hu n.
+  apply andb_prop in C. destruct C as [C2 C]. apply andb_prop in C. destruct C as [C C4].
+  apply andb_prop in C. destruct C as [C1 C3].
   apply Z.leb_le in C1. apply Z.ltb_lt in C2. apply Z.leb_le in C3. apply Z.leb_le in C4.
   set (g := map (mul h) N) in *. set (up := largest (all_tops g b)) in *.
   set (down := largest (all_tops g (map opposite b))) in *. set (most := Z.max up down) in *.

@@ -1,0 +1,99 @@
+"""The graphs of a certificate's stages as one graph, and its nodes as terms of Rocq."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from sosmith.verify.certificate_file import Certificate, NodeEntry, Operation, StageEntry
+from sosmith.verify.graph import inputs_of, require
+from sosmith.verify.rocq.polynomials import number
+
+
+@dataclass(frozen=True)
+class FlatGraph:
+    """All stages' nodes in a row.
+
+    Attributes
+    ----------
+    stages : sequence of StageEntry
+    offsets : list of int
+        Place of the first node of each stage, and behind them the number of all nodes.
+    feeds : list of list of int
+        For each stage but the first one, the nodes that its inputs take, in order.
+    """
+
+    stages: Sequence[StageEntry]
+    offsets: list[int]
+    feeds: list[list[int]]
+
+    @property
+    def size(self) -> int:
+        """Number of nodes."""
+        return self.offsets[-1]
+
+    @property
+    def ports(self) -> list[tuple[int, int]]:
+        """Ranges of the inputs of the first stage."""
+        first = self.stages[0]
+        return [(first.nodes[i].low, first.nodes[i].high) for i in inputs_of(first)]
+
+    def term(self) -> str:
+        """Write it as a list of nodes."""
+        rows = []
+        for index, stage in enumerate(self.stages):
+            entries = inputs_of(stage)
+            for at, node in enumerate(stage.nodes):
+                if node.op is Operation.INPUT:
+                    place = entries.index(at)
+                    made = f"Wire {self.feeds[index][place]}" if index else f"Input {place}"
+                else:
+                    made = _operation(node, self.offsets[index])
+                rows.append(f"Node ({made}) {number(node.frac)} {number(node.low)} {number(node.high)}")
+        return "[" + ";\n   ".join(rows) + "]"
+
+
+def flattened(certificate: Certificate) -> FlatGraph:
+    """Put all stages in a row.
+
+    Raises
+    ------
+    RejectedError
+        If a stage has not as many inputs as the one before it has outputs.
+    """
+    offsets: list[int] = [0]
+    feeds: list[list[int]] = [[]]
+    for index, stage in enumerate(certificate.stages):
+        if index:
+            before = certificate.stages[index - 1]
+            taken = [offsets[-2] + output for output in before.outputs]
+            count = len(inputs_of(stage))
+            require(count == len(taken), f"{stage.name} must have {len(taken)} inputs, not {count}")
+            feeds.append(taken)
+        offsets.append(offsets[-1] + len(stage.nodes))
+    return FlatGraph(certificate.stages, offsets, feeds)
+
+
+_NAMES = {
+    Operation.ADD: "Add",
+    Operation.SUBTRACT: "Subtract",
+    Operation.MULTIPLY: "Multiply",
+    Operation.FLOOR: "Floor",
+    Operation.TRUNCATE: "Truncate",
+    Operation.CLAMP: "Clamp",
+    Operation.BOUND: "Bound",
+    Operation.DELAY: "Delay",
+}
+
+
+def _operation(node: NodeEntry, offset: int) -> str:
+    operands = [str(offset + i) for i in node.operands]
+    if node.op is Operation.CONSTANT:
+        return f"Constant {number(node.parameter)}"
+    if node.op is Operation.SCALE:
+        return f"Scale {operands[0]} {number(node.parameter)} {number(node.parameter_frac)}"
+    if node.op is Operation.SHIFT:
+        return f"Shift {operands[0]} {number(node.parameter)}"
+    if node.op is Operation.FRACTION:
+        return f"Fraction {operands[0]} {number(node.parameter)}"
+    return " ".join([_NAMES[node.op], *operands])

@@ -1,0 +1,178 @@
+(* A dataflow graph of integers, as a certificate lists it, and what it computes.
+
+   A node is an operation on earlier nodes; a delay may take a later one. Every node has a code, an integer, and `frac`
+   fraction bits: its value is code / 2^frac. At each sample the nodes are computed in their order. *)
+Require Import Bool ZArith List Lia. Import ListNotations. Open Scope Z_scope.
+
+Inductive operation :=
+  | Input (port : nat)               (* the code at an input of the core *)
+  | Constant (code : Z)
+  | Add (a b : nat)                  (* binary points aligned *)
+  | Subtract (a b : nat)
+  | Multiply (a b : nat)
+  | Scale (a : nat) (by_ bits : Z)   (* times by_ / 2^bits *)
+  | Shift (a : nat) (by_ : Z)        (* times 2^by_: the same code with another binary point *)
+  | Floor (a : nat)                  (* rounds down to `frac` fraction bits *)
+  | Fraction (a : nat) (kept : Z)    (* what rounding down to `kept` fraction bits drops *)
+  | Truncate (a : nat)               (* rounds towards 0 to `frac` fraction bits *)
+  | Clamp (a : nat)                  (* limits to low .. high *)
+  | Bound (a : nat)                  (* the same, and claimed to be in low .. high *)
+  | Wire (a : nat)                   (* the same: the input of a stage *)
+  | Delay (a : nat).                 (* the code at the sample before; 0 at the first one *)
+
+Record node := Node { op : operation; frac : Z; low : Z; high : Z }.
+Definition graph := list node.
+Definition blank := Node (Constant 0) 0 0 0.
+Definition frac_of (g : graph) (i : nat) := frac (nth i g blank).
+
+(* The code of a node, from the codes of the nodes before it at this sample, of all nodes at the last one, and of the
+   inputs at this one. *)
+Definition compute (g : graph) (now last : list Z) (inputs : nat -> Z) (v : node) : Z :=
+  let code i := nth i now 0 in
+  let aligned i := code i * 2 ^ (frac v - frac_of g i) in
+  let dropped i := 2 ^ (frac_of g i - frac v) in
+  match op v with
+  | Input port => inputs port
+  | Constant c => c
+  | Add a b => aligned a + aligned b
+  | Subtract a b => aligned a - aligned b
+  | Multiply a b => code a * code b
+  | Scale a c _ => code a * c
+  | Shift a _ | Bound a | Wire a => code a
+  | Floor a => code a / dropped a
+  | Fraction a kept => code a mod 2 ^ (frac_of g a - kept)
+  | Truncate a => Z.quot (code a) (dropped a)
+  | Clamp a => Z.max (low v) (Z.min (high v) (code a))
+  | Delay a => nth a last 0
+  end.
+
+Fixpoint step (g : graph) (rest : list node) (now last : list Z) (inputs : nat -> Z) : list Z :=
+  match rest with
+  | [] => now
+  | v :: rest' => step g rest' (now ++ [compute g now last inputs v]) last inputs
+  end.
+Definition sample (g : graph) (last : list Z) (inputs : nat -> Z) : list Z := step g g [] last inputs.
+
+(* The codes of all nodes at sample n, for inputs x: x n p is the code at input p. Before the first sample all are 0. *)
+Fixpoint run (g : graph) (x : nat -> nat -> Z) (n : nat) : list Z :=
+  sample g (match n with O => [] | S m => run g x m end) (x n).
+Definition before (g : graph) (x : nat -> nat -> Z) (n : nat) : list Z :=
+  match n with O => [] | S m => run g x m end.
+Definition code (g : graph) (x : nat -> nat -> Z) (i n : nat) : Z := nth i (run g x n) 0.
+
+(* Operands are before the node that takes them, but for a delay; binary points fit. Then each code obeys the equation
+   of its operation. *)
+Definition operands (o : operation) : list nat :=
+  match o with
+  | Input _ | Constant _ | Delay _ => []
+  | Add a b | Subtract a b | Multiply a b => [a; b]
+  | Scale a _ _ | Shift a _ | Floor a | Fraction a _ | Truncate a | Clamp a | Bound a | Wire a => [a]
+  end.
+Definition points (g : graph) (v : node) : bool :=
+  let f := frac_of g in
+  match op v with
+  | Input _ | Constant _ => true
+  | Add a b | Subtract a b => frac v =? Z.max (f a) (f b)
+  | Multiply a b => frac v =? f a + f b
+  | Scale a _ bits => frac v =? f a + bits
+  | Shift a by_ => frac v =? f a - by_
+  | Floor a | Truncate a => frac v <? f a
+  | Fraction a kept => (frac v =? f a) && (kept <? f a)
+  | Clamp a | Bound a | Wire a | Delay a => frac v =? f a
+  end.
+Definition ordered_at (g : graph) (i : nat) (v : node) : bool :=
+  forallb (fun a => Nat.ltb a i) (operands (op v)) && points g v
+  && match op v with Delay a => Nat.ltb a (length g) | _ => true end.
+Fixpoint every (f : nat -> node -> bool) (i : nat) (rest : list node) : bool :=
+  match rest with [] => true | v :: rest' => f i v && every f (S i) rest' end.
+Definition ordered (g : graph) : bool := every (ordered_at g) 0 g.
+
+Lemma every_spec f : forall rest i k, every f i rest = true -> (k < length rest)%nat ->
+  f (i + k)%nat (nth k rest blank) = true.
+Proof.
+  induction rest as [|v rest IH]; simpl; intros i k H Hk; [lia|].
+  apply andb_prop in H. destruct H as [H1 H2].
+  destruct k as [|k]; [rewrite Nat.add_0_r; exact H1|].
+  replace (i + S k)%nat with (S i + k)%nat by lia. apply IH; [exact H2|lia].
+Qed.
+
+(* Computing the rest appends to what is there. *)
+Lemma step_length g : forall rest now last inputs,
+  length (step g rest now last inputs) = (length now + length rest)%nat.
+Proof.
+  induction rest as [|v rest IH]; simpl; intros; [lia|]. rewrite IH, app_length. simpl. lia.
+Qed.
+Lemma step_keeps g : forall rest now last inputs k, (k < length now)%nat ->
+  nth k (step g rest now last inputs) 0 = nth k now 0.
+Proof.
+  induction rest as [|v rest IH]; simpl; intros now last inputs k H; [reflexivity|].
+  rewrite IH by (rewrite app_length; simpl; lia). apply app_nth1, H.
+Qed.
+Lemma compute_ext g now now' last inputs v :
+  (forall a, In a (operands (op v)) -> nth a now 0 = nth a now' 0) ->
+  compute g now last inputs v = compute g now' last inputs v.
+Proof.
+  unfold compute. destruct (op v); simpl; intros H; try reflexivity;
+    repeat match goal with |- context [nth ?a now 0] => rewrite (H a) by auto end; reflexivity.
+Qed.
+Lemma step_nth g : forall rest now last inputs k, (k < length rest)%nat ->
+  (forall a, In a (operands (op (nth k rest blank))) -> (a < length now + k)%nat) ->
+  nth (length now + k) (step g rest now last inputs) 0
+  = compute g (step g rest now last inputs) last inputs (nth k rest blank).
+Proof.
+  induction rest as [|v rest IH]; simpl; intros now last inputs k Hk Ho; [lia|].
+  destruct k as [|k].
+  - rewrite Nat.add_0_r in *. rewrite step_keeps by (rewrite app_length; simpl; lia).
+    rewrite app_nth2, Nat.sub_diag by lia. simpl. apply compute_ext. intros a Ha.
+    specialize (Ho a Ha). rewrite step_keeps by (rewrite app_length; simpl; lia). rewrite app_nth1 by lia. reflexivity.
+  - specialize (IH (now ++ [compute g now last inputs v]) last inputs k ltac:(lia)).
+    rewrite app_length in IH. simpl in IH. replace (length now + S k)%nat with (length now + 1 + k)%nat by lia.
+    apply IH. intros a Ha. specialize (Ho a Ha). lia.
+Qed.
+
+Section Codes.
+Variables (g : graph) (x : nat -> nat -> Z).
+Hypothesis G : ordered g = true.
+
+Lemma ordered_node i : (i < length g)%nat -> ordered_at g i (nth i g blank) = true.
+Proof. intros H. exact (every_spec _ g 0 i G H). Qed.
+Lemma operands_before i a : (i < length g)%nat -> In a (operands (op (nth i g blank))) -> (a < i)%nat.
+Proof.
+  intros H Ha. pose proof (ordered_node i H) as O. unfold ordered_at in O.
+  apply andb_prop in O. destruct O as [O _]. apply andb_prop in O. destruct O as [O _].
+  rewrite forallb_forall in O. apply Nat.ltb_lt, O, Ha.
+Qed.
+Lemma points_fit i : (i < length g)%nat -> points g (nth i g blank) = true.
+Proof.
+  intros H. pose proof (ordered_node i H) as O. unfold ordered_at in O.
+  apply andb_prop in O. destruct O as [O _]. apply andb_prop in O. apply O.
+Qed.
+
+(* The equation of each node, at each sample. *)
+Theorem code_spec i n : (i < length g)%nat ->
+  code g x i n = compute g (run g x n) (before g x n) (x n) (nth i g blank).
+Proof.
+  intros H. unfold code.
+  assert (R : run g x n = step g g [] (before g x n) (x n)) by (destruct n; reflexivity).
+  rewrite R at 1. pose proof (step_nth g g [] (before g x n) (x n) i H) as S. simpl in S.
+  rewrite S, <- R; [reflexivity|]. intros a Ha. apply (operands_before i); assumption.
+Qed.
+Lemma before_code a n : nth a (before g x n) 0 = match n with O => 0 | S m => code g x a m end.
+Proof. destruct n; simpl; [destruct a|]; reflexivity. Qed.
+
+(* A property of codes that holds at each node when it holds at all nodes before it, and at all of the sample before,
+   holds at all nodes and samples: induction over time and graph. *)
+Lemma by_induction (P : nat -> nat -> Prop) :
+  (forall n i, (i < length g)%nat -> (forall a, (a < i)%nat -> P a n) ->
+    (forall m a, n = S m -> (a < length g)%nat -> P a m) -> P i n) ->
+  forall n i, (i < length g)%nat -> P i n.
+Proof.
+  intros H. induction n as [n IHn] using lt_wf_ind.
+  assert (Q : forall k i, (i < k)%nat -> (i < length g)%nat -> P i n).
+  { induction k as [|k IHk]; intros i Hk Hi; [lia|].
+    apply H; [exact Hi| |].
+    - intros a Ha. apply IHk; lia.
+    - intros m a -> Ha. apply IHn; [lia|exact Ha]. }
+  intros i Hi. apply (Q (S i)); lia.
+Qed.
+End Codes.
