@@ -1,6 +1,5 @@
 """Edits of a certificate: numbers, words, structure and layout, with all digests made right again."""
 
-# ruff: noqa: E501
 from __future__ import annotations
 
 import copy
