@@ -12,7 +12,7 @@
 
 5. Where sections work in on-line arithmetic, the sets of their residuals are followed (`sosmith.verify.online`).
 6. Where a filter starts from zero, samples may be flagged until it has settled: the counter is run, and what any other
-   past could change is followed until it has faded (`sosmith.verify.settling`).
+   past could change is followed until it has faded (`sosmith.verify.bounds.settling`).
 
 7. A decimator before the stages is exact but for one rounding (`sosmith.verify.decimation`), and what comes
    through it from above half the lower rate is bounded (`sosmith.verify.bounds.largest_gain`). All else is proven of
@@ -34,12 +34,12 @@ from flint import fmpq_poly
 from sosmith.verify.bounds.driven_responses import Denominator, Driven, deviation, extremes, magnitude, rational
 from sosmith.verify.bounds.l1_response import UndecidedError, fraction, is_stable
 from sosmith.verify.bounds.largest_gain import check_bands
+from sosmith.verify.bounds.settling import check_fading, without_counter
 from sosmith.verify.certificate_file import Certificate, Operation, StageEntry, on_grid
 from sosmith.verify.decimation import at_lower_rate, calibration_alone, rounding
 from sosmith.verify.graph import RejectedError, Transfer, check_graph, inputs_of, label, require
 from sosmith.verify.online import check_online
 from sosmith.verify.polynomial import output_error, polynomial_error
-from sosmith.verify.settling import check_fading, without_counter
 from sosmith.verify.start import Start, check_start, section_alone
 
 Progress = Callable[[str, int, int], None]
