@@ -19,8 +19,8 @@ from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.parallel.check import HardwareVerdict, check_hardware
 from sosmith.verify.program.check import ProgramVerdict, check_program
 from sosmith.verify.program.text import ProgramText, read_program
+from sosmith.verify.reader.rtlil.check import check_rtlil
 from sosmith.verify.reader.source import read_source
-from sosmith.verify.rtlil.check import check_rtlil
 from sosmith.verify.specified.calibration_fit import Refit, check_fit
 from sosmith.verify.specified.stated_specification import Agreement, check_specification
 from sosmith.verify.specified.words import words_of

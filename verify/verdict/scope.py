@@ -10,7 +10,7 @@ from sosmith.verify.c_model.check import ModelVerdict
 from sosmith.verify.certificate_file import Certificate, ItemEntry
 from sosmith.verify.parallel.check import HardwareVerdict
 from sosmith.verify.program.check import ProgramVerdict
-from sosmith.verify.rtlil.check import RtlilVerdict
+from sosmith.verify.reader.rtlil.check import RtlilVerdict
 from sosmith.verify.specified.stated_specification import Agreement
 from sosmith.verify.unit.check import UnitVerdict
 

@@ -16,10 +16,10 @@ from sosmith.gen.core import design_core
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.gen.specification.specification import from_text
 from sosmith.verify.graph import RejectedError
+from sosmith.verify.reader.rtlil.check import RtlilVerdict, check_rtlil
+from sosmith.verify.reader.rtlil.syntax import read_rtlil
 from sosmith.verify.reader.source import read_source
 from sosmith.verify.reader.syntax import Module
-from sosmith.verify.rtlil.check import RtlilVerdict, check_rtlil
-from sosmith.verify.rtlil.syntax import read_rtlil
 
 FIXED = 'hardware.realization = "df1_ef1"\nhardware.architecture = '
 TEXTS = {

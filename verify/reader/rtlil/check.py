@@ -17,11 +17,11 @@ from dataclasses import dataclass
 from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.reader.gates import Gates
 from sosmith.verify.reader.logic import Logic, logic_of, port_of
+from sosmith.verify.reader.rtlil.equality import Equality
+from sosmith.verify.reader.rtlil.logic import Place, RtlilLogic
+from sosmith.verify.reader.rtlil.syntax import RtlilModule, read_rtlil
 from sosmith.verify.reader.syntax import Bits, Expression, Joined, Module, Number
 from sosmith.verify.reader.widths import width_of
-from sosmith.verify.rtlil.equality import Equality
-from sosmith.verify.rtlil.logic import Place, RtlilLogic
-from sosmith.verify.rtlil.syntax import RtlilModule, read_rtlil
 
 _DEEPEST = 20_000
 """Most calls inside each other: nets are followed back one through the other."""

@@ -9,7 +9,7 @@ from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.reader.gates import HIGH, LOW, Gates, extended
 from sosmith.verify.reader.gates import Word as Literals
 from sosmith.verify.reader.logic import compared, operated, reduced, shortest, word_at
-from sosmith.verify.rtlil.syntax import Bit, Case, Cell, RtlilModule
+from sosmith.verify.reader.rtlil.syntax import Bit, Case, Cell, RtlilModule
 
 Place = tuple[str, int]
 """A bit of a net."""
