@@ -268,7 +268,7 @@ def test_a_full_disk_is_one_sentence(process: Start, tmp_path: Path) -> None:
         running = process("design", "plain.toml", "--json", stdout=full)
         _, errors = running.communicate(timeout=HANGS)
     assert running.returncode == 3
-    message = "sosmith: error: the output must be readable and writable, not: No space left on device"
+    message = "sosmith: error: stdout must take what is printed, not: No space left on device"
     assert [line for line in errors.splitlines() if not PROGRESS.search(line)] == [message]
 
 
@@ -440,7 +440,7 @@ def test_demo_walks_the_whole_road(process: Start, tmp_path: Path) -> None:
     output, errors = running.communicate(timeout=HANGS)
     assert running.returncode == 0
     words = " ".join(output.split())
-    assert "yes, all of 60,000 samples" in words
+    assert "all 60,000; bit for bit" in words
     assert "flange_wear: passed" in words
     assert errors.splitlines()[-1] == f"sosmith: report: {(tmp_path / 'out' / 'report.html').as_uri()}"
     report = json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))
