@@ -14,7 +14,6 @@ from sosmith.verify.rocq.claims import Claim, gain_claims
 from sosmith.verify.rocq.kernel import STANDARD, run_kernel, theory_texts
 from sosmith.verify.rocq.linear import LinearStage
 
-
 THEORIES = ("Streams", "PeakGain")
 """What theorems on gains need."""
 
