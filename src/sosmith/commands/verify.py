@@ -78,6 +78,7 @@ def verify(
     \b
         sosmith verify my_core/my.certificate.json
         sosmith verify my_core/my.certificate.json --spec my.toml --files my_core --rebuild
+        sosmith verify my_core/my.certificate.json --rocq --export my_core/rocq
     """
     from sosmith.interface.certificate import Certificate
     from sosmith.model.errors import ShortfallError
