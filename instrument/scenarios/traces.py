@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 from sosmith.gen.core import CoreDesign
@@ -82,6 +83,7 @@ def notes_on(design: CoreDesign, source: str) -> tuple[str, ...]:
     return range_notes(load_scenario(Path(source)), design.datapath.inputs)
 
 
+@dataclass(frozen=True)
 class DefaultTraces:
     """Traces of the default scenario, one for every channel, as `traces_for` makes them."""
 

@@ -499,7 +499,7 @@ def test_load_refuses_what_is_no_report(tmp_path: Path, content: str, reason: st
 def test_load_refuses_bytes(tmp_path: Path) -> None:
     path = tmp_path / "report.json"
     path.write_bytes(b"\xff\xfe\x00")
-    message = f"{path} must be a report.json of sosmith, not text that is no JSON"
+    message = f"{path}: line 1 must be UTF-8 text, not the byte 0xff"
     with pytest.raises(SpecificationError, match=f"^{re.escape(message)}$"):
         load_report(path)
 
