@@ -24,7 +24,7 @@ MAX_LINES = 1 << 24
 MAX_JSON = 1 << 26
 """Most bytes of a JSON file: a report has some hundred thousand, a large certificate some millions."""
 
-_PIECE = 1 << 20
+_PIECE = 1 << 18
 
 
 def read_bytes(path: Path, *, what: str, max_bytes: int) -> bytes:

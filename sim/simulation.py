@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import fcntl
 import hashlib
+import math
 import os
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -30,7 +31,7 @@ from sosmith.gen.word_lengths.other_realization import with_realization
 from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.model.arrays import Codes, side_by_side
 from sosmith.model.errors import SpecificationError
-from sosmith.model.reference.accuracy import error_statistics
+from sosmith.model.reference.accuracy import peak, sum_of_squares
 from sosmith.model.text_files import write_contents, write_files
 from sosmith.model.traces.trace import Trace
 from sosmith.sim.cosimulate import CosimulationResult, cosimulate, first_copies
@@ -38,6 +39,8 @@ from sosmith.sim.gate_level import with_cell_models
 from sosmith.sim.simulator_bench import SimulatorBench
 from sosmith.sim.simulators import check_name
 from sosmith.verify.certificate_file import Certificate
+
+_BLOCK = 1 << 20  # results that are compared at a time
 
 Progress = Callable[[str, int, int], None]
 """Called with the name of the step, the amount done and the total; the total is 0 if it is not known."""
@@ -189,8 +192,13 @@ def _alternatives(quantized: Quantized, run: Run) -> list[Alternative]:
         if realization == quantized.realization:
             continue
         other = with_realization(quantized, realization).datapath
-        error = other.output.decode(other.compute(run.codes))
-        error -= run.golden.reshape(error.shape)
-        found = error_statistics(error)
-        rows.append(Alternative(name=realization, max_abs=found.max_abs, rms=found.rms))
+        found, golden = other.compute(run.codes).reshape(-1), run.golden.reshape(-1)
+        peaks, squares = [], []
+        for start in range(0, len(found), _BLOCK):
+            error = other.output.decode(found[start : start + _BLOCK])
+            error -= golden[start : start + _BLOCK]
+            peaks.append(peak(error))
+            squares.append(sum_of_squares(error))
+        rms = math.sqrt(math.fsum(squares) / len(found))
+        rows.append(Alternative(name=realization, max_abs=max(peaks), rms=rms))
     return rows

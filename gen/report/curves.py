@@ -40,7 +40,7 @@ def error_over_time(evidence: Evidence) -> dict[str, Any]:
     edges = np.linspace(0, len(error), min(STRETCHES, len(error)) + 1).astype(int)
     stretches = [error[start:stop] for start, stop in itertools.pairwise(edges)]
     return {
-        "time": _rounded(evidence.run.time[edges[:-1]]),
+        "time": _rounded(evidence.run.instants[edges[:-1]]),
         "low": _rounded(np.array([part.min() for part in stretches])),
         "high": _rounded(np.array([part.max() for part in stretches])),
     }

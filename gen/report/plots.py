@@ -36,6 +36,7 @@ from sosmith.gen.filter.response import (
 from sosmith.gen.picture import settled
 from sosmith.gen.quantity import quantity, scale
 from sosmith.gen.report.evidence import Evidence
+from sosmith.gen.report.run import Instants
 from sosmith.model.reference.accuracy import error_statistics, peak
 
 Array = npt.NDArray[np.float64]
@@ -126,7 +127,7 @@ def _shorten(attribute: re.Match[str]) -> str:
     return re.sub(r"\s+", " ", rounded)
 
 
-def envelope(time: Array, values: Array, columns: int) -> tuple[Array, Array]:
+def envelope(time: Array | Instants, values: Array, columns: int) -> tuple[Array, Array]:
     """Thin out a long trace so that no peak is lost.
 
     Parameters
@@ -142,7 +143,7 @@ def envelope(time: Array, values: Array, columns: int) -> tuple[Array, Array]:
         The smallest and the largest value of each stretch at their own times; a short trace as it is.
     """
     if len(values) <= 2 * columns:
-        return time, values
+        return time[:], values
     edges = np.linspace(0, len(values), columns + 1).astype(int)
     chosen = set()
     for start, stop in itertools.pairwise(edges):
@@ -159,11 +160,12 @@ def _range_of(values: Array, margin: float) -> tuple[float, float]:
     return low - space, high + space
 
 
-def time_axis(axes: Axes, time: Array) -> tuple[float, str]:
+def time_axis(axes: Axes, time: Array | Instants) -> tuple[float, str]:
     """Label the time axis and return the factor from seconds to its unit."""
-    factor, unit = scale(peak(time), "s")
+    ends = np.array([time[0], time[len(time) - 1]])  # they rise
+    factor, unit = scale(peak(ends), "s")
     axes.set_xlabel(f"time in {unit}")
-    axes.set_xlim(*_range_of(np.array([time.min(), time.max()]) * factor, margin=0.0))
+    axes.set_xlim(*_range_of(ends * factor, margin=0.0))
     return factor, unit
 
 
@@ -177,7 +179,7 @@ def trace_figure(evidence: Evidence, transient: int, width: int) -> str:
     def paint(figure: Figure) -> None:
         panels = figure.subplots(1 + compared, 1, sharex=True, squeeze=False, height_ratios=(2, 1)[: 1 + compared])
         axes, lowest = panels[0, 0], panels[-1, 0]
-        time = evidence.run.time
+        time = evidence.run.instants
         factor, _ = time_axis(lowest, time)
         styles: dict[str, dict[str, Any]] = {"unfiltered": {"lw": 0.8}, "truth": {"lw": 5.0}, "golden": IDEAL_LINE}
         shown: dict[str, tuple[int, Array, Array]] = {}
@@ -207,7 +209,7 @@ def _paint_true_error(axes: Axes, evidence: Evidence, transient: int, factor: fl
     settled = error[transient:] if transient < len(error) else error
     scaling, unit = scale(peak(settled) or evidence.facts.lsb, evidence.facts.unit)
     error *= scaling
-    time, low, high = stretches(evidence.run.time, error, width)
+    time, low, high = stretches(evidence.run.instants, error, width)
     axes.fill_between(time * factor, low, high, color=COLOUR["hardware"], lw=0.8)
     axes.axhline(0, color=COLOUR["truth"], lw=1.2)
     axes.set_ylim(*_range_of(np.array([settled.min(), settled.max(), 0.0]), margin=0.08))
@@ -222,13 +224,13 @@ def _shade_transient(axes: Axes, evidence: Evidence, transient: int, factor: flo
         axes.axvspan(*ends, facecolor=COLOUR["muted"], alpha=0.14, lw=0)
 
 
-def stretches(time: Array, values: Array, columns: int) -> tuple[Array, Array, Array]:
+def stretches(time: Array | Instants, values: Array, columns: int) -> tuple[Array, Array, Array]:
     """Smallest and largest value of each of at most `columns` stretches of a trace, at the middle of each.
 
     A short trace comes as it is, with its values twice.
     """
     if len(values) <= 2 * columns:
-        return time, values, values
+        return time[:], values, values
     edges = np.linspace(0, len(values), columns + 1).astype(int)
     low, high = np.minimum.reduceat(values, edges[:-1]), np.maximum.reduceat(values, edges[:-1])
     return (time[edges[:-1]] + time[edges[1:] - 1]) / 2, low, high
@@ -255,7 +257,7 @@ def close_up_figure(evidence: Evidence, width: int) -> str:
     def paint(figure: Figure) -> None:
         axes = figure.subplots()
         near = close_up(evidence)
-        time, golden, hardware = evidence.run.time[near], evidence.run.golden[near], evidence.run.hardware[near]
+        time, golden, hardware = evidence.run.instants[near], evidence.run.golden[near], evidence.run.hardware[near]
         factor, _ = time_axis(axes, time)
         both = np.concatenate([golden, hardware])
         scaling, unit = scale(float(np.max(np.abs(both))), evidence.facts.unit)
@@ -301,13 +303,13 @@ def error_figure(evidence: Evidence, width: int) -> str:
 
     def paint(figure: Figure) -> None:
         axes = figure.subplots()
-        factor, _ = time_axis(axes, evidence.run.time)
+        factor, _ = time_axis(axes, evidence.run.instants)
         inside, _outside = error_limits(evidence)
         top = 1.25 * max([_error_peak(evidence), *(limit.value for limit in inside)])
         scaling, unit = scale(top, evidence.facts.unit)
         error = evidence.run.error
         error *= scaling
-        time, low, high = stretches(evidence.run.time, error, width // 4)
+        time, low, high = stretches(evidence.run.instants, error, width // 4)
         if low is high:
             axes.plot(time * factor, low, color=COLOUR["hardware"], lw=0.9)
         else:

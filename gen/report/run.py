@@ -24,6 +24,32 @@ _COLUMNS = ("received", "values", "golden", "before", "truth", "reading", "unset
 """The arrays of which a view of one channel keeps a column."""
 
 
+@dataclass(frozen=True)
+class Instants:
+    """Instants in s at even steps from 0, made where they are asked for.
+
+    Attributes
+    ----------
+    count : int
+        Number of instants.
+    rate : float
+        Instants in a second.
+    """
+
+    count: int
+    rate: float
+
+    def __len__(self) -> int:
+        """Return the number of instants."""
+        return self.count
+
+    def __getitem__(self, index: Any) -> Any:
+        """Return those that an array would have at `index`: a number, a slice or an array of numbers."""
+        if isinstance(index, slice):
+            return np.arange(*index.indices(self.count), dtype=np.float64) / self.rate
+        return np.asarray(index, dtype=np.float64) / self.rate
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Run:
     """The results of one run; arrays have the shape (n, channels), those of one channel alone (n,).
@@ -34,7 +60,7 @@ class Run:
     ----------
     scenario : str
         Name of the trace.
-    instants : Column, shape (n,)
+    instants : ndarray or Instants, shape (n,)
         Instants of the results in s, rising.
     codes : int64 array, shape (samples, channels, inputs)
         What went in; behind a decimator, more samples than results.
@@ -61,7 +87,7 @@ class Run:
     """
 
     scenario: str
-    instants: Column
+    instants: Array | Instants
     codes: Codes
     received: Codes
     values: Column
@@ -78,8 +104,8 @@ class Run:
         shape = np.shape(self.received if callable(self.values) else self.values)
         if len(shape) not in {1, 2} or min(shape) < 1:
             raise ValueError(f"hardware must have the shape (n,) or (n, channels) with n >= 1, not {shape!r}")
-        if not callable(self.instants) and np.shape(self.instants) != shape[:1]:
-            raise ValueError(f"time must have the shape {shape[:1]!r}, not {np.shape(self.instants)!r}")
+        if (len(self.instants),) != shape[:1]:
+            raise ValueError(f"time must have the shape {shape[:1]!r}, not {(len(self.instants),)!r}")
         for name in _COLUMNS:
             values = getattr(self, name)
             if values is not None and not callable(values) and np.shape(values) != shape:
@@ -96,7 +122,7 @@ class Run:
     @property
     def time(self) -> Array:
         """Instants of the results in s, shape (n,)."""
-        return _array(self.instants)
+        return np.asarray(self.instants[:])
 
     @property
     def hardware(self) -> Array:
@@ -120,7 +146,7 @@ class Run:
 
     def at(self, index: int) -> float:
         """Return an instant in s; a negative index counts from the end."""
-        return float(self.time[index])
+        return float(self.instants[range(len(self))[index]])
 
     @property
     def channels(self) -> int:
@@ -217,7 +243,7 @@ def run_of(
         traces = [trace.every(datapath.decimator.factor) for trace in traces]
     run = Run(
         scenario=traces[0].name,
-        instants=lambda: traces[0].time,
+        instants=Instants(len(traces[0]), float(traces[0].sample_rate)),
         codes=codes,
         received=received,
         values=lambda: datapath.output.decode(received),

@@ -11,7 +11,6 @@ from sosmith.gen.stimuli.core import bench_before, bench_of
 from sosmith.instrument.scenarios.catalogue import SCENARIOS, emulate
 from sosmith.instrument.scenarios.file import emulate_file, load_scenario, range_notes
 from sosmith.instrument.scenarios.instrument_signals import least_wear_ramp
-from sosmith.instrument.scenarios.summaries import is_scenario_file
 from sosmith.instrument.scenarios.vehicle_clearance import vehicle_clearance
 from sosmith.model.errors import SpecificationError
 from sosmith.model.traces.trace import Trace
@@ -66,6 +65,11 @@ def traces_for(design: CoreDesign, source: str, *, seed: int, seconds: float | N
     return tuple(emulate(source, bench, seed=seed + k, seconds=seconds).delayed(k) for k in channels)
 
 
+def is_scenario_file(source: str) -> bool:
+    """Whether `source` is the path of a scenario file, not a built-in scenario or a trace."""
+    return source not in SCENARIOS and source.lower().endswith(".toml")
+
+
 def notes_on(design: CoreDesign, source: str) -> tuple[str, ...]:
     """Return a sentence for each part of a scenario file that exceeds an input range; none for other sources.
 
@@ -79,7 +83,7 @@ def notes_on(design: CoreDesign, source: str) -> tuple[str, ...]:
     return range_notes(load_scenario(Path(source)), design.datapath.inputs)
 
 
-@dataclass(frozen=True)  # for it is part of tasks, which are compared
+@dataclass(frozen=True)
 class DefaultTraces:
     """Traces of the default scenario, one for every channel, as `traces_for` makes them."""
 

@@ -9,6 +9,7 @@ from array import array
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain, islice
 from pathlib import Path
 
 import numpy as np
@@ -21,10 +22,13 @@ from sosmith.model.foreign_files import read_lines
 # float() would also accept "nan", "1_000" and digits of other scripts.
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
+_PLAIN = re.compile(r"[0-9+\-.eE,\n ]*", re.ASCII)
+"""Text in which float() takes nothing that `NUMBER` does not."""
+
 LARGEST = 1e100
 """Largest magnitude of a number; sums of squares below it do not overflow, and no physical value is above it."""
 
-CHUNK = 1 << 16
+CHUNK = 1 << 14
 """Rows of a chunk."""
 
 MAX_CELLS = 1 << 26
@@ -118,50 +122,85 @@ def read_csv_chunks(
 
     Parameters and errors are those of `read_csv_table`, but for the number of cells.
     """
-    header: tuple[str, ...] = ()
-    cells, lines, any_rows = array("d"), array("I"), False
-    for header, line, row in _rows(path, known, required, readers or {}):
-        cells.extend(row)
-        lines.append(line)
-        if len(lines) == CHUNK:
-            yield _chunk(path, header, cells, lines)
-            cells, lines, any_rows = array("d"), array("I"), True
-    if lines:
-        yield _chunk(path, header, cells, lines)
-    elif not any_rows:
+    lines = read_lines(path, what="CSV file")
+    header, done = _header(path, lines, known, required)
+    readers = {name: reader for name, reader in (readers or {}).items() if name in header}
+    any_rows = False
+    while block := list(islice(lines, CHUNK)):
+        values = None if readers else _plain_numbers(block, len(header))
+        if values is None:
+            values, numbers, taken = _rows(path, header, done, block, lines, readers)
+        else:
+            taken = len(block)
+            numbers = np.arange(done + 1, done + taken + 1, dtype=np.uint32)
+        done += taken
+        if len(numbers):
+            any_rows = True
+            yield CsvTable(path, header, values, numbers)
+    if not any_rows:
         raise SpecificationError(f"{path} must hold rows of numbers below its header, not only the header")
 
 
-def _chunk(path: Path, header: tuple[str, ...], cells: array[float], lines: array[int]) -> CsvTable:
-    values = np.frombuffer(cells).reshape(len(lines), len(header))
-    return CsvTable(path, header, values, np.frombuffer(lines, dtype=np.uint32))
+def _header(
+    path: Path, lines: Iterator[str], known: Sequence[str], required: Sequence[str]
+) -> tuple[tuple[str, ...], int]:
+    """Take the header from the lines; return it, and how many lines it took."""
+    reader = csv.reader(lines, strict=True)
+    try:
+        for cells in reader:
+            if not _blank(cells):
+                header = tuple(cell.strip() for cell in cells)
+                _check_header(f"{path}, line {reader.line_num}", header, known, required)
+                return header, reader.line_num
+    except csv.Error as error:
+        raise _broken(path, reader.line_num, error) from None
+    raise SpecificationError(f"{path} must hold a header line and rows of numbers, not be empty")
+
+
+def _plain_numbers(lines: Sequence[str], columns: int) -> Values | None:
+    """Read lines of numbers and commas at once, shape (lines, columns); None if there is anything else or amiss."""
+    text = "".join(lines).replace("\r\n", "\n")
+    if not _PLAIN.fullmatch(text) or any(line.count(",") != columns - 1 for line in lines):
+        return None
+    try:
+        values = np.array(list(map(float, text.removesuffix("\n").replace("\n", ",").split(","))))
+    except ValueError:
+        return None
+    return values.reshape(len(lines), columns) if max(values.max(), -values.min()) <= LARGEST else None
 
 
 def _rows(
-    path: Path, known: Sequence[str], required: Sequence[str], readers: Mapping[str, Reader]
-) -> Iterator[tuple[tuple[str, ...], int, list[float]]]:
-    """Yield the header, the line and the numbers of each row."""
-    reader = csv.reader(read_lines(path, what="CSV file"), strict=True)
-    header: tuple[str, ...] = ()
+    path: Path,
+    header: tuple[str, ...],
+    done: int,
+    block: Sequence[str],
+    lines: Iterator[str],
+    readers: Mapping[str, Reader],
+) -> tuple[Values, npt.NDArray[np.uint32], int]:
+    """Read the rows that begin in `block`, behind `done` lines; return their numbers, lines, and how many they took."""
+    reader = csv.reader(chain(block, lines), strict=True)
+    values, numbers = array("d"), array("I")
     try:
-        for cells in reader:
-            if not any(cell.strip() for cell in cells) and len(cells) <= 1:
+        while reader.line_num < len(block) and (cells := next(reader, None)) is not None:
+            if _blank(cells):
                 continue
-            if not header:
-                header = tuple(cell.strip() for cell in cells)
-                _check_header(f"{path}, line {reader.line_num}", header, known, required)
-                continue
+            line = done + reader.line_num
             if len(cells) != len(header):
                 expected = "1 cell" if len(header) == 1 else f"{len(header)} cells"
-                raise SpecificationError(f"{path}, line {reader.line_num}: row must have {expected}, not {len(cells)}")
-            line = reader.line_num
-            yield header, line, [_number(path, line, *each, readers) for each in zip(header, cells, strict=True)]
+                raise SpecificationError(f"{path}, line {line}: row must have {expected}, not {len(cells)}")
+            values.extend(_number(path, line, *each, readers) for each in zip(header, cells, strict=True))
+            numbers.append(line)
     except csv.Error as error:
-        raise SpecificationError(
-            f"{path}, line {reader.line_num}: row must be valid CSV, not broken ({error})"
-        ) from None
-    if not header:
-        raise SpecificationError(f"{path} must hold a header line and rows of numbers, not be empty")
+        raise _broken(path, done + reader.line_num, error) from None
+    return np.array(values).reshape(-1, len(header)), np.array(numbers, dtype=np.uint32), reader.line_num
+
+
+def _blank(cells: Sequence[str]) -> bool:
+    return len(cells) <= 1 and not any(cell.strip() for cell in cells)
+
+
+def _broken(path: Path, line: int, error: csv.Error) -> SpecificationError:
+    return SpecificationError(f"{path}, line {line}: row must be valid CSV, not broken ({error})")
 
 
 def csv_header(path: Path) -> list[str]:

@@ -12,6 +12,9 @@ from typing import Any
 from sosmith.model.errors import SpecificationError
 from sosmith.model.foreign_files import read_text
 
+_DEEPEST = 100
+"""Tables and lists in one another, at most."""
+
 
 def read_toml(path: Path, *, what: str, max_bytes: int, parse_float: Callable[[str], Any] = float) -> dict[str, Any]:
     """Read a TOML file.
@@ -40,7 +43,9 @@ def parse_toml(text: str, name: str, *, what: str, parse_float: Callable[[str], 
         If the text is no TOML.
     """
     try:
-        return tomllib.loads(text.removeprefix("\ufeff"), parse_float=parse_float)
+        tree = tomllib.loads(text.removeprefix("\ufeff"), parse_float=parse_float)
+        _check_depth(tree)
+        return tree
     except tomllib.TOMLDecodeError as error:
         raise SpecificationError(f"{name}: {_syntax_error(str(error), text)}") from None
     except (ValueError, ArithmeticError, RecursionError):
@@ -48,6 +53,21 @@ def parse_toml(text: str, name: str, *, what: str, parse_float: Callable[[str], 
         raise SpecificationError(
             f"{name}: {what} must be TOML within reason, not lists some hundred deep or a number too long to read"
         ) from None
+
+
+def _check_depth(tree: dict[str, Any]) -> None:
+    """Raise RecursionError for tables and lists too deep in one another: a key of dots makes any depth."""
+    level: list[Any] = [tree]
+    for _ in range(_DEEPEST):
+        level = [
+            part
+            for one in level
+            for part in (one.values() if isinstance(one, dict) else one)
+            if isinstance(part, dict | list)
+        ]
+        if not level:
+            return
+    raise RecursionError
 
 
 def _syntax_error(message: str, text: str) -> str:

@@ -76,7 +76,7 @@ def test_a_comparison_keeps_codes_and_the_exact_result(monkeypatch: pytest.Monke
     trace = Trace(name="t", ports=design.datapath.inputs, sample_rate=design.spec.sample_rate, codes=codes)
     run_of(design, [trace])  # compiled by now
     # received, exact, flags and differences; a block of the exact chain
-    assert bytes_a_row(lambda: run_of(design, [trace])) < 8 + 8 + 3 + 5
+    assert bytes_a_row(lambda: run_of(design, [trace])) < 8 + 8 + 3 + 9
 
 
 @pytest.mark.slow

@@ -76,8 +76,11 @@ def _numpy(path: Path, suffix: str) -> Content:
                 raise SpecificationError(f"{path}: arrays must have one named {', '.join(_WAYS)}, not {loaded.files}")
             if sum(part.file_size for part in loaded.zip.infolist()) > MAX_BYTES:
                 raise SpecificationError(f"{path}: arrays must be at most {MAX_BYTES} bytes unpacked, not longer")
-            with loaded.zip.open(f"{name}.npy") as part:
-                array = _array(path, part)
+            with loaded.zip.open(name if name in loaded.zip.namelist() else f"{name}.npy") as part:
+                content = part.read(MAX_BYTES)
+            if not content.startswith(np.lib.format.MAGIC_PREFIX):
+                raise SpecificationError(f"{path}: {name} must be an array, not other bytes")
+            array = _array(path, BytesIO(content))
     except (ValueError, EOFError, KeyError, TypeError, SyntaxError, NotImplementedError, MemoryError) as error:
         raise SpecificationError(f"{path}: the filter must be {what} of numbers, not: {_first_line(error)}") from None
     except Exception as error:  # zipfile and zlib have errors of their own for damaged archives

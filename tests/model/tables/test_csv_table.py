@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from sosmith.model.errors import SpecificationError
+from sosmith.model.tables import csv_table
 from sosmith.model.tables.csv_table import read_csv_table
 
 
@@ -68,3 +69,40 @@ def test_missing_file_and_folder(tmp_path: Path) -> None:
         message = f"{path} must be a readable CSV file ({reason})"
         with pytest.raises(SpecificationError, match=f"^{re.escape(message)}$"):
             read_csv_table(path, ["a"])
+
+
+TEXTS = [
+    "a\n1\n2\n3\n4\n5",
+    "a,b\n1,2\n\n3,4\n  \n5,6\n",
+    'a,b\r\n1,2\r\n"3",4\r\n5, 6\r\n',
+    'a,b\n1,2\n"3\n",4\n5,6\n7,8\n',
+    "a,b\n1,2\n3,4,5,6\n7\n",
+    "a,b\n1,2,3\n4\n",
+    "a\n1\n2\nnan\n4\n",
+    "a\n1\n1_0\n",
+    "a\n1\n1e101\n",
+    "a\n1 2\n",
+    "a\n1\n+-1\n",
+]
+
+
+def outcome(path: Path) -> object:
+    try:
+        table = read_csv_table(path, ["a", "b"])
+    except SpecificationError as error:
+        return str(error)
+    return table.header, table.values.tolist(), table.lines.tolist()
+
+
+@pytest.mark.parametrize("text", TEXTS)
+def test_rows_are_the_same_however_many_are_read_at_once(
+    text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "a.csv"
+    path.write_bytes(text.encode())
+    found = []
+    for chunk in (1, 2, 3, 100):
+        monkeypatch.setattr(csv_table, "CHUNK", chunk)
+        found.append(outcome(path))
+    monkeypatch.setattr(csv_table, "_plain_numbers", lambda lines, columns: None)
+    assert found == [outcome(path)] * 4
