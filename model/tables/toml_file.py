@@ -43,6 +43,7 @@ def parse_toml(text: str, name: str, *, what: str, parse_float: Callable[[str], 
         If the text is no TOML.
     """
     try:
+        _check_keys(text)
         tree = tomllib.loads(text.removeprefix("\ufeff"), parse_float=parse_float)
         _check_depth(tree)
         return tree
@@ -53,6 +54,14 @@ def parse_toml(text: str, name: str, *, what: str, parse_float: Callable[[str], 
         raise SpecificationError(
             f"{name}: {what} must be TOML within reason, not lists some hundred deep or a number too long to read"
         ) from None
+
+
+def _check_keys(text: str) -> None:
+    """Raise RecursionError for a key of many dots, which Python's reader takes minutes for."""
+    for line in text.splitlines():
+        key, equals, _ = line.lstrip().partition("=")
+        if key.count(".") > _DEEPEST and (equals or key.startswith("[")) and not key.startswith("#"):
+            raise RecursionError
 
 
 def _check_depth(tree: dict[str, Any]) -> None:
