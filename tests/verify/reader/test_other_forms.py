@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import pytest
-from tests.verify.reader.test_strict_reader import TEXT, edited, refused
+from tests.verify.reader.small_text import TEXT, edited, refused
 
 ITEMS = [
     "parameter p = 1;", "localparam p = 1;", "defparam inner0.p = 1;", "specparam s = 1;", "specify endspecify",

@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 from tests.verify.parallel.cores import small as parallel
 from tests.verify.program.programs import small as folded
+from tests.verify.reader.example_cores import CORES, NAME, core
 from tests.verify.reader.netlists import netlists
-from tests.verify.reader.test_source import CORES, NAME, core
 from tests.verify.small_specifications import PLAIN
 
 from sosmith.verify.graph import RejectedError

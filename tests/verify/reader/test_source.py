@@ -3,34 +3,12 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
-from functools import cache
 
 import pytest
-from tests.gen.designs import EXAMPLES
+from tests.verify.reader.example_cores import CORES, NAME, core
 
-from sosmith.gen.core import design_core
-from sosmith.gen.output.verilog import core_verilog
-from sosmith.gen.specification.specification import load
 from sosmith.verify.graph import RejectedError
 from sosmith.verify.reader.source import read_source
-
-NAME = "audio_lowpass"
-CORES = {
-    "parallel": {"architecture": "parallel"},
-    "folded": {"architecture": "folded"},
-    "serial": {"architecture": "serial"},
-    "online": {"architecture": "online"},
-    "protected": {"architecture": "parallel", "protect": "correct"},
-    "loadable": {"architecture": "folded", "reload": True},
-    "beats": {"architecture": "parallel", "samples_per_clock": 2},
-}
-
-
-@cache
-def core(kind: str) -> str:
-    spec = load(EXAMPLES / f"{NAME}.toml")
-    return core_verilog(design_core(replace(spec, hardware=replace(spec.hardware, **CORES[kind]))))
 
 
 def plain(text: str) -> str:
