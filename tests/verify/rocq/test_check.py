@@ -59,7 +59,7 @@ def other_product(tree: Any) -> None:
 def other_filter(tree: Any) -> None:
     """Compare with another filter."""
     coefficients = tree["ideal"]["sections"][0]["denominator"]
-    coefficients[1] = str(Fraction(coefficients[1]) + Fraction(1, 1 << 20))
+    coefficients[1] = str(Fraction(coefficients[1]) + Fraction(1, 1 << 12))
 
 
 @needs_coqc
