@@ -14,8 +14,13 @@ def tool_cache() -> dict[str, str]:
     """Variables of the environment that these programs need beside this process's.
 
     There are none if the user's cache folder can be written; else a folder of our own takes its place, which lasts as
-    long as this process.
+    long as this process. It is their home, too, where the user's has no absolute path, which they refuse.
     """
+    home = {} if Path(os.environ.get("HOME", "/")).is_absolute() else {"HOME": _own().name}
+    return home | _cache_folder()
+
+
+def _cache_folder() -> dict[str, str]:
     named = os.environ.get("XDG_CACHE_HOME", "")
     try:
         folder = Path(named) if Path(named).is_absolute() else Path.home() / ".cache"

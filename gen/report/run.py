@@ -12,6 +12,7 @@ import numpy.typing as npt
 from sosmith.gen.core import CoreDesign
 from sosmith.model.arrays import Codes, side_by_side
 from sosmith.model.dataflow.status import Flag
+from sosmith.model.port import Port
 from sosmith.model.traces.trace import Trace
 
 Array = npt.NDArray[np.float64]
@@ -64,8 +65,8 @@ class Run:
         Instants of the results in s, rising.
     codes : int64 array, shape (samples, channels, inputs)
         What went in; behind a decimator, more samples than results.
-    received : int64 array
-        What came out.
+    received : array of integers
+        What came out, in the smallest type that holds the codes of the output: a run may have ten million of them.
     values : Column
         The values of `received`.
     differs : ndarray of bool, shape (n, channels)
@@ -89,7 +90,7 @@ class Run:
     scenario: str
     instants: Array | Instants
     codes: Codes
-    received: Codes
+    received: npt.NDArray[np.signedinteger[Any]]
     values: Column
     differs: Mask
     golden: Array
@@ -238,6 +239,7 @@ def run_of(
     received, status = received[: len(expected)], status[: len(expected)]  # not what fills a beat
     differs = (expected != received) | (flags != status)
     unsettled = (status >> Flag.SETTLING & 1).astype(np.bool_) if datapath.settles else None
+    received = np.asarray(received, dtype=_smallest(datapath.output))
     del expected, flags, status  # the exact chain takes as much memory
     if datapath.decimator is not None:  # what is told of a sample is told of those that bring a result
         traces = [trace.every(datapath.decimator.factor) for trace in traces]
@@ -256,6 +258,11 @@ def run_of(
         cycles=cycles,
     )
     return run.of_channel(0) if len(traces) == 1 else run
+
+
+def _smallest(port: Port) -> type[np.signedinteger[Any]]:
+    """Return the smallest type with a sign that holds the codes of a port."""
+    return next(kind for kind in (np.int16, np.int32, np.int64) if np.iinfo(kind).max >= port.highest)
 
 
 def _stacked(columns: Sequence[npt.NDArray[_Kind] | None]) -> npt.NDArray[_Kind] | None:

@@ -14,6 +14,7 @@ from sosmith.gen.facts.table import Table, View
 from sosmith.gen.report.evidence import Evidence
 from sosmith.gen.report.headlines import report_table
 from sosmith.gen.report.report import write_report
+from sosmith.gen.report.run import Run
 from sosmith.interface.quantity import Quantity
 
 
@@ -21,7 +22,8 @@ from sosmith.interface.quantity import Quantity
 class Report(View):
     """The results of `Design.simulate`.
 
-    Arrays hold one sample per row, shape (samples,) for one channel and (samples, channels) for several.
+    Arrays hold one sample per row, shape (samples,) for one channel and (samples, channels) for several. Times and
+    values of the hardware are made when they are asked for: a run may have ten million of them.
 
     Attributes
     ----------
@@ -29,25 +31,16 @@ class Report(View):
         The content of ``report.json``.
     folder : Path
         Folder of the files, including ``report.html``.
-    time : ndarray of float, shape (samples,)
-        Time of each sample in s.
     input_codes : dict of str to ndarray of int
         Codes applied to each input.
-    hardware_codes : ndarray of int
-        Codes at the output of the hardware.
-    hardware, exact : ndarray of float
-        Output of the hardware and exact result in double precision, in the unit of the output.
     unit : str
         Unit of the output.
     """
 
     summary: dict[str, Any] = field(repr=False)
     folder: Path
-    time: npt.NDArray[np.float64] = field(repr=False)
     input_codes: dict[str, npt.NDArray[np.int64]] = field(repr=False)
-    hardware_codes: npt.NDArray[np.int64] = field(repr=False)
-    hardware: npt.NDArray[np.float64] = field(repr=False)
-    exact: npt.NDArray[np.float64] = field(repr=False)
+    _run: Run = field(repr=False)
     unit: str
 
     @classmethod
@@ -58,13 +51,30 @@ class Report(View):
         return cls(
             summary=write_report(evidence, folder),
             folder=folder,
-            time=run.time,
             input_codes={port.name: codes[..., k] for k, port in enumerate(design.datapath.inputs)},
-            hardware_codes=run.received,
-            hardware=run.hardware,
-            exact=run.golden,
+            _run=run,
             unit=evidence.facts.unit,
         )
+
+    @property
+    def time(self) -> npt.NDArray[np.float64]:
+        """Time of each sample in s, shape (samples,)."""
+        return self._run.time
+
+    @property
+    def hardware_codes(self) -> npt.NDArray[np.int64]:
+        """Codes at the output of the hardware."""
+        return np.asarray(self._run.received, dtype=np.int64)
+
+    @property
+    def hardware(self) -> npt.NDArray[np.float64]:
+        """Output of the hardware, in the unit of the output."""
+        return self._run.hardware
+
+    @property
+    def exact(self) -> npt.NDArray[np.float64]:
+        """The exact result in double precision, in the unit of the output."""
+        return np.asarray(self._run.golden)
 
     @property
     def name(self) -> str:

@@ -22,6 +22,15 @@ def test_the_users_cache_is_used_where_it_can_be_written(tmp_path: Path, monkeyp
     assert (tmp_path / ".cache").is_dir()
 
 
+@pytest.mark.parametrize("home", ["", "relative", "plain.toml/../x"])
+def test_a_home_that_is_no_absolute_path_is_replaced(home: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setenv("HOME", home)
+    found = tool_cache()
+    assert set(found) == {"HOME"}
+    assert Path(found["HOME"]).is_dir()
+
+
 @pytest.mark.parametrize("name", ["XDG_CACHE_HOME", "HOME"])
 def test_else_a_folder_of_this_process(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").touch()
