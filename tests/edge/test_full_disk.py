@@ -28,16 +28,29 @@ class Disk:
         self.full_for: str | None = None
         for name in ("write_bytes", "write_text"):
             self._limit(name, patch)
+        real = Path.open
+
+        def opened(path: Path, mode: str = "r", *arguments: Any, **options: Any) -> Any:
+            if "w" in mode and self._is_full(path):
+                raise OSError(errno.ENOSPC, MESSAGE, str(path))
+            return real(path, mode, *arguments, **options)
+
+        patch.setattr(Path, "open", opened)
+
+    def _is_full(self, path: Path) -> bool:
+        return (self.full or path.name == self.full_for) and path.absolute().is_relative_to(self.folder)
 
     def _limit(self, name: str, patch: pytest.MonkeyPatch) -> None:
         """Let a method of `Path` write only half of its data while the disk is full."""
         real = getattr(Path, name)
 
         def limited(path: Path, data: Any, *arguments: Any, **options: Any) -> int:
-            full = self.full or path.name == self.full_for
-            if not full or not path.absolute().is_relative_to(self.folder):
+            if not self._is_full(path):
                 return int(real(path, data, *arguments, **options))
-            real(path, data[: len(data) // 2], *arguments, **options)
+            with patch.context() as half:
+                half.setattr(self, "full", False)
+                half.setattr(self, "full_for", None)
+                real(path, data[: len(data) // 2], *arguments, **options)
             raise OSError(errno.ENOSPC, MESSAGE, str(path))
 
         patch.setattr(Path, name, limited)

@@ -118,7 +118,7 @@ class Place:
             signal.signal(signal.SIGPIPE, signal.SIG_IGN)  # as Python begins
 
     def home(self) -> None:
-        os.environ["HOME"] = self._rng.choice(("", "/none/none", "/proc", "plain.toml", "\udcff"))
+        os.environ["HOME"] = self._rng.choice(("", "/proc/none", "/proc", "plain.toml", "\udcff"))
         os.environ["XDG_CACHE_HOME"] = self._rng.choice(("", "relative", str(self.folder / "plain.toml"), "/proc"))
         os.environ["XDG_CONFIG_HOME"] = os.environ["HOME"]
 
@@ -176,7 +176,7 @@ class Place:
         kinds: tuple[Callable[[], object], ...] = (
             lambda: place.symlink_to("/dev/full"),
             lambda: place.symlink_to(place.name),
-            lambda: place.symlink_to("/none/none"),
+            lambda: place.symlink_to("/proc/none"),
             lambda: place.symlink_to(LINKED),
             lambda: os.mkfifo(place),
             lambda: place.mkdir() if "." in place.name else place.write_text("a file"),

@@ -23,7 +23,9 @@ def test_the_users_cache_is_used_where_it_can_be_written(tmp_path: Path, monkeyp
 
 
 @pytest.mark.parametrize("home", ["", "relative", "plain.toml/../x"])
-def test_a_home_that_is_no_absolute_path_is_replaced(home: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_home_that_is_no_absolute_path_is_replaced(
+    home: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.setenv("HOME", home)
     found = tool_cache()

@@ -286,7 +286,7 @@ def test_design_shows_them() -> None:
         text = CliRunner().invoke(cli, arguments, env={"COLUMNS": "120"}).stdout
         table = text[text.index("Limit cycles") :]
         shown[realization] = re.findall(
-            r"^ +section(\d) +(none, proven|up to \S+) +(\S+) +(.+?) *$", table, re.MULTILINE
+            r"^ +section(\d) +(none, proven|\S+) +(\S+) +\S+ +\S+ +(.+?) *$", table, re.MULTILINE
         )
     assert [row[0] for row in shown["df1"]] == [row[0] for row in shown["normal"]] == ["0", "1", "2"]
     assert [row[1] == "none, proven" for row in shown["df1"]] == [False] * 3

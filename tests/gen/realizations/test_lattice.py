@@ -144,7 +144,8 @@ def test_auto_goes_on_without_it(tmp_path: Path) -> None:
     path = tmp_path / "even.toml"
     path.write_text(text, encoding="utf-8")
     assert design_core(load(path)).quantized.realization != "lattice_wdf"
-    with pytest.raises(ShortfallError, match=f"^{re.escape(REFUSED)}$"):
+    advice = 'hardware.realization = "df1_ef2" meets the specification as it is'
+    with pytest.raises(ShortfallError, match=f"^{re.escape(f'{REFUSED}; {advice}')}$"):
         design_core(load(path), realization="lattice_wdf")
 
 
