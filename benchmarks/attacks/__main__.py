@@ -15,7 +15,6 @@ import multiprocessing
 import re
 import sys
 from collections import Counter
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -65,7 +64,7 @@ def _task(task: tuple[str, int, int, Path | None]) -> Outcome:
         return Outcome(Counter(found["counts"]), Counter(found["classes"]), found["findings"], found["slowest"])
     outcome = attacked(kind, texts, certificates)
     if kept is not None:
-        kept.write_text(json.dumps(asdict(outcome)), encoding="utf-8")
+        kept.write_text(json.dumps(outcome.tree()), encoding="utf-8")
     return outcome
 
 
@@ -82,8 +81,7 @@ def campaign(texts: int, certificates: int, jobs: int, keep: Path | None = None)
             total.add(outcome)
             for finding in outcome.findings:
                 print(finding, file=sys.stderr, flush=True)
-    found = asdict(total)
-    return found | {key: dict(sorted(found[key].items())) for key in ("counts", "classes")}
+    return total.tree()
 
 
 def main() -> None:

@@ -49,6 +49,12 @@ class Outcome:
         self.findings += other.findings
         self.slowest = max(self.slowest, other.slowest)
 
+    def tree(self) -> dict[str, Any]:
+        """Return all of it in JSON types."""
+        # Not by `asdict`, which counts the pairs of a Counter up to Python 3.11.
+        counts, classes = (dict(sorted(counter.items())) for counter in (self.counts, self.classes))
+        return {"counts": counts, "classes": classes, "findings": self.findings, "slowest": self.slowest}
+
     def timed(self, what: str, judge: Callable[[], str]) -> str:
         """Return a verdict: "accepted", or a sentence; anything else that is raised is a finding."""
         start = time.process_time()
