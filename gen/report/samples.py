@@ -31,9 +31,14 @@ def viewer_data(evidence: Evidence, transient: int) -> dict[str, Any]:
         ``transient``: samples to shade.
     """
     facts, run = evidence.facts, evidence.run
-    index = _chosen(run.error)
+    # One column after the other: a run may have ten million samples.
+    error = run.error
+    index = _chosen(error)
+    chosen = packed(error[index])
+    del error
+    unfiltered = None if run.before is None else packed(_at(run.unfiltered, index))
     near, (inside, _outside) = close_up(evidence), error_limits(evidence)
-    start, end, samples, unfiltered = run.at(0), run.at(-1), len(run), run.unfiltered
+    start, end, samples = run.at(0), run.at(-1), len(run)
     apart = None if run.truth is None else _shown(run.minus(run.truth)[min(transient, samples - 1) :], facts.unit)
     return {
         "start": start,
@@ -44,9 +49,9 @@ def viewer_data(evidence: Evidence, transient: int) -> dict[str, Any]:
         "zero": float(facts.output.zero),
         "index": packed(index.astype(np.float64), exact=True),
         "code": packed(run.received[index].astype(np.float64), exact=True),
-        "error": packed(run.error[index]),
+        "error": chosen,
         "truth": None if run.truth is None else packed(run.truth[index]),
-        "unfiltered": None if unfiltered is None else packed(unfiltered[index]),
+        "unfiltered": unfiltered,
         "value": _shown(run.hardware, facts.unit),
         "fine": list(scale(facts.error_bound or facts.lsb, facts.unit)),
         "true_error": apart,
@@ -89,6 +94,11 @@ def _chosen(error: Array) -> npt.NDArray[np.int64]:
     np.abs(error, out=padded[:samples])
     chosen: npt.NDArray[np.int64] = np.arange(0, samples, stride) + padded.reshape(-1, stride).argmax(axis=1)
     return chosen
+
+
+def _at(values: Array | None, index: npt.NDArray[np.int64]) -> Array:
+    assert values is not None, "a filter has an input"
+    return values[index]
 
 
 def _shown(values: Array, unit: str) -> list[Any]:
