@@ -198,6 +198,7 @@ def _attack_certificates(core: Core, count: int, outcome: Outcome) -> None:
             group, other, wrong = "layout", None, certificates.spoilt_layout(text, seed)
             verdict = outcome.timed(name, lambda wrong=wrong: _file_verdict(core, wrong))
         else:
+            wrong = ""
             group, other = certificates.mutant(tree, seed)
             verdict = outcome.timed(name, lambda other=other: _certificate_verdict(core, other))
         outcome.classes[f"certificate, {group}"] += 1
@@ -205,7 +206,10 @@ def _attack_certificates(core: Core, count: int, outcome: Outcome) -> None:
             outcome.counts["certificates, refused"] += 1
             continue
         outcome.counts["certificates, accepted"] += 1
-        stronger = ["the layout"] if other is None else differing(tree, json.loads(json.dumps(other)))
+        if other is None:  # blanks between the parts of JSON are none of it
+            stronger = [] if json.loads(wrong) == json.loads(text) else ["the layout"]
+        else:
+            stronger = differing(tree, json.loads(json.dumps(other)))
         outcome.findings += [f"{name}: accepted with {place}" for place in stronger]
 
 

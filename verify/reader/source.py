@@ -185,6 +185,9 @@ def _check_nets(name: str, module: Module, modules: Mapping[str, Module]) -> Non
         for register, mask in own_bits.items():
             require(not loaded.get(register, 0) & mask, f"each bit of {register} in {name} must be loaded at one place")
             loaded[register] = loaded.get(register, 0) | mask
+    for register in module.registers:
+        whole = (1 << module.widths[register]) - 1
+        require(loaded.get(register, 0) == whole, f"each bit of {register} in {name} must be loaded at one place")
     read = _read(module, modules)
     for net in module.widths:
         if net in module.depths or net in module.registers or net.startswith("?") or module.ports.get(net) == "input":

@@ -282,3 +282,16 @@ def test_any_name_that_is_written_otherwise_is_refused(make: object) -> None:
             except RejectedError:
                 continue
             assert found == right  # within a comment
+
+
+@pytest.mark.parametrize("declared", ["reg idle = 1'h0;", "reg [3:0] idle = 4'h5;", "reg idle;"])
+def test_a_register_that_takes_nothing_over_is_refused(declared: str) -> None:
+    text = edited("  reg [3:0] held = 4'h5;\n", f"  reg [3:0] held = 4'h5;\n  {declared}\n")
+    with pytest.raises(RejectedError, match=r"^each bit of idle in top must be loaded at one place$"):
+        read_source(text, "top")
+
+
+def test_so_is_one_of_which_a_bit_takes_nothing_over() -> None:
+    text = edited("held <= n1;", "held[2:0] <= n1[2:0];").replace("held <= table1[a[1:0]];", "held[2:0] <= a[2:0];")
+    with pytest.raises(RejectedError, match=r"^each bit of held in top must be loaded at one place$"):
+        read_source(text, "top")
