@@ -52,7 +52,7 @@ def test_what_is_computed_or_kept_stays_whole() -> None:
     ("load", "sentence"),
     [
         ("held[8:0] <= chosen;", ""),
-        ("held[7:0] <= chosen[7:0];", "every bit of held must be loaded in one process"),
+        ("held[7:0] <= chosen[7:0];", "each bit of held in top must be loaded at one place"),
         ("if (e) held[7:0] <= chosen[7:0]; else held[8] <= 1'h0;", r"a process must load one register, not .*"),
         ("held[3:0] <= a;\n  always_ff @(posedge clk)\n    held[8:4] <= chosen[8:4];", ""),
         ("held[4:0] <= a;\n  always_ff @(posedge clk)\n    held[8:4] <= chosen[8:4];", "each bit of held .*"),
