@@ -97,6 +97,9 @@ ADDED = (
 )
 """What makes a store of version 1 one of version 2: type of sensor, method of the fit, acceptance in mm."""
 
+LARGEST = 1 << 28
+"""Most bytes of a store: one of 10,000 measurements has some three million."""
+
 _COMPLAINTS = {
     "database is locked": "must be free within a minute, not locked by another program",
     "file is not a database": "must be a store of measurements, not another kind of file",
@@ -440,6 +443,8 @@ def open_store(path: Path, *, create: bool = False) -> Iterator[MeasurementStore
     if not create and not path.is_file():
         raise SpecificationError(f"{path} must be an existing store of measurements; sosmith calibrate add creates one")
     is_new = create and not path.exists()
+    if not is_new and path.stat().st_size > LARGEST:
+        raise SpecificationError(f"{path}: the store must be at most {LARGEST} bytes, not {path.stat().st_size}")
     try:
         with closing(sqlite3.connect(path, timeout=PATIENCE, isolation_level=None)) as connection:
             try:

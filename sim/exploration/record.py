@@ -10,10 +10,14 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from sosmith.model.errors import SpecificationError, ToolError
+from sosmith.model.foreign_files import read_bytes
 from sosmith.model.text_files import write_files
 from sosmith.sim.exploration.evaluation import Point
 
 FILE = "points.jsonl"
+
+LARGEST = 1 << 28
+"""Most bytes of the file: a result has some thousand."""
 
 
 class Record:
@@ -27,7 +31,7 @@ class Record:
         self._handle, self._path = handle, path
         self.points: dict[str, Point] = {}
         whole = 0
-        content = path.read_bytes()
+        content = read_bytes(path, what="the record", max_bytes=LARGEST)
         for line in content.splitlines(keepends=True):
             try:
                 point = json.loads(line)

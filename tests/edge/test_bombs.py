@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import os
+import re
 import struct
 import tracemalloc
 import zipfile
@@ -24,6 +25,7 @@ from sosmith.gen.specification import specification
 from sosmith.gen.specification.coefficients.filter_file import read_filter_file
 from sosmith.host.identity_check import check_files
 from sosmith.host.loading import read_set
+from sosmith.instrument.calibration import measurement_store
 from sosmith.instrument.calibration.measurement_files import read_measurement_file
 from sosmith.instrument.scenarios.file import load_scenario
 from sosmith.instrument.wear.record_file import read_wear_record
@@ -34,6 +36,7 @@ from sosmith.model.port import Port
 from sosmith.model.tables import csv_table
 from sosmith.model.traces.signal_file import read_signal_file
 from sosmith.model.traces.trace_file import read_traces
+from sosmith.sim.exploration import record
 from tests.host.lines import plain_device
 
 LIMIT = 64 << 20
@@ -259,3 +262,24 @@ def test_arrays_within_the_limits_are_read(tmp_path: Path) -> None:
     np.save(tmp_path / "f.npy", rows)
     np.savez_compressed(tmp_path / "f.npz", sos=rows)
     assert read_filter_file(tmp_path / "f.npy").rows == read_filter_file(tmp_path / "f.npz").rows  # type: ignore[union-attr]
+
+
+def test_a_store_of_more_than_anyone_measures(tmp_path: Path) -> None:
+    path, size = tmp_path / "a.db", measurement_store.LARGEST + 1
+    with path.open("wb") as file:
+        file.truncate(size)
+    sentence = f"{path}: the store must be at most {measurement_store.LARGEST} bytes, not {size}"
+    with (
+        pytest.raises(SpecificationError, match=f"^{re.escape(sentence)}$"),
+        measurement_store.open_store(path),
+    ):
+        pass
+
+
+def test_a_record_of_more_than_anyone_explores(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(record, "LARGEST", 1000)
+    path = tmp_path / record.FILE
+    path.write_bytes(b'{"key": "a"}\n' * 100)
+    sentence = f"{path}: the record must be at most 1000 bytes, not longer"
+    with pytest.raises(SpecificationError, match=f"^{re.escape(sentence)}$"):
+        record.Record(0, path)
