@@ -46,8 +46,8 @@ endmodule
 """
 
 
-def refused(text: str, sentence: str = "", name: str = "top") -> None:
-    with pytest.raises(RejectedError):
+def refused(text: str, sentence: str = r"\S", name: str = "top") -> None:
+    with pytest.raises(RejectedError, match=sentence):
         read_source(text, name)
 
 
