@@ -5,8 +5,12 @@ from __future__ import annotations
 import io
 import os
 import sys
+from typing import TYPE_CHECKING
 
 from sosmith.model.errors import ToolError
+
+if TYPE_CHECKING:
+    from _typeshed import ReadableBuffer
 
 
 class _Closed(io.RawIOBase):
@@ -17,8 +21,8 @@ class _Closed(io.RawIOBase):
     def writable(self) -> bool:
         return True
 
-    def write(self, data: object) -> int:
-        taken = len(memoryview(data))  # type: ignore[arg-type]
+    def write(self, data: ReadableBuffer) -> int:
+        taken = len(memoryview(data))
         if taken:
             self.lost = "stdout must be open, not closed: what was printed is lost"
         return taken
@@ -29,24 +33,24 @@ class _Results(io.FileIO):
 
     lost: str | None = None
 
-    def write(self, data: object) -> int:
+    def write(self, data: ReadableBuffer) -> int:
         try:
-            return super().write(data)  # type: ignore[arg-type]
+            return super().write(data)
         except BrokenPipeError:  # the reader has left, and wants no more
             raise
         except OSError as error:
             self.lost = f"stdout must take what is printed, not: {error.strerror}"
-            return len(memoryview(data))  # type: ignore[arg-type]
+            return len(memoryview(data))
 
 
 class _Messages(io.FileIO):
     """Stderr: a message that cannot be told is no reason to leave work undone."""
 
-    def write(self, data: object) -> int:
+    def write(self, data: ReadableBuffer) -> int:
         try:
-            return super().write(data)  # type: ignore[arg-type]
+            return super().write(data)
         except OSError:
-            return len(memoryview(data))  # type: ignore[arg-type]
+            return len(memoryview(data))
 
 
 class StandardStreams:

@@ -97,9 +97,11 @@ class Loopback:
     ) -> None:
         from websockets.sync.server import ServerConnection, serve
 
+        check_free = self._check_free
+
         class Limited(ServerConnection):
-            def __init__(connection, *given: Any, **options: Any) -> None:  # noqa: N805
-                self._check_free()
+            def __init__(self, *given: Any, **options: Any) -> None:
+                check_free()
                 super().__init__(*given, **options)
 
         self._pages, self._talk = pages, talk

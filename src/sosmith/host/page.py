@@ -8,6 +8,7 @@ import secrets
 import threading
 import time
 from contextlib import suppress
+from functools import partial
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
@@ -102,6 +103,9 @@ class LivePage:
             self._picture, self._number = made, self._number + 1
             self._changed.notify_all()
 
+    def _is_after(self, seen: int) -> bool:
+        return self._number != seen
+
     def _serve(self, connection: ServerConnection) -> None:
         """Send each new picture, or the newest one if several were made meanwhile, until the page is gone."""
         from websockets.exceptions import ConnectionClosed
@@ -112,7 +116,7 @@ class LivePage:
         try:
             while not ended:
                 with self._changed:
-                    fresh = self._changed.wait_for(lambda last=seen: self._number != last, LOOK)  # type: ignore[misc]
+                    fresh = self._changed.wait_for(partial(self._is_after, seen), LOOK)
                     seen, shown, ended = self._number, self._picture, self._ended
                 if fresh:
                     connection.send(shown)
