@@ -24,9 +24,7 @@ by the name of its DELAY node. Under a wrong name a proof is not found.
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from sosmith.verify.certificate_file import Certificate
@@ -42,6 +40,7 @@ from sosmith.verify.parallel.netlist import Netlist, flattened
 from sosmith.verify.parallel.pipeline import DATA, Pipeline
 from sosmith.verify.parallel.split import split
 from sosmith.verify.progress import Progress
+from sosmith.verify.reader.recursion import deep_recursion
 from sosmith.verify.reader.source import read_modules
 from sosmith.verify.reader.syntax import Module
 
@@ -51,9 +50,6 @@ _PORTS = frozenset(
     {CLOCK, "aresetn", DATA, "s_axis_tvalid", "s_axis_tready", OUTPUT, FLAGS, "m_axis_tvalid", "m_axis_tready"}
 )
 _FLAG_BITS = 8
-
-_DEEPEST = 20_000
-"""Most calls inside each other: the lanes of a section are followed back one through the other."""
 
 
 @dataclass(frozen=True)
@@ -148,19 +144,8 @@ def check_modules(
     ports = set(next(iter(modules.values())).ports)
     wanted = _PORTS if channels == 1 else _PORTS | {DEST, OUTPUT_DEST}
     require(ports == wanted, f"the ports must be {', '.join(sorted(wanted))}, not {', '.join(sorted(ports))}")
-    with _deep_recursion():
+    with deep_recursion():
         return _checked(flattened(modules, CLOCK), certificate, channels, inside)
-
-
-@contextmanager
-def _deep_recursion() -> Iterator[None]:
-    """Let nets be followed back through as many lanes as there are, one after the other."""
-    before = sys.getrecursionlimit()
-    sys.setrecursionlimit(max(before, _DEEPEST))
-    try:
-        yield
-    finally:
-        sys.setrecursionlimit(before)
 
 
 def _checked(netlist: Netlist, certificate: Certificate, channels: int, inside: Inside) -> HardwareVerdict:

@@ -7,19 +7,15 @@ that are equal for another reason are taken for different ones, and the text is 
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from sosmith.verify.graph import require
 from sosmith.verify.reader.gates import Gates
 from sosmith.verify.reader.logic import Logic, logic_of
 from sosmith.verify.reader.outside import modules_outside
+from sosmith.verify.reader.recursion import deep_recursion
 from sosmith.verify.reader.syntax import Module
-
-_DEEPEST = 20_000
-"""Most calls inside each other: nets are followed back one through the other."""
 
 
 class Readings(NamedTuple):
@@ -39,7 +35,7 @@ def compare_readings(modules: Mapping[str, Module], netlist: str) -> Readings:
         For the first difference.
     """
     gates = Gates()
-    with _deep_recursion():
+    with deep_recursion():
         directions = {name: module.ports for name, module in modules.items()}
         own = {name: logic_of(module, directions, gates) for name, module in modules.items()}
         other = modules_outside(netlist, {name: module.registers for name, module in modules.items()}, gates)
@@ -70,14 +66,3 @@ def _compare(module: str, own: Logic, other: Logic) -> None:
             require(same, f"the second reader must see the {kind} {name} of {module} alike, not as another one")
     clocks = own.clocks == other.clocks
     require(clocks, f"the second reader must see the clock of {module} alike, not {', '.join(sorted(other.clocks))}")
-
-
-@contextmanager
-def _deep_recursion() -> Iterator[None]:
-    """Let nets be followed back as far as they go."""
-    before = sys.getrecursionlimit()
-    sys.setrecursionlimit(max(before, _DEEPEST))
-    try:
-        yield
-    finally:
-        sys.setrecursionlimit(before)

@@ -9,22 +9,18 @@ hand equal inputs to the instances, and hold equal content next; and they must b
 from __future__ import annotations
 
 import re
-import sys
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
 from dataclasses import dataclass
 
 from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.reader.gates import Gates
 from sosmith.verify.reader.logic import Logic, logic_of, port_of
+from sosmith.verify.reader.recursion import deep_recursion
 from sosmith.verify.reader.rtlil.equality import Equality
 from sosmith.verify.reader.rtlil.logic import Place, RtlilLogic
 from sosmith.verify.reader.rtlil.syntax import RtlilModule, read_rtlil
 from sosmith.verify.reader.syntax import Bits, Expression, Joined, Module, Number
 from sosmith.verify.reader.widths import width_of
-
-_DEEPEST = 20_000
-"""Most calls inside each other: nets are followed back one through the other."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +67,7 @@ def _checked(read: Mapping[str, RtlilModule], modules: Mapping[str, Module]) -> 
     gates = Gates()
     equality = Equality(gates)
     bits, left = 0, list[str]()
-    with _deep_recursion():
+    with deep_recursion():
         own = {name: module.ports for name, module in modules.items()}
         others = {name: _directions(module) for name, module in read.items()}
         names = {name: plain_names(module, modules[name]) for name, module in read.items()}
@@ -289,13 +285,3 @@ def _places(value: Expression, module: Module) -> list[Place | int] | None:
         parts = [_places(part, module) for part in reversed(value.parts)]
         return None if None in parts else [bit for part in parts for bit in part or ()]
     return None
-
-
-@contextmanager
-def _deep_recursion() -> Iterator[None]:
-    before = sys.getrecursionlimit()
-    sys.setrecursionlimit(max(before, _DEEPEST))
-    try:
-        yield
-    finally:
-        sys.setrecursionlimit(before)
