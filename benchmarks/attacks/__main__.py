@@ -37,17 +37,18 @@ _ROWS = {
     "traces, yosys": "the same of Yosys' netlist",
     "certificates": "wrong certificates, all digests right",
     "certificates, refused": "refused",
-    "certificates, accepted": "accepted: no claim is another one",
+    "certificates, accepted": "accepted",
 }
 
 
 def table(record: dict[str, Any]) -> str:
-    """Return the counts as a table in Markdown."""
+    """Return the counts as a table in Markdown, and each finding below it."""
     lines = ["| | count |", "|---|---:|"]
     lines += [f"| {words} | {record['counts'].get(key, 0):,} |" for key, words in _ROWS.items()]
     wrong = "findings: a tool sees something else, a claim is another one, a traceback, more than a minute"
     lines.append(f"| {wrong} | {len(record['findings'])} |")
     lines.append(f"| slowest verdict | {record['slowest']:.0f} s |")
+    lines += ["", *(f"- {finding}" for finding in record["findings"])] if record["findings"] else []
     return "".join(f"{line}\n" for line in lines)
 
 
