@@ -1,19 +1,22 @@
-"""The gate for files that others have made: however long or odd they are, reading takes bounded memory.
+"""The gate for files that others have made: however long or odd they are, reading takes bounded memory and ends.
 
 Every reader of such a file takes its bytes, text, lines or JSON from here, or hands what it has to a parser of its own
-that has limits.
+that has limits. A file is a regular one: a pipe may wait for a writer for ever, a device may never end.
 """
 
 from __future__ import annotations
 
 import codecs
+import errno
 import io
 import json
+import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 from sosmith.model.errors import SpecificationError
+from sosmith.model.file_kinds import kind_of
 
 MAX_LINE = 1 << 16
 """Most characters of a line: that of a table with some thousand columns."""
@@ -25,6 +28,46 @@ MAX_JSON = 1 << 26
 """Most bytes of a JSON file: a report has some hundred thousand, a large certificate some millions."""
 
 _PIECE = 1 << 18
+
+
+def opened(path: Path) -> io.BufferedReader:
+    """Open a regular file to read its bytes, without waiting.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be opened, or is a folder, a pipe, a socket or a device; its `strerror` says what it is.
+    ValueError
+        If `path` is an impossible one.
+    """
+    # Without this flag, a pipe is opened once somebody writes into it, and not before.
+    number = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
+    try:
+        found = kind_of(os.fstat(number).st_mode)
+        if found == "a folder":
+            raise OSError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+        if found:
+            raise OSError(errno.EINVAL, f"{found}, where a regular file is needed", str(path))
+        return os.fdopen(number, "rb")
+    except BaseException:
+        os.close(number)
+        raise
+
+
+def check_input(path: Path) -> None:
+    """Check that `path` is neither a pipe, a socket nor a device; whether it is there is told by who reads it.
+
+    Raises
+    ------
+    SpecificationError
+        If it is one, itself or by links.
+    """
+    try:
+        found = kind_of(path.stat().st_mode)
+    except (OSError, ValueError):
+        return
+    if found not in {None, "a folder"}:
+        raise SpecificationError(f"{path}: the input must be a regular file, not {found}")
 
 
 def read_bytes(path: Path, *, what: str, max_bytes: int) -> bytes:
@@ -45,7 +88,7 @@ def read_bytes(path: Path, *, what: str, max_bytes: int) -> bytes:
         If the file cannot be read or is longer.
     """
     try:
-        with path.open("rb") as file:
+        with opened(path) as file:
             content = file.read(max_bytes + 1)
     except OSError as error:
         found = (error.strerror or str(error)).lower()
@@ -113,7 +156,7 @@ def read_lines(path: Path, *, what: str) -> Iterator[str]:
         `MAX_LINES`.
     """
     try:
-        with path.open("rb") as file:
+        with opened(path) as file:
             for number, line in enumerate(_lines(path, file), 1):
                 if number > MAX_LINES:
                     raise SpecificationError(f"{path} must end within {MAX_LINES:,} lines, not go on")

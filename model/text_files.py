@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import errno
 import json
-import stat
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from sosmith.model.errors import SosmithError, SpecificationError, ToolError
+from sosmith.model.file_kinds import kind_of
 
 _UNUSABLE = {
     errno.EACCES,
@@ -119,9 +119,7 @@ def check_file(path: Path) -> None:
         ) from None
     except ValueError:
         raise SpecificationError(f"{str(path)!r} must be the path of a file, not an impossible one") from None
-    kinds = {stat.S_ISDIR: "a folder", stat.S_ISFIFO: "a pipe", stat.S_ISSOCK: "a socket"}
-    if not stat.S_ISREG(mode):
-        found = next((name for is_one, name in kinds.items() if is_one(mode)), "a device")
+    if found := kind_of(mode):
         raise SpecificationError(f"{path}: the output file must be a file, not {found}")
 
 

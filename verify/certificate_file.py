@@ -20,9 +20,11 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSeriali
 from pydantic_core import ErrorDetails
 
 from sosmith.model.errors import SpecificationError
+from sosmith.verify.given_file import read_given
 
 FORMAT = "sosmith certificate 2"
 _GRID_BITS = 64
+_MAX_BYTES = 1 << 26  # of a file: large ones have some millions
 _MAX_BITS = 4096  # of any number: far beyond any design, and few enough to keep the arithmetic fast
 _MAX_DIGITS = 1300  # of an integer in the file: slightly more than _MAX_BITS
 _RATIONAL = re.compile(r"(-?[0-9]{1,1200})(?:/([0-9]{1,1200}))?")
@@ -368,7 +370,7 @@ def read_certificate(path: Path) -> Certificate:
         If the file cannot be read or is no certificate.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_given(path, _MAX_BYTES).decode("utf-8")
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8"
         raise SpecificationError(f"{path}: the certificate must be a file that can be read, not: {reason}") from None

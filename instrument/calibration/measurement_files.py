@@ -18,6 +18,7 @@ from typing import Any
 from sosmith.gen.calibration.fit import COLUMNS
 from sosmith.instrument.calibration.acceptance import DEFAULT_RANGES, Range
 from sosmith.model.errors import SpecificationError
+from sosmith.model.foreign_files import opened
 from sosmith.model.tables.csv_table import NUMBER, check_separator, shortened
 from sosmith.model.tables.workbook import MAX_ROWS, Uncalculated, workbook_rows
 
@@ -113,7 +114,7 @@ def read_measurement_file(
         instead.
     """
     try:
-        with path.open("rb") as file:
+        with opened(path) as file:
             content = file.read(MAX_BYTES + 1)
     except (OSError, ValueError) as error:  # ValueError: a path with a NUL
         reason = (getattr(error, "strerror", None) or str(error)).lower()

@@ -21,9 +21,9 @@ import click
 
 import sosmith
 from sosmith.commands.standard_streams import StandardStreams
+from sosmith.given_paths import check_paths
 from sosmith.model.errors import SosmithError, ToolError
 from sosmith.model.suggestion import did_you_mean
-from sosmith.output_paths import check_outputs
 from sosmith.terminal import be_quiet, note, reader_may_leave, silence_stdout
 
 # Matrices are small here: threads of the linear algebra would mostly wait, at more than twice the processor time.
@@ -200,7 +200,7 @@ def _checked(callback: Callable[..., Any] | None) -> Callable[..., Any]:
 
     @wraps(callback)
     def run(*values: Any, **options: Any) -> Any:
-        check_outputs(click.get_current_context())
+        check_paths(click.get_current_context())
         return callback(*values, **options)
 
     return run

@@ -88,11 +88,11 @@ def test_what_is_no_regular_file_is_refused(tmp_path: Path, suffix: str) -> None
     fifo, folder = tmp_path / f"fifo{suffix}", tmp_path / f"folder{suffix}"
     os.mkfifo(fifo)
     folder.mkdir()
-    cases = ((fifo, "FIFO"), (folder, "folder"), (Path("/dev/full"), "device"), (Path("/dev/null"), "device"))
+    cases = ((fifo, "a pipe"), (folder, "a folder"), (Path("/dev/full"), "a device"), (Path("/dev/null"), "a device"))
     for path, kind in cases:
         with pytest.raises(SpecificationError) as caught:
             check_output(path)
-        assert str(caught.value) == f"{path}: the output must be a regular file, not a {kind}"
+        assert str(caught.value) == f"{path}: the output must be a regular file, not {kind}"
         with pytest.raises(SpecificationError, match=f"^{path}: the recording must be a (regular )?file"):
             recording(path, COLUMNS)
 

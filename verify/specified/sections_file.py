@@ -11,10 +11,12 @@ import warnings
 from collections.abc import Sequence
 from decimal import Decimal
 from fractions import Fraction
+from io import BytesIO
 from itertools import chain
 from pathlib import Path
 from typing import Any
 
+from sosmith.verify.given_file import read_given
 from sosmith.verify.graph import RejectedError
 from sosmith.verify.specified.mat_matrices import doubles_in
 
@@ -35,7 +37,7 @@ def sections_in(path: Path) -> tuple[tuple[Fraction, ...], ...]:
     try:
         if path.stat().st_size > _MAX_BYTES:
             raise RejectedError(f"filter.sos_file must be at most {_MAX_BYTES} bytes, not longer")
-        rows, scale = _content(path)
+        rows, scale = _content(path.suffix.lower(), read_given(path, _MAX_BYTES))
     except RejectedError:
         raise
     except Exception as error:  # whatever a damaged file makes of its reader
@@ -60,19 +62,18 @@ def sections_in(path: Path) -> tuple[tuple[Fraction, ...], ...]:
     return tuple(map(tuple, made))
 
 
-def _content(path: Path) -> tuple[_Rows, list[Fraction]]:
-    suffix = path.suffix.lower()
+def _content(suffix: str, content: bytes) -> tuple[_Rows, list[Fraction]]:
     if suffix == ".npy":
         import numpy  # noqa: PLC0415 - slow to load, and seldom needed
 
-        with path.open("rb") as file, warnings.catch_warnings():
+        with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            return _rows(numpy.lib.format.read_array(file, allow_pickle=False)), []
+            return _rows(numpy.lib.format.read_array(BytesIO(content), allow_pickle=False)), []
     if suffix == ".mat":
-        held = doubles_in(path.read_bytes(), _MAX_BYTES)
+        held = doubles_in(content, _MAX_BYTES)
         scale = held.get("g", held.get("scalevalues"))
         return held["sos"], list(chain.from_iterable(scale or []))
-    text = path.read_text(encoding="utf-8-sig")
+    text = content.decode("utf-8-sig")
     lines = [re.split("[#%]", line)[0].strip(" \t,;") for line in text.splitlines()]
     cells = [re.split(r"[\s,;]+", line) for line in lines if line]
     if cells and cells[0][0][:1].isalpha():  # names of the columns

@@ -7,7 +7,11 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from sosmith.verify.certificate_file import AboutEntry, Certificate, certificate_text, sealed
+from sosmith.verify.given_file import read_given
 from sosmith.verify.graph import RejectedError, require
+
+_MAX_BYTES = 1 << 28
+"""Most bytes of a file: the longest netlists have some ten million."""
 
 
 def check_seal(certificate: Certificate, content: bytes) -> AboutEntry:
@@ -156,7 +160,7 @@ def content_of(path: Path) -> bytes:
         If it cannot be read.
     """
     try:
-        return path.read_bytes()
+        return read_given(path, _MAX_BYTES)
     except OSError as error:
         raise RejectedError(f"{path} must be a file that can be read, not: {error.strerror}") from None
 

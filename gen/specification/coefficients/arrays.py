@@ -29,7 +29,7 @@ from sosmith.gen.specification.coefficients.content import (
 from sosmith.gen.specification.coefficients.mat_file import matrices
 from sosmith.gen.specification.coefficients.text import of_rows
 from sosmith.model.errors import SpecificationError
-from sosmith.model.foreign_files import read_text
+from sosmith.model.foreign_files import opened, read_text
 
 MAX_BYTES = 1 << 22
 """Largest size of a file in bytes."""
@@ -66,7 +66,7 @@ def _numpy(path: Path, suffix: str) -> Content:
     what = f"a NumPy file {suffix}"
     try:
         # Objects could run code when they are read; a filter needs none.
-        with path.open("rb") as file, warnings.catch_warnings():
+        with opened(path) as file, warnings.catch_warnings():
             warnings.simplefilter("ignore")  # about headers of Python 2
             if suffix == ".npy":
                 return of_rows(path, _matrix(path, _array(path, file)), kind=what)
@@ -113,8 +113,10 @@ def _unfit(path: Path, shape: tuple[int, ...], kind: np.dtype[Any]) -> Specifica
 
 
 def _matlab(path: Path) -> Content:
+    with opened(path) as file:
+        content = file.read(MAX_BYTES)
     try:
-        held = matrices(path.read_bytes(), MAX_BYTES)
+        held = matrices(content, MAX_BYTES)
     except NotImplementedError:
         raise SpecificationError(
             f"{path}: the filter must be a MAT file up to version 7, not 7.3: save with -v7"

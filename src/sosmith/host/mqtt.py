@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
 import os
@@ -24,6 +25,7 @@ from sosmith.host.clock import utc_text
 from sosmith.host.outbox import MOST, Outbox
 from sosmith.host.readings import Readings
 from sosmith.model.errors import SpecificationError, ToolError
+from sosmith.model.foreign_files import opened
 
 if TYPE_CHECKING:
     from paho.mqtt.client import Client
@@ -148,7 +150,7 @@ _LONGEST = 4096  # characters of a line with credentials
 def _credentials(path: Path) -> tuple[str, str]:
     """Read ``user:password`` from a file that is its owner's alone."""
     try:
-        with path.open(encoding="utf-8") as file:
+        with io.TextIOWrapper(opened(path), encoding="utf-8") as file:
             about = os.fstat(file.fileno())
             if stat.S_IMODE(about.st_mode) & 0o077:
                 raise SpecificationError(

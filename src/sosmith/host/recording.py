@@ -6,13 +6,13 @@ import csv
 import fcntl
 import io
 import os
-import stat
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Protocol
 
 from sosmith.model.errors import SpecificationError, ToolError
+from sosmith.model.file_kinds import kind_of
 
 _JOURNAL = ".rows.csv"
 """What is added to the name of a Parquet file while it is recorded."""
@@ -71,7 +71,7 @@ def check_output(path: Path, *inputs: Path | None) -> None:
         If it may not.
     """
     if path.exists() and not path.is_file():
-        raise SpecificationError(f"{path}: the output must be a regular file, not a {_kind(path.stat().st_mode)}")
+        raise SpecificationError(f"{path}: the output must be a regular file, not {kind_of(path.stat().st_mode)}")
     for given in inputs:
         if given is not None and path.exists() and given.exists() and path.samefile(given):
             raise SpecificationError(f"{path}: the output must be another file than the input {given}, not the same")
@@ -149,9 +149,8 @@ class CsvRecording:
 
     def _take(self) -> None:
         """Check that the file is a regular one, and lock it."""
-        mode = os.fstat(self._file).st_mode
-        if not stat.S_ISREG(mode):
-            raise SpecificationError(f"{self._path}: the recording must be a regular file, not a {_kind(mode)}")
+        if found := kind_of(os.fstat(self._file).st_mode):
+            raise SpecificationError(f"{self._path}: the recording must be a regular file, not {found}")
         try:
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
@@ -274,9 +273,3 @@ def as_csv(rows: Iterable[Sequence[object]]) -> str:
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows(rows)
     return text.getvalue()
-
-
-def _kind(mode: int) -> str:
-    """Name what is no regular file."""
-    kinds = {stat.S_ISDIR: "folder", stat.S_ISFIFO: "FIFO", stat.S_ISSOCK: "socket", stat.S_ISCHR: "device"}
-    return next((name for test, name in kinds.items() if test(mode)), "device")

@@ -5,12 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 from sosmith.gen.specification.examples import DEFAULT, contents, titles
-from sosmith.model.foreign_files import read_text
+from sosmith.model.foreign_files import check_input, read_text
 from sosmith.model.text_files import check_file, to_json, write_contents, write_file, write_files
 
 __all__ = [
     "DEFAULT",
     "check_file",
+    "check_input",
     "contents",
     "default_folder",
     "read_text",
