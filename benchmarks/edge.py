@@ -22,6 +22,7 @@ from tests.edge.hostile_alarms import published
 from tests.edge.hostile_board import to_model, to_netlist
 from tests.edge.hostile_run import hostile_run
 from tests.edge.pages.hostile_page import attacked
+from tests.edge.processes import full_disks
 from tests.edge.processes.environments import COMMANDS, tried
 from tests.edge.processes.kills import duration, killed
 from tests.edge.processes.writers import QUICK, WHOLE
@@ -118,6 +119,27 @@ def environments(share: int) -> Rows:
     }
 
 
+def disks(share: int) -> Rows:
+    """Run commands on full disks: once for each path that they write, and each place that may be full."""
+    if not full_disks.possible():
+        sys.exit("full disks take a file system of their own: run this as a user who may have one (unshare -rm)")
+    cases = [(writer, place) for writer in full_disks.WRITERS for place in full_disks.PLACES][::share]
+    rng = random.Random(_FIRST)
+    found = [full_disks.tried(writer, place, rng.choice(full_disks.SIZES)) for writer, place in cases]
+    findings = [
+        f"{' '.join(case[0])}, {case[1]}: {one}"
+        for case, each in zip(cases, found, strict=True)
+        for one in each.findings
+    ]
+    _tell("disks", findings)
+    statuses = Counter(each.status for each in found)
+    return {
+        f"full disks, for {len(full_disks.WRITERS)} ways of commands to write, temporary files and caches": len(found),
+        **{f"full disks: calls that ended with status {status}": statuses[status] for status in sorted(statuses)},
+        "full disks: findings": len(findings),
+    }
+
+
 def alarms(share: int) -> Rows:
     """Publish alarms to a broker that is killed again and again."""
     with tempfile.TemporaryDirectory() as folder:
@@ -137,6 +159,7 @@ PARTS: dict[str, Callable[[int], Rows]] = {
     "page": page,
     "kills": kills,
     "environments": environments,
+    "disks": disks,
     "alarms": alarms,
 }
 

@@ -6,6 +6,7 @@ failed; 130 interrupted.
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import sys
@@ -14,6 +15,7 @@ from contextlib import suppress
 from functools import wraps
 from importlib import import_module
 from io import TextIOWrapper
+from tempfile import gettempdir
 from types import FrameType
 from typing import Any, NamedTuple
 
@@ -260,7 +262,7 @@ def main() -> None:
             raise
         status = _interrupted()
     except OSError as error:
-        note(f"error: {error.filename or 'the output'} must be readable and writable, not: {error.strerror}")
+        note(f"error: {_unusable(error)}")
         status = ToolError.exit_status
         silence_stdout()
     with suppress(OSError):  # a reader that has left
@@ -269,6 +271,12 @@ def main() -> None:
         note(f"error: {streams.lost}")
         status = ToolError.exit_status
     sys.exit(status)
+
+
+def _unusable(error: OSError) -> str:
+    if error.errno == errno.ENOSPC and error.filename is None:  # what was written is not known then
+        return f"the disks of the output and of {gettempdir()} must have room, not: {error.strerror}"
+    return f"{error.filename or 'the output'} must be readable and writable, not: {error.strerror}"
 
 
 def _interrupted() -> int:

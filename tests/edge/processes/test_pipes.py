@@ -14,18 +14,15 @@ import click
 import pytest
 
 import sosmith
-from sosmith.cli import cli, main
+from sosmith.cli import main
 from sosmith.model.errors import SpecificationError
-from sosmith.output_paths import OutputFile, OutputFolder
 from sosmith.verify.graph import RejectedError
 from tests.commands.command_line import QUICK
+from tests.edge.processes.every_command import paths_read
 from tests.gen.specification.bad_specifications import BASE, COEF
 
 SECONDS = 60
 """An end within this time, on however busy a machine."""
-
-WRITTEN = {("init", "file"), ("monitor", "mqtt_keep"), ("verify", "export")}
-"""Paths that are written, though their options are of the common kind."""
 
 PIPE = "a pipe, where a regular file is needed"
 
@@ -47,27 +44,6 @@ def an_end() -> Iterator[None]:
     finally:
         signal.alarm(0)
         signal.signal(signal.SIGALRM, before)
-
-
-def paths_read() -> Iterator[tuple[str, click.Command, click.Parameter]]:
-    """Yield each path that a command reads, with the command's name: all that the commands say of themselves."""
-
-    def inside(group: click.Group, name: str) -> Iterator[tuple[str, click.Command]]:
-        context = click.Context(group)
-        for part in group.list_commands(context):
-            command = group.get_command(context, part)
-            assert command is not None
-            if isinstance(command, click.Group):
-                yield from inside(command, f"{name}{part} ")
-            else:
-                yield name + part, command
-
-    for name, command in inside(cli, ""):
-        for parameter in command.params:
-            kind = parameter.type
-            is_read = isinstance(kind, click.Path) and not isinstance(kind, OutputFile | OutputFolder)
-            if is_read and (name, parameter.name) not in WRITTEN:
-                yield name, command, parameter
 
 
 def line(name: str, command: click.Command, parameter: click.Parameter, path: str) -> list[str]:
