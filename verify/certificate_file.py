@@ -132,9 +132,12 @@ class StageEntry(_Part):
 
 
 class SectionEntry(_Part):
-    """An ideal section: coefficients of powers of ``z**-1``, the constant one first."""
+    """An ideal section: coefficients of powers of ``z**-1``, the constant one first.
 
-    numerator: Annotated[tuple[Rational, ...], Field(min_length=1, max_length=3)]
+    Only the first one may have a numerator of more than three: all of that of a sampled filter.
+    """
+
+    numerator: Annotated[tuple[Rational, ...], Field(min_length=1, max_length=20)]
     denominator: Annotated[tuple[Rational, ...], Field(min_length=1, max_length=3)]
 
 

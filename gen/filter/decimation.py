@@ -27,9 +27,10 @@ import numpy as np
 from flint import arb, fmpq
 
 from sosmith.gen.filter.design import Array, Filter, design
+from sosmith.gen.filter.exact_form import Exact
 from sosmith.gen.filter.largest_gain import Peak, band_gains
 from sosmith.gen.filter.response import Complex, complex_response
-from sosmith.gen.filter.sections import Exact, Row
+from sosmith.gen.filter.sections import Row
 from sosmith.gen.specification.choices import AUTO, MAX_DECIMATION, MAX_RATIO
 from sosmith.gen.specification.specification import FilterSpec
 from sosmith.model.arithmetic.correct_rounding import evaluate, nearest_double, nearest_multiple

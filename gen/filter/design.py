@@ -18,19 +18,11 @@ import numpy as np
 import numpy.typing as npt
 from flint import acb, arb, fmpq
 
+from sosmith.gen.filter.exact_form import Exact, exact_bilinear, exact_form, given_form, pole_factors
 from sosmith.gen.filter.impulse_invariance import Aliasing, aliasing, impulse_invariant, simple_level
 from sosmith.gen.filter.minimum_order import least_order
 from sosmith.gen.filter.prototypes import Prototype, prototype
-from sosmith.gen.filter.sections import (
-    Exact,
-    Row,
-    Section,
-    exact_bits,
-    exact_sections,
-    given_sections,
-    rounded,
-    sections,
-)
+from sosmith.gen.filter.sections import Row, rounded, sections
 from sosmith.gen.filter.transformations import bilinear, unwarped, warped
 from sosmith.gen.quantity import frequency
 from sosmith.gen.specification.choices import MAX_DECIMATION
@@ -46,7 +38,6 @@ _DECAY = 1e-12  # relative to its envelope, where an impulse response counts as 
 _LONG = 1 << 15  # samples, beyond which responses are cut shorter where they are only estimated
 _COMFORTABLE = 20  # samples per period of the band edge; fewer hardly reduce the word lengths
 _UNITY = 1e-14  # relative distance within which the gain of given sections counts as one: rounding, not intent
-_LARGEST_RADIUS = 1 - 2.0**-52  # of a pole that a double can tell from 1
 _GRID = 2048  # frequencies up to half the sample rate at which given sections are evaluated
 
 
@@ -240,9 +231,10 @@ def design(spec: FilterSpec, sample_rate: Fraction | float) -> Filter:
     """
     fs = Fraction(sample_rate)
     if spec.sos is not None:
+        stated = spec.sos
         given = tuple(tuple(float(value) for value in row) for row in spec.sos)
         kind, rows = evaluate(lambda: _normalized(given))
-        exact = given_sections(spec.sos, _exact_bits(given))
+        exact = evaluate(lambda: given_form(stated))
         return _filter(spec, fs, "sections", kind, rows, exact, order=_poles(given))
     order, cutoff = evaluate(lambda: _order_and_cutoff(spec, fs))
     alias = None
@@ -321,29 +313,21 @@ def _prototype(spec: FilterSpec, order: int) -> Prototype:
     return prototype(spec.family, order, spec.passband_loss, spec.stopband_loss)
 
 
-def _bilinear(spec: FilterSpec, fs: Fraction) -> _Both:
-    order, edges = _order_and_edges(spec, fs)
-    digital = bilinear(_prototype(spec, order), spec.kind, edges)
-    return _both(sections(digital), digital.passing, digital.level, digital.level)
-
-
-def _sampled(spec: FilterSpec, order: int, ratio: Fraction) -> _Both:
-    made, level = impulse_invariant(_prototype(spec, order), ratio)
-    return _both(made, acb(1), level, simple_level(level))
-
-
 _Both = tuple[tuple[Row, ...], tuple[Exact, ...]]
 """Rounded to doubles, and exact."""
 
 
-def _both(made: Sequence[Section], passing: acb, level: arb, simple: arb) -> _Both:
-    rows = rounded(made, passing, simple)
-    return rows, exact_sections(made, passing, level, _exact_bits(rows))
+def _bilinear(spec: FilterSpec, fs: Fraction) -> _Both:
+    order, edges = _order_and_edges(spec, fs)
+    digital = bilinear(_prototype(spec, order), spec.kind, edges)
+    return rounded(sections(digital), digital.passing, digital.level), exact_bilinear(digital)
 
 
-def _exact_bits(rows: Sequence[Row]) -> int:
-    """Choose the fraction bits of exact coefficients by the poles of their doubles."""
-    return exact_bits([min(_radius(row[4], row[5]), _LARGEST_RADIUS) for row in rows for _ in range(_poles([row]))])
+def _sampled(spec: FilterSpec, order: int, ratio: Fraction) -> _Both:
+    sampled = impulse_invariant(_prototype(spec, order), ratio)
+    rows = rounded(sampled.sections(), acb(1), simple_level(sampled.level))
+    over = [tap.real for tap in sampled.numerator.coeffs()]
+    return rows, exact_form(over, [], pole_factors(sampled.pole_pairs, sampled.real_poles))
 
 
 def _poles(rows: Sequence[Row]) -> int:

@@ -220,7 +220,8 @@ def _sampled(content: ZerosAndPoles, sample_rate: Fraction) -> Factored:
         pole_pairs=tuple(acb(ball(re), ball(im)) / unit for re, im in content.poles if im > 0),
         dc_gain=level,
     )
-    made, gain = impulse_invariant(prototype, Fraction(1, 4))
+    sampled = impulse_invariant(prototype, Fraction(1, 4))
+    made, gain = sampled.sections(), sampled.level
     rows = _signed(rounded(made, acb(1), abs(gain)), negative=gain < 0)
     grid = [_on_circle(k) for k in range(_GRID + 1)]
     exact = [_product(made, z) * gain / _product(made, acb(1)) for z in grid]

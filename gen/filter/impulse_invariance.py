@@ -53,8 +53,8 @@ class Aliasing:
     dc_error: float
 
 
-def impulse_invariant(prototype: Prototype, ratio: Fraction) -> tuple[list[Section], arb]:
-    """Sections of the filter that samples the impulse response of an analog low-pass, and its gain at zero frequency.
+def impulse_invariant(prototype: Prototype, ratio: Fraction) -> Sampled:
+    """Sample the impulse response of an analog low-pass.
 
     Parameters
     ----------
@@ -63,22 +63,16 @@ def impulse_invariant(prototype: Prototype, ratio: Fraction) -> tuple[list[Secti
     ratio : Fraction
         Cutoff divided by the sample rate, not pre-warped.
 
-    Returns
-    -------
-    list of Section
-        Poles closest to the unit circle come last, as in scipy; numerators are not scaled.
-    arb
-        The gain at zero frequency; `simple_level` is it for hardware.
-
     Raises
     ------
     ValueError
         If the poles do not outnumber the zeros.
-    UndecidedError
-        If the precision is too low.
     """
-    sampled = _Sampled.of(prototype, ratio)
-    return _sections(sampled.numerator, prototype, sampled.model.scale), sampled(acb(1)).real
+    if prototype.zeros_at_infinity < 1:
+        raise ValueError(f"zeros must be fewer than the {prototype.order} poles, not {2 * len(prototype.zeros)}")
+    model = _Analog.of(prototype, 2 * arb.pi() * ball(ratio))
+    denominators = tuple(acb_poly([1, -pole.exp()]) for pole in model.poles)
+    return Sampled(prototype, model, _numerator(model, denominators), denominators)
 
 
 def simple_level(level: arb) -> arb:
@@ -88,10 +82,10 @@ def simple_level(level: arb) -> arb:
 
 def aliasing(prototype: Prototype, ratio: Fraction) -> Aliasing:
     """Compare the filter of `impulse_invariant` with its analog model; parameters and errors as there."""
-    sampled = _Sampled.of(prototype, ratio)
+    sampled = impulse_invariant(prototype, ratio)
     model = sampled.model
     level = prototype.dc_gain
-    dc_error = nearest_double(sampled(acb(1)).real / level - 1)
+    dc_error = nearest_double(sampled.level / level - 1)
     slowest = _smallest([abs(pole) for pole in model.poles])
     start = _smallest([slowest / arb.pi(), arb(1)]) / 10**_DECADES  # relative to half the sample rate
     even = [arb(k) / (_GRID - 1) for k in range(_GRID)]
@@ -143,21 +137,13 @@ class _Analog:
 
 
 @dataclass(frozen=True)
-class _Sampled:
-    """The digital filter in ``w = z**-1``, and its analog model."""
+class Sampled:
+    """A digital filter in ``w = z**-1``, and the analog filter whose impulse response it samples."""
 
+    prototype: Prototype
+    model: _Analog
     numerator: acb_poly
     denominators: tuple[acb_poly, ...]
-    model: _Analog
-
-    @classmethod
-    def of(cls, prototype: Prototype, ratio: Fraction) -> _Sampled:
-        """Sample the impulse response of a prototype."""
-        if prototype.zeros_at_infinity < 1:
-            raise ValueError(f"zeros must be fewer than the {prototype.order} poles, not {2 * len(prototype.zeros)}")
-        model = _Analog.of(prototype, 2 * arb.pi() * ball(ratio))
-        denominators = tuple(acb_poly([1, -pole.exp()]) for pole in model.poles)
-        return cls(_numerator(model, denominators), denominators, model)
 
     def __call__(self, w: acb) -> acb:
         value: acb = self.numerator(w)
@@ -165,20 +151,40 @@ class _Sampled:
             value /= denominator(w)
         return value
 
+    @property
+    def level(self) -> arb:
+        """The gain at zero frequency; `simple_level` is it for hardware."""
+        return self(acb(1)).real
 
-def _sections(numerator: acb_poly, prototype: Prototype, scale: arb) -> list[Section]:
-    single = [(pole * scale).exp() for pole in prototype.real_poles]
-    pairs = [(pole * scale).exp() for pole in prototype.pole_pairs]
-    groups = _zero_groups(numerator, delayed=prototype.zeros_at_infinity > 1)
-    matched = []
-    for pole in sorted(pairs, key=lambda pole: nearest_double(1 - abs(pole) ** 2)):
-        distances = [
-            min((nearest_double(abs(zero - pole) ** 2) for zero in group.zeros), default=float("inf"))
-            for group in groups
-        ]
-        group = groups.pop(distances.index(min(distances)))
-        matched.append(_section(group, acb_poly([1, -2 * pole.real, abs(pole) ** 2])))
-    return [*(_section(_Group(acb_poly([1]), ()), acb_poly([1, -pole])) for pole in single), *matched[::-1]]
+    @property
+    def real_poles(self) -> list[arb]:
+        """Its poles in the z-plane that are real."""
+        return [(pole * self.model.scale).exp() for pole in self.prototype.real_poles]
+
+    @property
+    def pole_pairs(self) -> list[acb]:
+        """One of each conjugate pair of its poles in the z-plane."""
+        return [(pole * self.model.scale).exp() for pole in self.prototype.pole_pairs]
+
+    def sections(self) -> list[Section]:
+        """Return its sections; poles closest to the unit circle come last, and numerators are not scaled.
+
+        Raises
+        ------
+        UndecidedError
+            If the precision is too low.
+        """
+        groups = _zero_groups(self.numerator, delayed=self.prototype.zeros_at_infinity > 1)
+        matched = []
+        for pole in sorted(self.pole_pairs, key=lambda pole: nearest_double(1 - abs(pole) ** 2)):
+            distances = [
+                min((nearest_double(abs(zero - pole) ** 2) for zero in group.zeros), default=float("inf"))
+                for group in groups
+            ]
+            group = groups.pop(distances.index(min(distances)))
+            matched.append(_section(group, acb_poly([1, -2 * pole.real, abs(pole) ** 2])))
+        single = [_section(_Group(acb_poly([1]), ()), acb_poly([1, -pole])) for pole in self.real_poles]
+        return [*single, *matched[::-1]]
 
 
 def _numerator(model: _Analog, denominators: Sequence[acb_poly]) -> acb_poly:

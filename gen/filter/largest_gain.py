@@ -23,7 +23,7 @@ from heapq import heappop, heappush
 
 from flint import acb, arb, ctx
 
-from sosmith.gen.filter.sections import Exact
+from sosmith.gen.filter.exact_form import Exact
 from sosmith.model.arithmetic.correct_rounding import ball, evaluate, nearest_multiple
 
 TOLERANCE = Fraction(1, 1 << 10)

@@ -5,33 +5,25 @@ gain of a section at its reference frequency is then accurate to one rounding, e
 unit circle that rounding a1 or a2 alone would change the gain by much more. All choices compare correctly rounded
 numbers, so that equal distances are equal on every machine.
 
-What proofs compare the hardware with is not these doubles but `exact_sections`, which have as many more bits as the
-poles' distance from the unit circle asks for.
+What proofs compare the hardware with is not these doubles but the exact filter (`sosmith.gen.filter.exact_form`), which
+has as many more bits as the poles' distance from the unit circle asks for.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 
 from flint import acb, arb
 
 from sosmith.gen.filter.transformations import DigitalFilter
-from sosmith.model.arithmetic.correct_rounding import ball, nearest_double, nearest_multiple
+from sosmith.model.arithmetic.correct_rounding import ball, nearest_double
 
 Row = tuple[float, ...]
 """(b0, b1, b2, 1, a1, a2)."""
 
 Quadratic = tuple[arb, arb, arb]
 """Coefficients of 1, 1/z and 1/z**2."""
-
-Exact = tuple[tuple[Fraction, ...], tuple[Fraction, ...]]
-"""Numerator and denominator of a section: coefficients of 1, 1/z and 1/z**2, without trailing zeros."""
-
-_SPARE_BITS = 192
-"""Fraction bits of exact coefficients if all poles lie at z = 0."""
 
 
 @dataclass(frozen=True)
@@ -126,51 +118,6 @@ def rounded(made: Sequence[Section], passing: acb, level: arb) -> tuple[Row, ...
             gain *= level
         rows.append((*(nearest_double(gain * value) for value in section.numerator), *denominator))
     return tuple(rows)
-
-
-def exact_sections(made: Sequence[Section], passing: acb, level: arb, frac: int) -> tuple[Exact, ...]:
-    """Round the coefficients of sections, scaled as by `rounded`, to `frac` fraction bits.
-
-    Raises
-    ------
-    UndecidedError
-        If a number does not round to one multiple.
-    """
-    result = []
-    for index, section in enumerate(made):
-        gain = _magnitude(section.denominator, passing) / _magnitude(section.numerator, passing)
-        if index == 0:
-            gain *= level
-        numerator = [nearest_multiple(gain * value, frac) for value in section.numerator]
-        result.append(_shortened(numerator, [nearest_multiple(value, frac) for value in section.denominator]))
-    return tuple(result)
-
-
-def given_sections(rows: Sequence[Sequence[Fraction]], frac: int) -> tuple[Exact, ...]:
-    """Round given sections (b0, b1, b2, 1, a1, a2) to `frac` fraction bits."""
-    nearest = [[Fraction(round(value * 2**frac), 2**frac) for value in row] for row in rows]
-    return tuple(_shortened(row[:3], row[3:]) for row in nearest)
-
-
-def _shortened(numerator: Sequence[Fraction], denominator: Sequence[Fraction]) -> Exact:
-    """Drop the trailing zeros of a section's polynomials."""
-    first, second = (
-        tuple(values[: max((k + 1 for k, value in enumerate(values) if value), default=1)])
-        for values in (numerator, denominator)
-    )
-    return first, second
-
-
-def exact_bits(radii: Sequence[float]) -> int:
-    """Choose the fraction bits of exact coefficients for poles of the given radii, below 1.
-
-    An error of a coefficient is amplified by at most the product of ``1 / (1 - radius)**2`` over all poles: the
-    filter's impulse response is then off by about ``2**-_SPARE_BITS`` at most.
-    """
-    amplification = Fraction(1)
-    for radius in radii:
-        amplification /= (1 - Fraction(radius)) ** 2
-    return _SPARE_BITS + math.ceil(amplification).bit_length()
 
 
 def _magnitude(polynomial: Sequence[arb], z: acb) -> arb:

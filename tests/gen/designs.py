@@ -9,7 +9,7 @@ from typing import Any
 
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.filter.design import Filter
-from sosmith.gen.filter.sections import given_sections
+from sosmith.gen.filter.exact_form import rounded_rows
 from sosmith.gen.specification.specification import load
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -39,4 +39,4 @@ def parallel_design(name: str, **options: Any) -> CoreDesign:
 def with_rows(filter_: Filter, rows: Iterable[Sequence[float]]) -> Filter:
     """Return a filter with other sections, which are exact as they are."""
     made = tuple(tuple(map(float, row)) for row in rows)
-    return replace(filter_, rows=made, exact=given_sections([list(map(Fraction, row)) for row in made], 1100))
+    return replace(filter_, rows=made, exact=rounded_rows([list(map(Fraction, row)) for row in made], 1100))

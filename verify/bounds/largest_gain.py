@@ -20,7 +20,7 @@ from fractions import Fraction
 from functools import reduce
 from operator import mul
 
-from flint import arb, arb_poly, ctx, fmpq, fmpq_poly
+from flint import arb, arb_poly, ctx, fmpq, fmpq_poly, fmpz_poly
 
 from sosmith.verify.bounds.l1_response import UndecidedError, fraction
 from sosmith.verify.certificate_file import DecimationEntry, SectionEntry
@@ -154,9 +154,12 @@ def _right_side(entry: DecimationEntry, band: int, frequency: arb) -> arb:
 
 
 def _square(taps: Sequence[Fraction]) -> fmpq_poly:
-    """Squared magnitude of up to three taps, in the cosine: ``cos 2 w`` is ``2 x**2 - 1``."""
-    b0, b1, b2 = (*taps, Fraction(0), Fraction(0))[:3]
-    return fmpq_poly([_fmpq(b0**2 + b1**2 + b2**2 - 2 * b0 * b2), _fmpq(2 * b1 * (b0 + b2)), _fmpq(4 * b0 * b2)])
+    """Squared magnitude of taps, in the cosine: that of k times the angle is the Chebyshev polynomial T_k."""
+    square = fmpq_poly([])
+    for k in range(len(taps)):
+        apart = sum((one * other for one, other in zip(taps, taps[k:], strict=False)), Fraction(0))
+        square += fmpq_poly(fmpz_poly.chebyshev_t(k)) * _fmpq(apart * min(k + 1, 2))
+    return square
 
 
 def _frequency(x: Fraction) -> arb:

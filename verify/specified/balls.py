@@ -24,5 +24,14 @@ def upper_limit(value: arb) -> Fraction:
     True
     """
     with ctx.workprec(64):
-        mantissa, exponent = value.upper().man_exp()
+        return fraction_of(value.upper())
+
+
+def fraction_of(point: arb) -> Fraction:
+    """Return what a ball without a radius holds.
+
+    >>> fraction_of(arb(0.75))
+    Fraction(3, 4)
+    """
+    mantissa, exponent = point.man_exp()
     return Fraction(int(mantissa)) * Fraction(2) ** int(exponent)

@@ -24,6 +24,25 @@ from sosmith.verify.specified.balls import ball
 from sosmith.verify.specified.filter_table import FilterTable, read_filter_table
 from sosmith.verify.specified.smallest_order import edge_from_passband, smallest_order
 
+Taps = Sequence[arb]
+"""A real factor in w with one root or two: its coefficients behind the leading 1."""
+
+
+class Factors(NamedTuple):
+    """The true filter: a polynomial in w times the quotient of the products of real factors that begin with 1.
+
+    `first` is the filter's first sample, or all of the numerator of a sampled filter, which has no `zeros`.
+    """
+
+    first: Taps
+    zeros: list[Taps]
+    poles: list[Taps]
+
+    def multiplied(self) -> TransferFunction:
+        """Return numerator and denominator."""
+        over, under = (prod((arb_poly([1, *taps]) for taps in each), start=arb_poly([1])) for each in self[1:])
+        return TransferFunction(arb_poly(list(self.first)) * over, under)
+
 
 class TransferFunction(NamedTuple):
     """Polynomials in ``w = 1/z`` whose balls contain the true coefficients; the denominator begins with 1."""
@@ -53,15 +72,21 @@ class StatedFilter:
             If no supported order meets the stated edges and losses.
         """
         with ctx.workprec(bits):
-            stated = self._transfer_function()
+            stated = _product(self.table.rows) if self.table.rows else self.factors().multiplied()
             return stated._replace(
                 numerator=stated.numerator * arb_poly([ball(1 + self.correction), ball(-self.correction)])
             )
 
-    def _transfer_function(self) -> TransferFunction:
-        """Return what the table itself states, at the present precision."""
-        if self.table.rows:
-            return _product(self.table.rows)
+    def factors(self) -> Factors:
+        """Return what a table without `rows` states, but for the correction, at the present precision.
+
+        Raises
+        ------
+        UndecidedError
+            If the precision is too low.
+        SpecificationError
+            If no supported order meets the stated edges and losses.
+        """
         if self.table.method == "impulse_invariant":
             return _impulse_invariant(self._prototype(self.table.order or 0), self.table.cutoff[0])
         order, band = self._order_and_band()
@@ -165,33 +190,73 @@ def _product(rows: Sequence[Sequence[Fraction]]) -> TransferFunction:
     )
 
 
-def _real(polynomial: acb_poly) -> arb_poly:
-    """Real part of a polynomial whose true coefficients are real."""
-    return arb_poly([value.real for value in polynomial.coeffs()])
+def _one_of_each(roots: Sequence[acb]) -> list[acb]:
+    """Return the roots that are real and, of each conjugate pair, the one above the real axis."""
+    return [root for root in roots if root.imag.is_zero() or root.imag > 0]
 
 
-def _normalized(numerator: acb_poly, denominator: acb_poly) -> TransferFunction:
-    above, below = _real(numerator), _real(denominator)
-    first = below[0]
-    if first.contains(0):
-        raise UndecidedError("the stated filter could not be enclosed")
-    coefficients = [value / first for value in below.coeffs()]
-    return TransferFunction(arb_poly([value / first for value in above.coeffs()]), arb_poly([1, *coefficients[1:]]))
-
-
-def _bilinear(prototype: AnalogPrototype, kind: str, band: _Band) -> TransferFunction:
+def _bilinear(prototype: AnalogPrototype, kind: str, band: _Band) -> Factors:
     minus, plus = acb_poly([1, -1]), acb_poly([1, 1])
     up, down = minus, plus * acb(band.width)
+    infinite = [plus]
     if band.product is not None:
         up, down = minus**2 + plus**2 * acb(band.product), minus * plus * acb(band.width)
+        infinite = [minus, plus]
     if kind in {"highpass", "bandstop"}:
         up, down = (plus * acb(band.width), minus) if band.product is None else (down, up)
-    numerator = prod((down - up * (1 / zero) for zero in prototype.zeros), start=acb_poly([prototype.gain]))
-    denominator = prod((down - up * (1 / pole) for pole in prototype.poles), start=acb_poly([1]))
-    return _normalized(numerator * down ** (len(prototype.poles) - len(prototype.zeros)), denominator)
+        infinite = [down]
+    zeros, poles = (
+        [(root, down - up * (1 / root)) for root in _one_of_each(roots)] for roots in (prototype.zeros, prototype.poles)
+    )
+    beyond = len(prototype.poles) - len(prototype.zeros)
+    first = prototype.gain * down[0].real ** beyond
+    for factors, power in ((zeros, 1), (poles, -1)):
+        for root, factor in factors:
+            first *= factor[0].real ** power if root.imag.is_zero() else _square(factor[0]) ** power
+    if not first.is_finite():
+        raise UndecidedError("the stated filter could not be enclosed")
+    at_infinity = [_taps(factor) for factor in infinite] * beyond
+    return Factors(
+        [first],
+        [*at_infinity, *(taps for root, factor in zeros for taps in _real_factors(root, factor))],
+        [taps for root, factor in poles for taps in _real_factors(root, factor)],
+    )
 
 
-def _impulse_invariant(prototype: AnalogPrototype, ratio: Fraction) -> TransferFunction:
+def _real_factors(root: acb, factor: acb_poly) -> list[Taps]:
+    """Return the real factors that become of one real root of the prototype, or of a conjugate pair.
+
+    `factor` is what becomes of the root itself: it has the degree 1, or 2 in a band.
+    """
+    if root.imag.is_zero():
+        return [_taps(factor)]
+    first, second = factor[1] / factor[0], factor[2] / factor[0]
+    if factor.degree() == 1:
+        return [_pair(-first)]
+    middle, apart = -first / 2, _root(first**2 / 4 - second)
+    return [_pair(middle + apart), _pair(middle - apart)]
+
+
+def _pair(place: acb) -> Taps:
+    """Return the factor ``(1 - p w)(1 - p' w)`` of a place p in the z-plane and its conjugate."""
+    return [-2 * place.real, _square(place)]
+
+
+def _taps(factor: acb_poly) -> Taps:
+    """Return what is behind the leading 1 of a polynomial whose true coefficients are real."""
+    return [(value / factor[0]).real for value in factor.coeffs()[1:]]
+
+
+def _root(value: acb) -> acb:
+    """Return a square root, away from the negative real axis, where those of a ball would be both."""
+    return (-value).sqrt() * acb(0, 1) if value.real < 0 else value.sqrt()
+
+
+def _square(value: acb) -> arb:
+    return value.real**2 + value.imag**2
+
+
+def _impulse_invariant(prototype: AnalogPrototype, ratio: Fraction) -> Factors:
     """Return ``T sum(R / (1 - exp(p T) w))`` over the poles p and residues R of the filter with its edge at `ratio`."""
     edge = 2 * arb.pi() * ball(ratio)  # rad per sample
     poles = prototype.poles
@@ -202,4 +267,9 @@ def _impulse_invariant(prototype: AnalogPrototype, ratio: Fraction) -> TransferF
         over = prod((1 - pole / zero for zero in prototype.zeros), start=-edge * pole * prototype.gain)
         under = prod((1 - pole / poles[i] for i in others), start=acb(1))
         numerator += prod((factors[i] for i in others), start=acb_poly([over / under]))
-    return _normalized(numerator, prod(factors, start=acb_poly([1])))
+    places = [(pole, (edge * pole).exp()) for pole in _one_of_each(poles)]
+    return Factors(
+        [numerator[k].real for k in range(len(poles))],
+        [],
+        [[-place.real] if pole.imag.is_zero() else _pair(place) for pole, place in places],
+    )

@@ -3,7 +3,7 @@
 The specification's numbers are taken as they are written, as decimal fractions. Ports, allowed error and calibration
 must equal the certificate's entries exactly. The filter is derived again from its words, by
 `sosmith.verify.specified.ideal_filter`; the certificate's rational sections must be so close to it that every
-claim holds against it as well.
+claim holds against it as well, and have the very digits that follow from it (`sosmith.verify.specified.exact_form`).
 """
 
 from __future__ import annotations
@@ -17,8 +17,9 @@ from pathlib import Path
 from typing import Any
 
 from sosmith.verify.bounds.l1_response import UndecidedError
-from sosmith.verify.certificate_file import Certificate, PortEntry
+from sosmith.verify.certificate_file import Certificate, PortEntry, SectionEntry
 from sosmith.verify.graph import RejectedError, require
+from sosmith.verify.specified.exact_form import exact_sections
 from sosmith.verify.specified.filter_distance import distance
 from sosmith.verify.specified.ideal_filter import stated_filter
 from sosmith.verify.specified.sections_file import sections_in
@@ -130,7 +131,9 @@ def _filter_distance(certificate: Certificate, tree: Mapping[str, Any], margin: 
     if "sos_file" in table:
         table["sos"] = sections_in(folder / table.pop("sos_file"))
     try:
-        apart = distance(stated_filter(table, rate, correction), certificate.ideal.sections)
+        wanted = stated_filter(table, rate, correction)
+        apart = distance(wanted, certificate.ideal.sections)
+        exact = exact_sections(wanted)
     except UndecidedError as error:
         raise RejectedError(f"the filter could not be compared with the specified one: {error}") from None
     require(
@@ -138,7 +141,19 @@ def _filter_distance(certificate: Certificate, tree: Mapping[str, Any], margin: 
         f"the filter must be the specified one within a peak gain of {float(margin):.3g}, "
         f"not differ from it by up to {float(apart):.3g}",
     )
+    _check_digits(certificate.ideal.sections, exact)
     return apart
+
+
+def _check_digits(found: Sequence[SectionEntry], exact: Sequence[SectionEntry]) -> None:
+    """Check that the exact filter has the very digits that follow from the words, so that it is no other one."""
+    require(len(found) == len(exact), f"the exact filter must have {len(exact)} sections, not {len(found)}")
+    for k, (section, wanted) in enumerate(zip(found, exact, strict=True)):
+        for name in SectionEntry.model_fields:
+            require(
+                getattr(section, name) == getattr(wanted, name),
+                f"the {name} of section {k} of the exact filter must have the digits that follow from the words",
+            )
 
 
 def _check_polynomial(found: Sequence[Sequence[Fraction]], stated: Sequence[Sequence[Any]]) -> None:
