@@ -2,8 +2,8 @@
 
 python requirements/bill.py dist/sosmith.cdx.json
 
-It is made of `base.txt` and `boards.txt` beside it, in the environment that `audit.txt` describes, and is the same bytes from
-the same files.
+It is made of `base.txt` and `boards.txt` beside it, in the environment of `audit.txt`. The same files give the
+same bytes.
 """
 
 import re
