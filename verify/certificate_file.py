@@ -1,8 +1,8 @@
 """The file format of a certificate.
 
-A certificate is a JSON text. Integers are JSON integers, rationals are strings ``"p/q"``; there are no
-floating-point numbers in it. The sum of an infinite series is stored as the next multiple of ``2**-64`` above it
-(`on_grid`), so that anyone who computes it accurately enough gets the same number.
+A certificate is a JSON text. Integers are JSON integers, rationals are strings ``"p/q"`` in lowest terms, or ``"p"``;
+there are no floating-point numbers in it. The sum of an infinite series is stored as the next multiple of ``2**-64``
+above it (`on_grid`), so that anyone who computes it accurately enough gets the same number.
 """
 
 from __future__ import annotations
@@ -41,7 +41,10 @@ def _rational(value: object) -> object:
     match = _RATIONAL.fullmatch(value) if isinstance(value, str) else None
     if match is None or int(match[2] or 1) == 0:
         raise ValueError('must be a rational number as a text "p/q"')
-    return Fraction(int(match[1]), int(match[2] or 1))
+    found = Fraction(int(match[1]), int(match[2] or 1))
+    if str(found) != value:
+        raise ValueError('must be a rational number in lowest terms as a text "p/q", or "p"')
+    return found
 
 
 Rational = Annotated[Fraction, BeforeValidator(_rational), PlainSerializer(str)]

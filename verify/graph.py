@@ -74,7 +74,9 @@ def check_graph(stage: StageEntry) -> None:
         unused = (node.parameter, node.parameter_frac)[_PARAMETERS.get(node.op, 0) :]
         require(not any(unused), f"{name} must have no parameter that it does not use, not {unused}")
         require(node.low <= node.high, f"{name} must have a range that rises, not {node.low}..{node.high}")
-        if wanted:
+    for index, node in enumerate(stage.nodes):
+        name = label(stage, index)
+        if node.operands:
             frac, low, high = _expected(stage, node, name)
             require(node.frac == frac, f"{name} must have {frac} fraction bits, not {node.frac}")
             require(

@@ -486,6 +486,20 @@ def test_the_grid_is_above() -> None:
     assert on_grid(Fraction(-1, 3)) - unit <= Fraction(-1, 3) < on_grid(Fraction(-1, 3))
 
 
+@pytest.mark.parametrize("operands", [[14], [1007], []])
+def test_a_node_that_refers_to_a_later_one_without_operands(operands: list[int]) -> None:
+    """The range of a delay is looked up at its source: all references are checked before."""
+    tree = json.loads(text_of(BENCH))
+    stage, index = next(
+        (stage, index)
+        for stage in tree["stages"]
+        for index, node in enumerate(stage["nodes"])
+        if node["op"] == "delay" and stage["nodes"][node["operands"][0]]["op"] == "bound"
+    )
+    stage["nodes"][stage["nodes"][index]["operands"][0]]["operands"] = operands
+    rejected(tree, r"node \d+ \(bound .*\) of .* must have (1 operands, not 0|operands before it, not .*)")
+
+
 # The file and the command.
 
 
@@ -521,6 +535,14 @@ def test_what_is_no_certificate(text: str, message: str, tmp_path: Path) -> None
         (("format",), "sosmith certificate 1", "it must be 'sosmith certificate 2'"),
         (("max_error",), 1, 'it must be a rational number as a text "p/q"'),
         (("max_error",), "1/0", 'it must be a rational number as a text "p/q"'),
+        *(
+            (("max_error",), text, 'it must be a rational number in lowest terms as a text "p/q", or "p"')
+            for text in ("2/4", "1/1", "01", "-0", "0/1", "1/04096")
+        ),
+        *(
+            (("max_error",), text, 'it must be a rational number as a text "p/q"')
+            for text in ("+1", " 1", "1\n", "1e0", "1.0", "0x1", "\uff11", "\u0661/2", "1/-2", "--1", "1//2", "1_0", "")
+        ),
         (("inputs", 0, "bits"), 33, "it must be at most 32"),
         (("inputs", 0, "bits"), "16", "it must be an integer"),
         (("inputs", 0, "bits"), 1, "it must be at least 2"),
@@ -566,7 +588,7 @@ def test_a_kind_of_mistake_without_a_sentence_of_ours(tmp_path: Path, monkeypatc
 
 
 def test_a_file_that_cannot_be_read(tmp_path: Path) -> None:
-    for path, reason in ((tmp_path, "Is a directory"), (tmp_path / "none", "No such file or directory")):
+    for path, reason in ((tmp_path, "it is no regular file"), (tmp_path / "none", "No such file or directory")):
         message = f"{path}: the certificate must be a file that can be read, not: {reason}"
         with pytest.raises(SpecificationError, match=f"^{re.escape(message)}$"):
             read_certificate(path)

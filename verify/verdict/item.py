@@ -53,12 +53,14 @@ def check_item(certificate: Certificate, item: ItemEntry) -> None:
     """
     entry = certificate.decimation
     _same("core", item.core, core_of(certificate))
+    if certificate.about is not None and "core" in certificate.about.options:
+        _same("core", certificate.about.options["core"], item.core)
     _same("start", item.start, certificate.ideal.start or "zero")
     _same("architecture", item.architecture == "online", certificate.claims.online is not None, "online")
     _same("ahead", item.ahead is not None, entry is not None and entry.calibration is not None, "there")
     require(entry is not None or not item.hold, "hold of the item must not be stated without a decimator")
     require(item.channels == 1 or item.samples == 1, "several samples a clock must be those of one channel")
-    _same("flags", item.flags, _STATUS)
+    _same("flags", [*item.flags.items()], [*_STATUS.items()])
     _check_codes(certificate, item)
     dest = -(-(item.channels - 1).bit_length() // _BYTE) * _BYTE
     _check_stream("taken", item.taken, certificate.inputs, item.samples, dest, 0)
@@ -94,9 +96,9 @@ def _check_stream(
             FieldEntry(name=port.name, offset=offset, width=port.bits, signed=port.signed, lsb=port.lsb, zero=port.zero)
         )
         offset += -(-port.bits // _BYTE) * _BYTE
-    wanted = StreamEntry(width=offset * samples, dest_width=dest, user_width=user, fields=tuple(fields))
-    for key in StreamEntry.model_fields:
-        _same(f"{key} of {name}", getattr(stream, key), getattr(wanted, key))
+    wanted = {"width": offset * samples, "dest_width": dest, "user_width": user, "fields": tuple(fields)}
+    for key, value in wanted.items():
+        _same(f"{key} of {name}", getattr(stream, key), value)
 
 
 def _same(what: str, stated: object, proven: object, state: str = "") -> None:
@@ -193,10 +195,9 @@ def whole_core(tree: Mapping[str, Any]) -> str:
 
 
 def file_names(name: str, item: ItemEntry | None) -> list[str]:
-    """Return the names of the files that are written with a certificate."""
-    ends = ["c", "h", "il", "json", "sv", *(("rdl",) if item is not None and item.reload else ())]
-    registers = [f"{name}_registers.h"] if item is not None and item.reload else []
-    return sorted([*(f"{name}.{end}" for end in ends), *registers])
+    """Return the names of the files that are written with a certificate, in their order."""
+    registers = ["_registers.h", ".rdl"] if item is not None and item.reload else []
+    return [f"{name}{end}" for end in (".sv", ".il", ".json", ".c", ".h", *registers)]
 
 
 def check_ports(top: Module, item: ItemEntry) -> None:

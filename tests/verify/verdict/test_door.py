@@ -130,7 +130,7 @@ def test_an_empty_module_is_no_core(manifest: str, copy: Callable[..., Path]) ->
         ({"ahead": "parallel"}, "ahead of the item must not be there, as in the certificate"),
         ({"architecture": "online"}, "architecture of the item must not be online, as in the certificate"),
         ({"flags": {"input_at_rail": 3}}, "flags of the item must be .*"),
-        ({"reload": True}, "the files of the certificate must be plain.c, .*plain_registers.h, not .*"),
+        ({"reload": True}, "the files of the certificate must be plain.sv, .*plain_registers.h, plain.rdl, not .*"),
     ],
 )
 def test_the_item_agrees_with_what_is_proven(fields: Tree, sentence: str, copy: Callable[..., Path]) -> None:
@@ -176,8 +176,53 @@ def test_the_set_of_files_is_the_expected_one(missing: str, copy: Callable[..., 
             : None if missing != ".." else 0
         ]
 
-    with pytest.raises(RejectedError, match=r"^the files of the certificate must be plain.c, .*plain.sv, not "):
+    with pytest.raises(RejectedError, match=r"^the files of the certificate must be plain.sv, .*plain.h, not "):
         proof(forge(copy(PARALLEL), without))
+
+
+def turned(*place: str) -> Callable[[Tree], None]:
+    """Return an edit that turns the order of a list or an object."""
+
+    def edit(tree: Tree) -> None:
+        for key in place[:-1]:
+            tree = tree[key]
+        found = tree[place[-1]]
+        tree[place[-1]] = found[::-1] if isinstance(found, list) else dict(reversed(found.items()))
+
+    return edit
+
+
+def about(key: str, **fields: str) -> Callable[[Tree], None]:
+    return lambda tree: tree["about"][key].update(fields)
+
+
+@pytest.mark.parametrize(
+    ("edit", "sentence"),
+    [
+        (turned("about", "files"), "the files of the certificate must be plain.sv, .*, not plain.h, .*"),
+        (turned("about", "item", "flags"), "flags of the item must be .*"),
+        (turned("about", "versions"), "the versions in the certificate must be of sosmith, amaranth, .*"),
+        (
+            turned("claims", "budget"),
+            "the parts of the budget must be filter coefficients, .*",
+        ),
+        (about("versions", proof="audited"), "the versions in the certificate must be of sosmith, amaranth, .*"),
+        (about("versions", amaranth="the best"), "the version of amaranth must be a plain one, not 'the best'"),
+        (about("versions", amaranth="0.5\n1"), r"the version of amaranth must be a plain one, not '0\.5\\n1'"),
+        (about("versions", amaranth="\u0663.1"), "the version of amaranth must be a plain one, not .*"),
+        (about("versions", amaranth=""), "the version of amaranth must be a plain one, not ''"),
+        (lambda tree: tree["about"]["versions"].pop("amaranth"), "the versions in the certificate must be of .*"),
+        (about("options", approved="yes"), "the options in the certificate must be of core, .*, not .*"),
+        (about("options", core="instrument"), "core of the item must be filter, .*, not instrument|core of .*"),
+        (about("options", board="../x"), r"the option board must be a plain name, not '\.\./x'"),
+        (about("options", board="x", core="filter"), "the options in the certificate must be of core, .*"),
+    ],
+)
+def test_nothing_is_free_that_nothing_is_proven_of(
+    edit: Callable[[Tree], None], sentence: str, copy: Callable[..., Path]
+) -> None:
+    with pytest.raises(RejectedError, match=f"^({sentence})$"):
+        proof(forge(copy(PARALLEL), edit))
 
 
 @pytest.mark.parametrize("name", ["../plain", "/plain", "plain/../plain", "a b", "\x1b[2K", ""])
