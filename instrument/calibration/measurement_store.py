@@ -234,7 +234,11 @@ class MeasurementStore:
             "WHERE sensor.name = ? GROUP BY source.id ORDER BY source.id",
             sensor,
         )
-        return [Source(*row[:6], None if row[6] is None else Withdrawal(*row[6:])) for row in rows]
+        found = []
+        for number, name, sha256, count, first, last, *gone in rows:
+            withdrawal = None if gone[0] is None else Withdrawal(*gone)
+            found.append(Source(number, name, sha256, count, first, last, withdrawal))
+        return found
 
     def withdraw(self, source: int, date: str, author: str, reason: str) -> None:
         """Record that a file, by its number, does not count from now on."""
