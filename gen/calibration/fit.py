@@ -10,6 +10,7 @@ same measurements give the same bits on every machine and in any order. A robust
 
 from __future__ import annotations
 
+import datetime
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -26,6 +27,9 @@ from sosmith.model.tables.csv_table import CsvTable, check_rows, read_csv_table
 
 COLUMNS = ("clearance_mm", "voltage_V", "temperature_C")
 """Columns of a measurement file, in their documented order."""
+
+DATE_COLUMN = "date"
+"""Optional column with the date of each measurement, such as 2024-03-01."""
 
 MAX_ORDER = 6
 """Highest order tried: 28 terms. The paper needs order 2."""
@@ -201,18 +205,29 @@ class Fit:
 
 
 def read_measurements(path: Path) -> Measurements:
-    """Read a CSV file with the columns clearance_mm, voltage_V and temperature_C, in any order.
+    """Read a CSV file with the columns clearance_mm, voltage_V, temperature_C and, if present, date, in any order.
 
     Raises
     ------
     SpecificationError
-        As for `read_csv_table`; if a clearance is negative; if two rows are equal.
+        As for `read_csv_table`; if a clearance is negative; if two rows are equal, which those of two days are not.
     """
-    table = read_csv_table(path, COLUMNS, required=COLUMNS)
+    table = read_csv_table(path, (*COLUMNS, DATE_COLUMN), required=COLUMNS, readers={DATE_COLUMN: _ordinal})
     clearance, voltage, temperature = (table.column(name) for name in COLUMNS)
+    days = tuple(map(int, table.column(DATE_COLUMN).tolist())) if DATE_COLUMN in table else ()
     check_rows(table, clearance < 0, lambda k: f"clearance_mm must be 0 or more, not {clearance[k]}")
     _refuse_repeated_row(table)
-    return Measurements(clearance, voltage, temperature, str(path))
+    return Measurements(clearance, voltage, temperature, str(path), days)
+
+
+def _ordinal(text: str) -> float:
+    try:
+        day = datetime.date.fromisoformat(text)
+    except ValueError:
+        day = None
+    if day is None or day.isoformat() != text:
+        raise ValueError("a date such as 2024-03-01")
+    return float(day.toordinal())
 
 
 def _refuse_repeated_row(table: CsvTable) -> None:

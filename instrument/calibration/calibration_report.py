@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from sosmith.gen.calibration.fit import COLUMNS
+from sosmith.gen.calibration.fit import COLUMNS, DATE_COLUMN
 from sosmith.instrument.calibration.advice import Advice
 from sosmith.instrument.calibration.coefficient_covariance import CoefficientUncertainty, of_bayes, of_least_squares
-from sosmith.instrument.calibration.measurement_store import StoredMeasurement, Version, as_measurements
+from sosmith.instrument.calibration.measurement_store import Source, StoredMeasurement, Version, as_measurements
 from sosmith.instrument.calibration.self_updating import Addition, Calibration
 from sosmith.instrument.calibration.uncertainty import SHARE
 from sosmith.model.arrays import Values
@@ -137,6 +137,19 @@ def version_json(sensor: str, version: Version) -> dict[str, Any]:
     }
 
 
+def source_json(source: Source) -> dict[str, Any]:
+    """Return a file that was added, and its withdrawal if it was withdrawn."""
+    gone = source.withdrawal
+    return {
+        "number": source.number,
+        "file": source.name,
+        "sha256": source.sha256,
+        "measurements": source.measurements,
+        "dates": [source.first, source.last],
+        "withdrawn": None if gone is None else {"date": gone.date, "author": gone.author, "reason": gone.reason},
+    }
+
+
 def addition_json(addition: Addition) -> dict[str, Any]:
     """Return which lines of a file were kept and which were refused, and the calibration made from them."""
     made = addition.calibration
@@ -214,8 +227,8 @@ def _uncertainty_table(found: CoefficientUncertainty) -> str:
 
 def measurements_csv(stored: list[StoredMeasurement]) -> str:
     """CSV as ``calibration.data`` of a specification reads it; numbers read back as the same doubles."""
-    rows = [",".join(map(repr, one.reading.values)) for one in stored]
-    return "\n".join([",".join(COLUMNS), *rows, ""])
+    rows = [",".join([*map(repr, one.reading.values), one.reading.date]) for one in stored]
+    return "\n".join([",".join((*COLUMNS, DATE_COLUMN)), *rows, ""])
 
 
 def _coefficients(version: Version) -> list[list[float]]:

@@ -11,7 +11,7 @@ from sosmith.instrument.calibration.advice import Advice
 from sosmith.instrument.calibration.calibration_report import CALLED_OUT, uncertainty_plane
 from sosmith.instrument.calibration.fit_quality import CELLS
 from sosmith.instrument.calibration.health.monitoring import Health, date_of
-from sosmith.instrument.calibration.measurement_store import Version
+from sosmith.instrument.calibration.measurement_store import Source, Version
 from sosmith.instrument.calibration.self_updating import Calibration
 from sosmith.instrument.calibration.uncertainty import Uncertainty
 
@@ -184,3 +184,23 @@ def history_table(sensor: str, versions: Sequence[Version]) -> Table:
     return Table(
         f"Sensor {sensor}, errors in mm", rows, ("no.", "date", "count", "orders", "r", "rms", "CV error", "drift")
     )
+
+
+def sources_table(sensor: str, sources: Sequence[Source]) -> Table:
+    """Return one row for each file of a sensor, and a sentence for each that was withdrawn."""
+    rows = [
+        (
+            str(one.number),
+            one.name,
+            f"{one.measurements:,}",
+            one.first if one.first == one.last else f"{one.first} to {one.last}",
+            "counts" if one.withdrawal is None else "withdrawn",
+        )
+        for one in sources
+    ]
+    notes = [
+        f"{one.name} was withdrawn on {one.withdrawal.date} by {one.withdrawal.author}: {one.withdrawal.reason}"
+        for one in sources
+        if one.withdrawal is not None
+    ]
+    return Table(f"Sensor {sensor}", rows, ("no.", "file", "measurements", "of", ""), notes=notes)

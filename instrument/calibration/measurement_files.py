@@ -15,15 +15,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from sosmith.gen.calibration.fit import COLUMNS
+from sosmith.gen.calibration.fit import COLUMNS, DATE_COLUMN
 from sosmith.instrument.calibration.acceptance import DEFAULT_RANGES, Range
 from sosmith.model.errors import SpecificationError
 from sosmith.model.foreign_files import opened
 from sosmith.model.tables.csv_table import NUMBER, check_separator, shortened
 from sosmith.model.tables.workbook import MAX_ROWS, Uncalculated, workbook_rows
-
-DATE_COLUMN = "date"
-"""Optional column with the date of each measurement, such as 2024-03-01."""
 
 MAX_BYTES = 16 << 20
 """Most bytes of a file: several times what `MAX_ROWS` rows take."""
@@ -53,6 +50,11 @@ class Reading:
     line: int
     date: str
     values: tuple[float, float, float]
+
+    @property
+    def key(self) -> tuple[str, tuple[float, ...]]:
+        """What no two measurements of a sensor share: date and values. The same values of another day are a repeat."""
+        return self.date, self.values
 
     def sha256(self, sensor: str) -> str:
         """Return the SHA-256 of sensor name, date and exact values, in hexadecimal."""
@@ -213,7 +215,7 @@ class _Rows:
     ranges: tuple[Range, Range, Range]
     readings: list[Reading] = field(default_factory=list)
     refusals: list[Refusal] = field(default_factory=list)
-    first_lines: dict[tuple[float, ...], int] = field(default_factory=dict)
+    first_lines: dict[tuple[str, tuple[float, ...]], int] = field(default_factory=dict)
 
     def take(self, line: int, cells: Sequence[Any]) -> None:
         """Add one row to `readings` or to `refusals`."""
@@ -222,7 +224,7 @@ class _Rows:
         except SpecificationError as error:
             self.refusals.append(Refusal(line, str(error)))
             return
-        first = self.first_lines.setdefault(reading.values, line)
+        first = self.first_lines.setdefault(reading.key, line)
         if first == line:
             self.readings.append(reading)
         else:

@@ -23,79 +23,13 @@ from sosmith.gen.calibration.fit import Measurements
 from sosmith.instrument.calibration.acceptance import METHODS, Method, Range
 from sosmith.instrument.calibration.measurement_files import MeasurementFile, Reading
 from sosmith.instrument.calibration.sensor_type import DEFAULT_TYPE, SENSOR_TYPES, SensorType
+from sosmith.instrument.calibration.store.schema import APPLICATION_ID, SCHEMA, SCHEMA_VERSION, bring_up_to_date
 from sosmith.model.errors import SpecificationError, ToolError
 from sosmith.model.polynomial import Polynomial
 from sosmith.model.tables.csv_table import shortened
 
-APPLICATION_ID = 0x534F534D
-"""SQLite application ID that marks a file as a measurement store."""
-
-SCHEMA_VERSION = 2
-"""Version 2 added the columns of `ADDED`; a store of version 1 gets them when it is opened."""
-
 PATIENCE = 60.0
 """Time in s that a writer waits for another one."""
-
-SCHEMA = (
-    """CREATE TABLE sensor (
-        id INTEGER PRIMARY KEY,
-        name TEXT NOT NULL UNIQUE,
-        clearance_low_mm REAL NOT NULL, clearance_high_mm REAL NOT NULL,
-        voltage_low_V REAL NOT NULL, voltage_high_V REAL NOT NULL,
-        temperature_low_C REAL NOT NULL, temperature_high_C REAL NOT NULL,
-        type TEXT
-    ) STRICT""",
-    """CREATE TABLE source (
-        id INTEGER PRIMARY KEY AUTOINCREMENT,
-        sensor INTEGER NOT NULL REFERENCES sensor,
-        name TEXT NOT NULL,
-        sha256 TEXT NOT NULL,
-        UNIQUE (sensor, sha256)
-    ) STRICT""",
-    """CREATE TABLE measurement (
-        id INTEGER PRIMARY KEY AUTOINCREMENT,
-        sensor INTEGER NOT NULL REFERENCES sensor,
-        source INTEGER NOT NULL REFERENCES source,
-        line INTEGER NOT NULL,
-        date TEXT NOT NULL,
-        clearance_mm REAL NOT NULL, voltage_V REAL NOT NULL, temperature_C REAL NOT NULL,
-        sha256 TEXT NOT NULL,
-        UNIQUE (sensor, clearance_mm, voltage_V, temperature_C)
-    ) STRICT""",
-    """CREATE TABLE version (
-        sensor INTEGER NOT NULL REFERENCES sensor,
-        number INTEGER NOT NULL,
-        date TEXT NOT NULL,
-        measurements INTEGER NOT NULL,
-        last_measurement INTEGER NOT NULL REFERENCES measurement,
-        data_sha256 TEXT NOT NULL,
-        required_r REAL NOT NULL,
-        robust INTEGER NOT NULL,
-        coefficients TEXT NOT NULL,
-        adjusted_r_squared REAL NOT NULL,
-        rms_mm REAL NOT NULL,
-        cross_validated_mm REAL,
-        drift_mm REAL,
-        method TEXT NOT NULL DEFAULT 'paper',
-        type TEXT,
-        accept_mm REAL,
-        PRIMARY KEY (sensor, number)
-    ) STRICT""",
-    *(
-        f"""CREATE TRIGGER {table}_{event.lower()} BEFORE {event} ON {table}
-        BEGIN SELECT RAISE(ABORT, 'what is in the store stays as it is'); END"""
-        for table in ("source", "measurement", "version")
-        for event in ("UPDATE", "DELETE")
-    ),
-)
-
-ADDED = (
-    "ALTER TABLE sensor ADD COLUMN type TEXT",
-    "ALTER TABLE version ADD COLUMN method TEXT NOT NULL DEFAULT 'paper'",
-    "ALTER TABLE version ADD COLUMN type TEXT",
-    "ALTER TABLE version ADD COLUMN accept_mm REAL",
-)
-"""What makes a store of version 1 one of version 2: type of sensor, method of the fit, acceptance in mm."""
 
 LARGEST = 1 << 28
 """Most bytes of a store: one of 10,000 measurements has some three million."""
@@ -121,9 +55,11 @@ _UNREACHABLE = {
 """Primary codes of errors that are not about what the file holds."""
 
 _OPTIONAL = (float, type(None))
+_WHOLE = (int, type(None))
 _MEASUREMENT = (int, str, int, str, float, float, float, str)
 _TEXT = (str, type(None))
-_VERSION = (int, str, int, int, str, float, int, str, float, float, _OPTIONAL, _OPTIONAL, str, _TEXT, _OPTIONAL)
+_VERSION = (int, str, int, int, str, float, int, str, float, float, _OPTIONAL, _OPTIONAL, str, _TEXT, _OPTIONAL, int)
+_SOURCE = (int, str, str, int, str, str, _WHOLE, _TEXT, _TEXT, _TEXT)
 """Types of the values of a row; SQLite checks them only when it writes."""
 
 
@@ -137,6 +73,43 @@ class StoredMeasurement:
 
 
 @dataclass(frozen=True)
+class Withdrawal:
+    """That a file does not count: number of the withdrawal, its date, who withdrew it, and why."""
+
+    number: int
+    date: str
+    author: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Source:
+    """A file that was added.
+
+    Attributes
+    ----------
+    number : int
+        Its number in the store.
+    name, sha256 : str
+        Its path as given, and its hash.
+    measurements : int
+        Number of measurements that were stored from it, withdrawn or not.
+    first, last : str
+        Dates of the first and the last of them.
+    withdrawal : Withdrawal or None
+        That it does not count, if so.
+    """
+
+    number: int
+    name: str
+    sha256: str
+    measurements: int
+    first: str
+    last: str
+    withdrawal: Withdrawal | None
+
+
+@dataclass(frozen=True)
 class Version:
     """One version of a sensor's calibration.
 
@@ -147,7 +120,8 @@ class Version:
     date : str
         Date of the fit, such as 2024-03-01.
     measurements, last_measurement : int
-        Number of measurements it was fitted to, and the number of the last one: all of the sensor up to that one.
+        Number of measurements it was fitted to, and the number of the last one: all of the sensor up to that one, but
+        for those of withdrawn files.
     data_sha256 : str
         SHA-256 over the hashes of these measurements.
     required_r : float
@@ -167,6 +141,8 @@ class Version:
         The prior of a Bayesian calibration; None for the paper's method.
     accept : float or None
         Largest half-width of an interval in mm that was acceptable; None if not limited.
+    last_withdrawal : int
+        Number of the last withdrawal of one of the sensor's files before it; 0 if there was none.
     """
 
     number: int
@@ -184,6 +160,7 @@ class Version:
     method: Method = "paper"
     sensor_type: SensorType | None = None
     accept: float | None = None
+    last_withdrawal: int = 0
 
 
 class MeasurementStore:
@@ -246,15 +223,30 @@ class MeasurementStore:
         """Change the type of a sensor that is in the store."""
         self._sql.execute("UPDATE sensor SET type = ? WHERE name = ?", (sensor_type.json(), sensor))
 
-    def source_of(self, sensor: str, sha256: str) -> str | None:
-        """Return the name under which a file with this hash was added, or None."""
+    def sources(self, sensor: str) -> list[Source]:
+        """Return the files of a sensor in the order in which they were added, withdrawn ones too."""
         rows = self._rows(
-            (str,),
-            "SELECT name FROM source WHERE sensor = (SELECT id FROM sensor WHERE name = ?) AND sha256 = ?",
+            _SOURCE,
+            "SELECT source.id, source.name, source.sha256, count(*), min(measurement.date), max(measurement.date), "
+            "withdrawal.id, withdrawal.date, author, reason FROM source "
+            "JOIN sensor ON sensor.id = source.sensor JOIN measurement ON measurement.source = source.id "
+            "LEFT JOIN withdrawal ON withdrawal.source = source.id "
+            "WHERE sensor.name = ? GROUP BY source.id ORDER BY source.id",
             sensor,
-            sha256,
         )
-        return next((name for (name,) in rows), None)
+        found = []
+        for number, name, sha256, count, first, last, *gone in rows:
+            withdrawal = None if gone[0] is None else Withdrawal(*gone)
+            found.append(Source(number, name, sha256, count, first, last, withdrawal))
+        return found
+
+    def withdraw(self, source: int, date: str, author: str, reason: str) -> None:
+        """Record that a file, by its number, does not count from now on."""
+        self._sql.execute("INSERT INTO withdrawal VALUES (NULL, ?, ?, ?, ?)", (source, date, author, reason))
+
+    def last_withdrawal(self, sensor: str) -> int:
+        """Return the number of the last withdrawal of a file of a sensor; 0 if there is none."""
+        return max((one.withdrawal.number for one in self.sources(sensor) if one.withdrawal is not None), default=0)
 
     def insert(self, sensor: str, file: MeasurementFile) -> None:
         """Insert the valid rows of a file, none of which may be in the store already."""
@@ -264,15 +256,20 @@ class MeasurementStore:
             "INSERT INTO source VALUES (NULL, ?, ?, ?)", (sensor_id, name, file.sha256)
         ).lastrowid
         self._sql.executemany(
-            "INSERT INTO measurement VALUES (NULL, ?, ?, ?, ?, ?, ?, ?, ?)",
+            "INSERT INTO measurement VALUES (NULL, ?, ?, ?, ?, ?, ?, ?, ?, NULL, NULL, NULL)",
             [
                 (sensor_id, source, reading.line, reading.date, *reading.values, reading.sha256(sensor))
                 for reading in file.readings
             ],
         )
 
-    def measurements(self, sensor: str, last: int | None = None) -> list[StoredMeasurement]:
+    def measurements(
+        self, sensor: str, last: int | None = None, last_withdrawal: int | None = None
+    ) -> list[StoredMeasurement]:
         """Return the measurements of a sensor in the order in which they were added, up to number `last`.
+
+        Those of files that were withdrawn up to the withdrawal of number `last_withdrawal`, by default of all withdrawn
+        files, are left out.
 
         Raises
         ------
@@ -282,10 +279,13 @@ class MeasurementStore:
         found = []
         for number, source, line, date, *values, sha256 in self._rows(
             _MEASUREMENT,
-            "SELECT measurement.id, source.name, line, date, clearance_mm, voltage_V, temperature_C, "
+            "SELECT measurement.id, source.name, line, measurement.date, clearance_mm, voltage_V, temperature_C, "
             "measurement.sha256 FROM measurement JOIN sensor ON sensor.id = measurement.sensor "
             "JOIN source ON source.id = measurement.source "
-            "WHERE sensor.name = ? AND measurement.id <= coalesce(?, measurement.id) ORDER BY measurement.id",
+            "LEFT JOIN withdrawal ON withdrawal.source = source.id AND withdrawal.id <= coalesce(?, withdrawal.id) "
+            "WHERE sensor.name = ? AND measurement.id <= coalesce(?, measurement.id) AND withdrawal.id IS NULL "
+            "ORDER BY measurement.id",
+            last_withdrawal,
             sensor,
             last,
         ):
@@ -308,7 +308,8 @@ class MeasurementStore:
         rows = self._rows(
             _VERSION,
             "SELECT number, date, measurements, last_measurement, data_sha256, required_r, robust, coefficients, "
-            "adjusted_r_squared, rms_mm, cross_validated_mm, drift_mm, method, type, accept_mm FROM version "
+            "adjusted_r_squared, rms_mm, cross_validated_mm, drift_mm, method, type, accept_mm, last_withdrawal "
+            "FROM version "
             "WHERE sensor = (SELECT id FROM sensor WHERE name = ?) ORDER BY number",
             sensor,
         )
@@ -329,6 +330,7 @@ class MeasurementStore:
                 self._method(method),
                 None if sensor_type is None else self._type(sensor_type),
                 accept,
+                last_withdrawal,
             )
             for (
                 number,
@@ -346,6 +348,7 @@ class MeasurementStore:
                 method,
                 sensor_type,
                 accept,
+                last_withdrawal,
             ) in rows
         ]
 
@@ -353,7 +356,7 @@ class MeasurementStore:
         """Insert a version; its number must be the next one."""
         coefficients = [[float(a).hex() for a in row] for row in version.polynomial.coefficients]
         self._sql.execute(
-            "INSERT INTO version SELECT id, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ? FROM sensor WHERE name = ?",
+            "INSERT INTO version SELECT id, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ? FROM sensor WHERE name = ?",
             (
                 version.number,
                 version.date,
@@ -370,6 +373,7 @@ class MeasurementStore:
                 version.method,
                 None if version.sensor_type is None else version.sensor_type.json(),
                 version.accept,
+                version.last_withdrawal,
                 sensor,
             ),
         )
@@ -480,12 +484,12 @@ def _prepare(store: MeasurementStore, connection: sqlite3.Connection) -> None:
     application, version = _pragmas(connection)
     if application != APPLICATION_ID:
         raise SpecificationError(f"{store.path} must be a store of measurements, not another SQLite database")
-    if version == 1:
+    if 0 < version < SCHEMA_VERSION:
+        # SQLite would take a table that is dropped for one whose rows are deleted, and ignores this in a transaction.
+        connection.execute("PRAGMA foreign_keys = OFF")
         with store.transaction():
-            if _pragmas(connection)[1] == 1:  # unless another process was faster
-                for statement in ADDED:
-                    connection.execute(statement)
-                connection.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
+            bring_up_to_date(connection)
+        connection.execute("PRAGMA foreign_keys = ON")
         version = SCHEMA_VERSION
     if version != SCHEMA_VERSION:
         raise SpecificationError(f"{store.path}: the store's schema must be version {SCHEMA_VERSION}, not {version}")

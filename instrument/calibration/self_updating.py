@@ -33,6 +33,7 @@ from sosmith.instrument.calibration.measurement_files import (
 )
 from sosmith.instrument.calibration.measurement_store import (
     MeasurementStore,
+    Source,
     StoredMeasurement,
     Version,
     as_measurements,
@@ -187,9 +188,9 @@ def add(
         usual = before or DEFAULT_RANGES
         now = _ranges_from_now_on(ranges, usual)
         file = read_measurement_file(path, date, now)
-        earlier = store.source_of(sensor, file.sha256)
-        if earlier is not None:
-            raise SpecificationError(f"{path} must hold new measurements, not those already added as {earlier}")
+        for source in store.sources(sensor):
+            if source.sha256 == file.sha256 and source.withdrawal is None:
+                raise SpecificationError(f"{path} must hold new measurements, not those already added as {source.name}")
         file = _sift(store, sensor, file)
         if not _keeps(file, keep_good=keep_good):
             return Addition(file, False, None, "")
@@ -261,6 +262,95 @@ def refit(
             raise ShortfallError(str(error)) from None
 
 
+@dataclass(frozen=True)
+class Withdrawn:
+    """Result of withdrawing a file.
+
+    Attributes
+    ----------
+    source : Source
+        The file, with its withdrawal.
+    calibration : Calibration or None
+        The version without it, fitted as the newest one was; None if there was none, or no polynomial is good enough.
+    shortfall : str
+        Reason why there is no version now; empty otherwise.
+    """
+
+    source: Source
+    calibration: Calibration | None
+    shortfall: str
+
+
+def withdraw(
+    store: MeasurementStore,
+    sensor: str,
+    name: str,
+    date: str,
+    author: str,
+    reason: str,
+    progress: Progress = untold,
+) -> Withdrawn:
+    """Withdraw a file: its measurements stay in the store and count no more. Fit again, in one transaction.
+
+    Parameters
+    ----------
+    name : str
+        Number or name of the file, as `MeasurementStore.sources` has them.
+    date, author, reason : str
+        Of the withdrawal; the date is that of the new version, too.
+
+    Raises
+    ------
+    SpecificationError
+        If the sensor is unknown; if no file of it that counts has that number or name, or several do; if author or
+        reason is no printable text.
+    """
+    for what, text in (("author", author), ("reason", reason)):
+        if not text.strip() or not text.isprintable():
+            raise SpecificationError(f"the {what} must be printable text, not {text!r}")
+    with store.transaction():
+        _known(store, sensor)
+        source = _counted_source(store, sensor, name)
+        store.withdraw(source.number, date, author, reason)
+        source = next(one for one in store.sources(sensor) if one.number == source.number)
+        versions = store.versions(sensor)
+        try:
+            settings = _settings_of(versions[-1]) if versions else _Settings("bayes", 0.0, False, None, None)
+            settings = replace(settings, sensor_type=store.sensor_type(sensor))
+            return Withdrawn(source, _fit(store, sensor, date, settings, progress), "")
+        except SpecificationError as error:
+            return Withdrawn(source, None, str(error))
+
+
+def sources_of(store: MeasurementStore, sensor: str) -> list[Source]:
+    """Return the files of a sensor; raises SpecificationError if there is no such sensor."""
+    _known(store, sensor)
+    return store.sources(sensor)
+
+
+def _counted_source(store: MeasurementStore, sensor: str, name: str) -> Source:
+    """Return the file of that number or name that was not withdrawn."""
+    sources = store.sources(sensor)
+    found = [one for one in sources if name in (str(one.number), one.name)]
+    if not found:
+        raise SpecificationError(
+            f"{store.path}: the file must be one of {', '.join(one.name for one in sources)}, or its number, not {name}"
+        )
+    counted = [one for one in found if one.withdrawal is None]
+    if not counted:
+        gone = found[-1].withdrawal
+        assert gone is not None, "it does not count"
+        raise SpecificationError(
+            f"{name} must be a file that counts, not one that {gone.author} withdrew on {gone.date}"
+        )
+    if len(counted) > 1:
+        numbers = ", ".join(str(one.number) for one in counted)
+        raise SpecificationError(
+            f"{name} must be given by its number, one of {numbers}, not by a name that is there twice"
+        )
+    return counted[0]
+
+
 def find_version(store: MeasurementStore, sensor: str, number: int | None = None) -> Version:
     """Return a version; the newest if `number` is None.
 
@@ -291,10 +381,10 @@ def calibration_of(store: MeasurementStore, sensor: str, number: int | None = No
         If the result differs from the stored version in any bit.
     """
     version = find_version(store, sensor, number)
-    stored = store.measurements(sensor, version.last_measurement)
+    stored = store.measurements(sensor, version.last_measurement, version.last_withdrawal)
     try:
-        settings = _Settings(version.method, version.required_r, version.robust, version.accept, version.sensor_type)
-        again = _calibration(store, sensor, stored, version.date, settings, version.number)
+        settings = _settings_of(version)
+        again = _calibration(store, sensor, stored, version.date, settings, version)
     except SpecificationError as error:
         raise ShortfallError(
             f"version {version.number} of sensor {sensor} must be reproducible, not fail: {error}"
@@ -383,14 +473,14 @@ def _keeps(file: MeasurementFile, *, keep_good: bool) -> bool:
 
 def _sift(store: MeasurementStore, sensor: str, file: MeasurementFile) -> MeasurementFile:
     """Reject rows that are already in the store, and every row if two columns are swapped."""
-    known = {one.reading.values: one for one in store.measurements(sensor)}
+    known = {one.reading.key: one for one in store.measurements(sensor)}
     versions = store.versions(sensor)
     swapped = _swapped(file, versions[-1]) if versions else ""
     refusals = list(file.refusals)
     readings = []
     for reading in file.readings:
-        if reading.values in known:
-            one = known[reading.values]
+        if reading.key in known:
+            one = known[reading.key]
             where = f"measurement {one.number} ({one.source}, line {one.reading.line}, {one.reading.date})"
             refusals.append(Refusal(reading.line, f"row must be a new measurement, not a duplicate of {where}"))
         elif swapped:
@@ -427,13 +517,20 @@ class _Settings:
     sensor_type: SensorType | None
 
 
+def _settings_of(version: Version) -> _Settings:
+    return _Settings(version.method, version.required_r, version.robust, version.accept, version.sensor_type)
+
+
 def _fit(store: MeasurementStore, sensor: str, date: str, settings: _Settings, progress: Progress) -> Calibration:
     versions = store.versions(sensor)
     stored = store.measurements(sensor)
-    made = _calibration(store, sensor, stored, date, settings, len(versions) + 1, progress)
+    if not stored:
+        raise SpecificationError(f"{store.path}, sensor {sensor} must hold a file that counts, not none")
+    made = _calibration(store, sensor, stored, date, settings, None, progress)
     if versions:
         newest = versions[-1]
-        if replace(made.version, number=newest.number, date=newest.date, drift=newest.drift) == newest:
+        same = {name: getattr(newest, name) for name in ("number", "date", "drift")}
+        if replace(made.version, **same) == newest:
             return replace(made, version=newest, new=False, drift={k: made.drift[k] for k in range(1, newest.number)})
     store.insert_version(sensor, made.version)
     return replace(made, new=True)
@@ -445,10 +542,12 @@ def _calibration(
     stored: Sequence[StoredMeasurement],
     date: str,
     settings: _Settings,
-    number: int,
+    again: Version | None,
     progress: Progress = untold,
 ) -> Calibration:
-    """Fit, and compare with the versions before `number`."""
+    """Fit a new version, or that of `again` once more, and compare with those before it."""
+    earlier = store.versions(sensor)
+    number = len(earlier) + 1 if again is None else again.number
     measurements: Measurements = as_measurements(stored, f"{store.path}, sensor {sensor}")
     ranges = store.ranges(sensor)
     assert ranges is not None, "measurements belong to a sensor"
@@ -466,7 +565,7 @@ def _calibration(
     region: CoveredRegion = quality.region
     drift = {
         version.number: region.largest_difference(fitted.polynomial, version.polynomial)
-        for version in store.versions(sensor)[: number - 1]
+        for version in earlier[: number - 1]
     }
     version = Version(
         number=number,
@@ -484,5 +583,6 @@ def _calibration(
         method=settings.method,
         sensor_type=settings.sensor_type if bayesian else None,
         accept=accept,
+        last_withdrawal=store.last_withdrawal(sensor) if again is None else again.last_withdrawal,
     )
     return Calibration(sensor, version, False, stored, fitted, quality, ranges, drift, made)

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sosmith.gen.calibration.fit import COLUMNS
-from sosmith.instrument.calibration.measurement_files import DATE_COLUMN
+from sosmith.gen.calibration.fit import COLUMNS, DATE_COLUMN
 from sosmith.instrument.scenarios.file import ScenarioFile
 from sosmith.model.arithmetic.random_streams import streams
 

@@ -29,7 +29,7 @@ from sosmith.gen.output.core_facts import core_facts
 from sosmith.gen.output.manifest import manifest
 from sosmith.gen.reload.register_map import markdown
 from sosmith.gen.specification.combinations import TERMS
-from sosmith.instrument.calibration.measurement_store import SCHEMA
+from sosmith.instrument.calibration.store.schema import SCHEMA
 from sosmith.instrument.vehicle.parameters import built_in
 from sosmith.instrument.vehicle.vehicle_report import parameters_json
 from sosmith.interface.specification import Specification

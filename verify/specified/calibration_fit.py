@@ -24,6 +24,8 @@ from sosmith.verify.certificate_file import PortEntry
 from sosmith.verify.graph import RejectedError, require
 
 _COLUMNS = ("clearance_mm", "voltage_V", "temperature_C")
+_DATE = "date"
+_DAY = re.compile(r"\d{4}-(0[1-9]|1[0-2])-(0[1-9]|[12]\d|3[01])", re.ASCII)
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
 _HIGHEST = 6
 """Highest order that is tried."""
@@ -145,21 +147,29 @@ def _measurements(content: bytes) -> _Rows:
         lines = [[cell.strip() for cell in cells] for cells in reader if len(cells) > 1 or "".join(cells).strip()]
     except (UnicodeDecodeError, csv.Error):
         raise RejectedError("the measurements must be a CSV file in UTF-8") from None
-    require(bool(lines) and sorted(lines[0]) == sorted(_COLUMNS), f"the measurements must be {', '.join(_COLUMNS)}")
+    dated = bool(lines) and _DATE in lines[0]
+    columns = (*_COLUMNS, _DATE) if dated else _COLUMNS
+    require(bool(lines) and sorted(lines[0]) == sorted(columns), f"the measurements must be {', '.join(_COLUMNS)}")
     require(len(lines) <= _MOST_ROWS, f"there must be at most {_MOST_ROWS} measurements, not {len(lines) - 1}")
     require(len(lines) > 4, f"there must be at least 4 measurements, not {len(lines) - 1}")
-    order = [lines[0].index(name) for name in _COLUMNS]
+    order = [lines[0].index(name) for name in columns]
     rows: _Rows = []
+    days: list[list[str]] = []
     for line in lines[1:]:
+        cells = [line[index] for index in order] if len(line) == len(order) else []
         require(
-            len(line) == len(order) and all(_NUMBER.fullmatch(cell) for cell in line),
-            f"a measurement must be {len(order)} numbers, not {','.join(line)[:60]!r}",
+            bool(cells)
+            and all(_NUMBER.fullmatch(cell) for cell in cells[: len(_COLUMNS)])
+            and all(_DAY.fullmatch(cell) for cell in cells[len(_COLUMNS) :]),
+            f"a measurement must be {len(_COLUMNS)} numbers{' and a date' * dated}, not {','.join(line)[:60]!r}",
         )
-        values = [float(line[index]) for index in order]
+        values = [float(cell) for cell in cells[: len(_COLUMNS)]]
         require(all(map(math.isfinite, values)), "a measurement must be finite")
         clearance, voltage, temperature = map(Fraction, values)
         rows.append((clearance, voltage, temperature))
-    require(len(set(rows)) == len(rows), "each measurement must be there once")
+        days.append(cells[len(_COLUMNS) :])
+    own = {(*row, *day) for row, day in zip(rows, days, strict=True)}
+    require(len(own) == len(rows), "each measurement must be there once")
     return rows
 
 

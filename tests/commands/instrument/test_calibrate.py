@@ -153,6 +153,27 @@ def test_history_lists_and_verifies() -> None:
     assert listed[1]["drift_from_previous_mm"] > 0
 
 
+def test_a_file_is_withdrawn_and_the_list_says_who_did_it_and_why() -> None:
+    good("add", "a.csv", *DAY, *PAPER)
+    good("add", "b.csv", "--date", "2024-03-08", *PAPER)
+    gone = good("withdraw", "b.csv", "--author", "A. Smith", "--reason", "gauge 4 was worn", "--date", "2024-03-09")
+    assert "sosmith: withdrew 60 measurements of b.csv in calibration.db\n" in gone.stderr
+    assert "Sensor sensor, version 3 of 2024-03-09: new" in gone.stdout
+    shown = good("files").stdout
+    assert re.search(r"^  1 +a\.csv +60 +2024-03-01 +counts$", shown, re.M)
+    assert re.search(r"^  2 +b\.csv +60 +2024-03-08 +withdrawn$", shown, re.M)
+    assert "b.csv was withdrawn on 2024-03-09 by A. Smith: gauge 4 was worn" in shown
+    first, second = json.loads(good("files", "--json").stdout)
+    assert (first["number"], first["measurements"], first["withdrawn"]) == (1, 60, None)
+    assert second["withdrawn"] == {"date": "2024-03-09", "author": "A. Smith", "reason": "gauge 4 was worn"}
+    assert "3 of 3" in good("history", "--verify").stderr
+    result = run("withdraw", "1", "--author", "A", "--reason", "r", *DAY, "--json")
+    assert isinstance(result.exception, ShortfallError)
+    last = json.loads(result.stdout)
+    assert last["calibration"] is None
+    assert last["shortfall"] == "calibration.db, sensor sensor must hold a file that counts, not none"
+
+
 def test_exports_feed_a_specification_and_give_the_same_polynomial() -> None:
     for name in ("a.csv", "b.csv"):
         good("add", name, "--sensor", "left", *DAY, *PAPER)
@@ -379,7 +400,9 @@ def test_an_unknown_sensor_is_told_which_there_are() -> None:
 
 
 def test_help_shows_every_command_and_its_options() -> None:
-    assert list(calibrate.commands) == ["add", "fit", "history", "export", "plot", "advise", "health"]
+    assert list(calibrate.commands) == [
+        *("add", "fit", "files", "withdraw", "history", "export", "plot", "advise", "health")
+    ]
     for command in calibrate.commands:
         shown = good(command, "--help").stdout
         for option in ("--store", "--sensor"):

@@ -16,12 +16,16 @@ from pathlib import Path
 
 import pytest
 from tests.instrument.calibration.measuring import readings, write_csv
+from tests.instrument.calibration.old_stores import older
 
-from sosmith.instrument.calibration.measurement_store import MeasurementStore, open_store
-from sosmith.instrument.calibration.self_updating import add, calibration_of, find_version, refit
+from sosmith.gen.calibration.fit import fit, read_measurements
+from sosmith.instrument.calibration.calibration_report import measurements_csv
+from sosmith.instrument.calibration.measurement_store import MeasurementStore, Withdrawal, open_store
+from sosmith.instrument.calibration.self_updating import add, calibration_of, find_version, refit, withdraw
 from sosmith.instrument.calibration.sensor_type import SENSOR_TYPES
 from sosmith.model.errors import ShortfallError, SpecificationError, ToolError
 from sosmith.model.polynomial import EQUATION_5A, Polynomial
+from sosmith.verify.specified.calibration_fit import check_fit
 
 DAY = "2024-03-01"
 ROOT = Path(__file__).parents[3]
@@ -95,10 +99,73 @@ def test_what_is_there_already_is_refused(store: MeasurementStore, tmp_path: Pat
     header, first, *_ = path.read_text().splitlines()
     other = tmp_path / "b.csv"
     other.write_text(f"{header}\n{first}\n1,1.5,30\n")
-    addition = add(store, "left", other, "2024-03-02")
+    addition = add(store, "left", other, DAY)
     assert not addition.kept
     reason = f"row must be a new measurement, not a duplicate of measurement 1 ({path}, line 2, {DAY})"
     assert [(one.line, one.reason) for one in addition.file.refusals] == [(2, reason)]
+
+
+def test_the_same_reading_on_another_day_is_a_measurement(store: MeasurementStore, tmp_path: Path) -> None:
+    add(store, "left", batch(tmp_path, "a.csv"), DAY)
+    header, first, *_ = (tmp_path / "a.csv").read_text().splitlines()
+    other = tmp_path / "b.csv"
+    other.write_text(f"{header},date\n{first},2024-03-02\n{first},2024-03-03\n{first},2024-03-03\n")
+    addition = add(store, "left", other, DAY, keep_good=True)
+    assert [(one.line, one.reason) for one in addition.file.refusals] == [
+        (4, "row must be a new measurement, not a duplicate of line 3")
+    ]
+    assert [one.reading.date for one in store.measurements("left")[40:]] == ["2024-03-02", "2024-03-03"]
+    exported = tmp_path / "exported.csv"
+    exported.write_text(measurements_csv(store.measurements("left")))
+    made = find_version(store, "left").polynomial
+    assert fit(read_measurements(exported)).polynomial == made
+    assert check_fit(exported.read_bytes(), made.coefficients).rows == 42
+
+
+def test_a_withdrawn_file_counts_no_more_and_stays(store: MeasurementStore, tmp_path: Path) -> None:
+    first = add(store, "left", batch(tmp_path, "a.csv"), DAY, required_r=0.999).calibration
+    wrong = write_csv(tmp_path / "b.csv", [(d + 0.5, V, T) for d, V, T in readings(40, seed=2)])
+    second = add(store, "left", wrong, "2024-03-02", required_r=0.99).calibration
+    assert first is not None
+    assert second is not None
+    gone = withdraw(store, "left", str(wrong), "2024-03-03", "A. Smith", "wrong gauge")
+    assert gone.source.withdrawal == Withdrawal(1, "2024-03-03", "A. Smith", "wrong gauge")
+    assert gone.calibration is not None
+    assert gone.calibration.version.polynomial == first.version.polynomial
+    assert (gone.calibration.version.required_r, gone.calibration.version.measurements) == (0.99, 40)
+    assert [one.withdrawal is None for one in store.sources("left")] == [True, False]
+    for number in (1, 2, 3):
+        assert calibration_of(store, "left", number).version == store.versions("left")[number - 1]
+    message = f"{wrong} must be a file that counts, not one that A. Smith withdrew on 2024-03-03"
+    with pytest.raises(SpecificationError, match=f"^{re.escape(message)}$"):
+        withdraw(store, "left", str(wrong), "2024-03-04", "A. Smith", "again")
+    again = add(store, "left", wrong, "2024-03-02", required_r=0.99)  # after all
+    assert again.kept
+    assert again.calibration is not None
+    assert again.calibration.version.polynomial == second.version.polynomial
+    assert not refit(store, "left", DAY, required_r=0.99).new
+    gone = withdraw(store, "left", "3", "2024-03-03", "A. Smith", "for good")
+    gone = withdraw(store, "left", "1", "2024-03-03", "A. Smith", "all of it")
+    assert gone.calibration is None
+    assert gone.shortfall == f"{store.path}, sensor left must hold a file that counts, not none"
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"name": "c.csv"}, "{path}: the file must be one of {folder}/a.csv, or its number, not c.csv"),
+        ({"author": " "}, "the author must be printable text, not ' '"),
+        ({"reason": "a\nb"}, "the reason must be printable text, not 'a\\nb'"),
+        ({"sensor": "right"}, "{path}: the sensor must be one of left, not right"),
+    ],
+)
+def test_refused_withdrawals(store: MeasurementStore, tmp_path: Path, given: dict[str, str], message: str) -> None:
+    add(store, "left", batch(tmp_path, "a.csv"), DAY)
+    asked = {"sensor": "left", "name": "1", "date": DAY, "author": "A. Smith", "reason": "wrong"} | given
+    text = message.format(path=store.path, folder=tmp_path)
+    with pytest.raises(SpecificationError, match=f"^{re.escape(text)}$"):
+        withdraw(store, **asked)
+    assert store.sources("left")[0].withdrawal is None
 
 
 def test_columns_swapped_within_their_ranges_are_found_by_the_version_before(
@@ -209,11 +276,12 @@ def test_a_changed_measurement_and_a_changed_version_are_noticed(store: Measurem
 
 
 @pytest.mark.parametrize("statement", ["DELETE FROM {}", "UPDATE {} SET date = '2000-01-01'"])
-@pytest.mark.parametrize("table", ["measurement", "version"])
+@pytest.mark.parametrize("table", ["measurement", "version", "withdrawal"])
 def test_what_is_in_the_store_stays_as_it_is(
     statement: str, table: str, store: MeasurementStore, tmp_path: Path
 ) -> None:
     add(store, "left", batch(tmp_path, "a.csv"), DAY)
+    withdraw(store, "left", "1", DAY, "A. Smith", "wrong")
     connection = sqlite3.connect(store.path)
     with pytest.raises(sqlite3.IntegrityError, match=r"^what is in the store stays as it is$"):
         connection.execute(statement.format(table))
@@ -255,23 +323,32 @@ def opening(path: Path, message: str, kind: type[Exception] = SpecificationError
         pass
 
 
-def test_a_store_of_version_1_is_brought_up_to_date(tmp_path: Path) -> None:
-    path = tmp_path / "c.db"
-    with open_store(path, create=True) as store:
+def tables_of(path: Path) -> dict[str, list[tuple[object, ...]]]:
+    """Everything by its name: columns of tables, in the order of their names, since those that were added come last."""
+    with closing(sqlite3.connect(path)) as connection:
+        names = [name for (name,) in connection.execute("SELECT name FROM sqlite_schema ORDER BY name")]
+        return {name: sorted(row[1:] for row in connection.execute(f"PRAGMA table_info({name})")) for name in names}
+
+
+@pytest.mark.parametrize("version", [1, 2])
+def test_an_older_store_is_brought_up_to_date(tmp_path: Path, version: int) -> None:
+    with open_store(tmp_path / "made.db", create=True) as store:
         made = add(store, "left", write_csv(tmp_path / "a.csv", readings(60)), "2024-03-01").calibration
     assert made is not None
-    with sqlite3.connect(path) as connection:
-        for table, column in (("sensor", "type"), ("version", "method"), ("version", "type"), ("version", "accept_mm")):
-            connection.execute(f"ALTER TABLE {table} DROP COLUMN {column}")
-        connection.execute("PRAGMA user_version = 1")
-    connection.close()
+    path = older(tmp_path / "c.db", version, tmp_path / "made.db")
     with open_store(path) as store:
         assert calibration_of(store, "left").version == made.version
+        assert [one.number for one in store.measurements("left")] == [*range(1, 61)]
         other = refit(store, "left", "2024-03-01", method="bayes", sensor_type=SENSOR_TYPES["equation_4"])
         assert other.version.sensor_type == store.sensor_type("left") == SENSOR_TYPES["equation_4"]
+        store.check()
     with open_store(path) as store:
         assert [one.method for one in store.versions("left")] == ["paper", "bayes"]
         assert calibration_of(store, "left").version == other.version
+        addition = add(store, "left", write_csv(tmp_path / "b.csv", readings(60)[:8]), "2024-03-02")
+        assert addition.kept
+        assert store.measurements("left")[-1].number == 68
+    assert tables_of(path) == tables_of(tmp_path / "made.db")
 
 
 @pytest.mark.parametrize(
@@ -311,9 +388,9 @@ def test_files_that_are_no_store(tmp_path: Path) -> None:
     with open_store(path, create=True):
         pass
     with sqlite3.connect(path) as connection:
-        connection.execute("PRAGMA user_version = 3")
+        connection.execute("PRAGMA user_version = 4")
     connection.close()
-    opening(path, ": the store's schema must be version 2, not 3")
+    opening(path, ": the store's schema must be version 3, not 4")
 
 
 def test_a_damaged_store_is_noticed(store: MeasurementStore, tmp_path: Path) -> None:

@@ -80,6 +80,21 @@ def test_other_weights_are_refused(tmp_path: Path) -> None:
         check_fit(path.read_bytes(), robust)
 
 
+def test_the_same_reading_of_another_day_counts_again(tmp_path: Path) -> None:
+    path = written(tmp_path, 6, 1, 40)
+    header, *rows = path.read_text().splitlines()
+    dated = [f"2024-03-01,{row}" for row in rows] + [f"2024-03-02,{row}" for row in rows[:5]]
+    path.write_text("\n".join([f"date,{header}", *dated, ""]))
+    house = fit(read_measurements(path))
+    assert check_fit(path.read_bytes(), house.polynomial.coefficients).rows == 45
+    path.write_text(path.read_text() + dated[-1])
+    with pytest.raises(RejectedError, match=r"^each measurement must be there once$"):
+        fitted(path.read_bytes())
+    path.write_text(path.read_text().replace("2024-03-02", "2.3.2024"))
+    with pytest.raises(RejectedError, match=r"^a measurement must be 3 numbers and a date, not '2\.3\.2024,.*'$"):
+        fitted(path.read_bytes())
+
+
 @pytest.mark.parametrize(
     ("content", "sentence"),
     [

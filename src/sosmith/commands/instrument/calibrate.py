@@ -35,6 +35,7 @@ reaches the required value. To get started:
 \b
     sosmith calibrate add bench.csv --sensor left      add measurements, show the fit
     sosmith calibrate history --sensor left            list all versions and their drift
+    sosmith calibrate files --sensor left              list the files, and which were withdrawn
     sosmith calibrate export --sensor left             print [calibration] for a specification
     sosmith calibrate advise --sensor left 2mm 3mm     what to measure next
     sosmith calibrate health --sensor left             whether the sensor has changed
@@ -271,6 +272,57 @@ def fit_command(
     if as_json:
         print_json(fitted.as_dict())
     else:
+        print_tables(fitted.tables())
+
+
+@calibrate.command("files")
+@_STORE
+@_SENSOR
+@JSON_OPTION
+def files_command(store: Path, sensor: str, as_json: bool) -> None:
+    """List the files that a sensor's measurements came from, and which of them were withdrawn, by whom and why.
+
+    \b
+        sosmith calibrate files --sensor left
+    """
+    from sosmith.interface.instrument.calibration_store import CalibrationStore
+
+    files = CalibrationStore(store).files(sensor)
+    if as_json:
+        print_json(files.entries())
+    else:
+        print_tables(files.tables())
+
+
+@calibrate.command("withdraw")
+@click.argument("file")
+@click.option("--reason", required=True, help="Why the file does not count.")
+@click.option("--author", required=True, help="Who withdraws it.")
+@_STORE
+@_SENSOR
+@_DATE
+@JSON_OPTION
+def withdraw_command(file: str, reason: str, author: str, store: Path, sensor: str, date: str, as_json: bool) -> None:
+    """Withdraw FILE, and refit without it.
+
+    FILE is its name as it was added, or its number in `sosmith calibrate files`. Nothing is deleted: the withdrawal is
+    recorded with author and reason, the measurements count no more, and the versions fitted to them stay reproducible.
+    The new version is fitted as the newest one was. A corrected file may then be added, with the same readings or
+    others. Exits with 1 if the file is withdrawn but no polynomial is good enough.
+
+    \b
+        sosmith calibrate withdraw april.csv --sensor left --reason "gauge 4 was worn" --author "A. Smith"
+    """
+    from sosmith.interface.instrument.calibration_store import CalibrationStore
+
+    with show_progress() as step:
+        removed = CalibrationStore(store).withdraw(sensor, file, date, author=author, reason=reason, progress=step)
+    if as_json:
+        print_json(removed.as_dict())
+    note(f"withdrew {_counted(removed.measurements, 'measurement')} of {removed.file} in {store}")
+    fitted = removed.fitted
+    _warn(fitted)
+    if not as_json:
         print_tables(fitted.tables())
 
 

@@ -19,6 +19,7 @@ from sosmith.instrument.calibration.calibration_report import (
     advice_json,
     calibration_json,
     measurements_csv,
+    source_json,
     specification_table,
     version_json,
 )
@@ -27,14 +28,16 @@ from sosmith.instrument.calibration.calibration_tables import (
     calibration_tables,
     health_table,
     history_table,
+    sources_table,
 )
 from sosmith.instrument.calibration.health.health_report import health_json
 from sosmith.instrument.calibration.health.monitoring import Health
 from sosmith.instrument.calibration.measurement_files import Refusal, parse_date
-from sosmith.instrument.calibration.measurement_store import Version, open_store
+from sosmith.instrument.calibration.measurement_store import Source, Version, open_store
 from sosmith.instrument.calibration.self_updating import (
     Addition,
     Calibration,
+    Withdrawn,
     add,
     advice_for,
     calibration_of,
@@ -42,6 +45,8 @@ from sosmith.instrument.calibration.self_updating import (
     health_for,
     refit,
     refused_first_file,
+    sources_of,
+    withdraw,
 )
 from sosmith.instrument.calibration.sensor_type_file import sensor_type_named
 from sosmith.interface.certificate import Progress
@@ -138,6 +143,54 @@ class Added:
     def as_dict(self) -> dict[str, Any]:
         """Return all of it in JSON types."""
         return addition_json(self.addition)
+
+
+@dataclass(frozen=True, eq=False)
+class Removed:
+    """What became of a calibration when a file was withdrawn."""
+
+    withdrawn: Withdrawn
+
+    @property
+    def file(self) -> str:
+        """Name of the file."""
+        return self.withdrawn.source.name
+
+    @property
+    def measurements(self) -> int:
+        """Number of its measurements, which count no more."""
+        return self.withdrawn.source.measurements
+
+    @property
+    def fitted(self) -> Fitted:
+        """The version without it; raises ShortfallError if no polynomial is good enough."""
+        if self.withdrawn.calibration is None:
+            raise ShortfallError(self.withdrawn.shortfall)
+        return Fitted(self.withdrawn.calibration)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return all of it in JSON types."""
+        made = self.withdrawn.calibration
+        return source_json(self.withdrawn.source) | {
+            "shortfall": self.withdrawn.shortfall,
+            "calibration": None if made is None else calibration_json(made),
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Files(View):
+    """The files of a sensor, withdrawn ones too."""
+
+    sensor: str
+    sources: Sequence[Source]
+
+    def tables(self) -> list[Table]:
+        """Return a row for each, and a sentence for each withdrawal."""
+        return [sources_table(self.sensor, self.sources)]
+
+    def entries(self) -> list[dict[str, Any]]:
+        """Return them in JSON types."""
+        return [source_json(source) for source in self.sources]
 
 
 @dataclass(frozen=True, eq=False)
@@ -286,6 +339,41 @@ class CalibrationStore:
             progress(step, 0, 0)
             return Fitted(refit(store, sensor, date, progress=_told(progress, step), **settings))
 
+    def files(self, sensor: str) -> Files:
+        """Return the files of a sensor in the order in which they were added."""
+        with open_store(self.path) as store:
+            return Files(sensor, sources_of(store, sensor))
+
+    def withdraw(
+        self,
+        sensor: str,
+        name: str,
+        date: str,
+        *,
+        author: str,
+        reason: str,
+        progress: Progress = lambda step, done, total: None,
+    ) -> Removed:
+        """Withdraw a file, and fit again without it. It stays in the store, and the versions fitted to it as well.
+
+        Parameters
+        ----------
+        sensor : str
+            Its name.
+        name : str
+            Name of the file as it was added, or its number.
+        date : str
+            Date of the withdrawal, and of the new version.
+        author, reason : str
+            Who withdraws it, and why.
+        progress : callable
+            Called with the name of each step, and how far it is.
+        """
+        with open_store(self.path) as store:
+            step = f"fitting {sensor}"
+            progress(step, 0, 0)
+            return Removed(withdraw(store, sensor, name, date, author, reason, _told(progress, step)))
+
     def history(
         self, sensor: str, *, verify: bool = False, progress: Progress = lambda step, done, total: None
     ) -> History:
@@ -318,7 +406,8 @@ class CalibrationStore:
     def measurements(self, sensor: str, number: int | None = None) -> str:
         """Return the measurements of a version as CSV, for the key ``calibration.data`` of a specification."""
         with open_store(self.path) as store:
-            return measurements_csv(store.measurements(sensor, find_version(store, sensor, number).last_measurement))
+            version = find_version(store, sensor, number)
+            return measurements_csv(store.measurements(sensor, version.last_measurement, version.last_withdrawal))
 
     def picture(
         self,
