@@ -76,6 +76,9 @@ STATUSES = {0, 1, 2, 3}
 PATIENCE = 600.0
 """Seconds after which a command is taken to hang, on however busy a machine."""
 
+_BOARD = 30.0
+"""Seconds after which a board is interrupted, which would run on."""
+
 _MOUNTED = 'mount -t tmpfs -o size="$1"k none "$2" && shift 2 && "$@"; status=$?; cp -r out after'
 
 
@@ -156,11 +159,12 @@ def _run(folder: Path, line: list[str]) -> subprocess.CompletedProcess[str]:
         start_new_session=True,
     )
     try:
-        _, said = process.communicate(timeout=3 if "board" in line else PATIENCE)
+        _, said = process.communicate(timeout=_BOARD if "board" in line else PATIENCE)
     except subprocess.TimeoutExpired:
         os.killpg(process.pid, signal.SIGINT)  # a board runs until then
         _, said = process.communicate(timeout=PATIENCE)
-        return subprocess.CompletedProcess(line, 0 if process.returncode == 130 else process.returncode, "", said)
+        stopped = process.returncode in {130, -signal.SIGINT}  # the latter is the shell's
+        return subprocess.CompletedProcess(line, 0 if stopped else process.returncode, "", said)
     return subprocess.CompletedProcess(line, process.returncode, "", said)
 
 
