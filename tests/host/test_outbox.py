@@ -6,6 +6,7 @@ import subprocess
 import sys
 from collections import Counter
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -237,6 +238,19 @@ def test_a_file_has_one_user(tmp_path: Path) -> None:
         Outbox(tmp_path / "alarms")
     first.close()
     Outbox(tmp_path / "alarms").close()
+
+
+def test_a_file_on_a_full_disk_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    real = sqlite3.connect
+
+    def connect(*arguments: Any, **options: Any) -> sqlite3.Connection:
+        connection = real(*arguments, **options)
+        connection.execute("PRAGMA max_page_count = 1")
+        return connection
+
+    monkeypatch.setattr(sqlite3, "connect", connect)
+    with pytest.raises(ToolError, match=r"alarms must take the waiting messages, not: database or disk is full$"):
+        Outbox(tmp_path / "alarms")
 
 
 def test_a_file_that_takes_nothing_more_is_told(tmp_path: Path) -> None:

@@ -60,6 +60,8 @@ class Outbox:
     ------
     SpecificationError
         If the file is none of an outbox, or in use by another process.
+    ToolError
+        If the file does not take what is to be written.
     """
 
     def __init__(self, path: Path | None = None) -> None:
@@ -74,6 +76,9 @@ class Outbox:
             self._open()
         except sqlite3.Error as error:
             self._kept.close()
+            code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR)
+            if code & 0xFF in {sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR}:  # above these bits are details
+                raise self._full(error) from None
             reason = "in use by another process" if "locked" in str(error) else str(error)
             raise SpecificationError(f"{path}: the file must be one of waiting messages, not: {reason}") from None
         self._waiting = self._told("SELECT count(*) FROM message")
@@ -167,4 +172,7 @@ class Outbox:
         try:
             self._kept.execute(statement, values)
         except sqlite3.Error as error:
-            raise ToolError(f"{self._path or 'the memory'} must take the waiting messages, not: {error}") from None
+            raise self._full(error) from None
+
+    def _full(self, error: sqlite3.Error) -> ToolError:
+        return ToolError(f"{self._path or 'the memory'} must take the waiting messages, not: {error}")
