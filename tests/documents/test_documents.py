@@ -15,6 +15,7 @@ from pathlib import Path
 
 import click
 import pytest
+from benchmarks.hardware_pictures import pictures
 from tests.documents import commands_page
 from tests.documents.protocol_page import with_parts
 from tests.documents.python_page import first_example, page
@@ -277,3 +278,8 @@ if __name__ == "__main__":
     PROTOCOL.write_text(with_parts(PROTOCOL.read_text(encoding="utf-8")), encoding="utf-8")
     renew(CALIBRATION, _SCHEMA, schema())
     renew(VEHICLE, _PARAMETERS, parameter_table())
+
+
+def test_the_pictures_of_the_hardware_show_it_as_it_is() -> None:
+    made = pictures()
+    assert {name: (ROOT / name).read_text(encoding="utf-8") for name in made} == made
