@@ -1,4 +1,4 @@
-"""Test vectors: what went into a core and what came out of it, as CSV, NPZ, VCD, or words for `$readmemh`."""
+"""Test vectors: what went into a core and what came out of it, as CSV, NPZ, VCD, words for `$readmemh`, or sound."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from sosmith.gen.output.core_facts import InterfaceFacts, StreamFacts
 from sosmith.model.arrays import Codes
 from sosmith.model.dataflow.status import STATUS_BITS
 from sosmith.model.errors import SpecificationError
+from sosmith.model.traces.wav_file import check_rate, wav_bytes
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -37,7 +38,7 @@ class Vectors:
     status: npt.NDArray[np.uint8]
 
 
-FORMATS = (".csv", ".npz", ".vcd", ".hex")
+FORMATS = (".csv", ".npz", ".vcd", ".hex", ".wav")
 """Suffixes of the files that `vector_files` makes."""
 
 
@@ -94,16 +95,23 @@ def _joined(column: npt.NDArray[np.generic], width: int, lanes: int) -> list[str
     return ["".join(reversed(digits[start : start + lanes])) for start in range(0, len(digits), lanes)]
 
 
-def check_format(path: Path) -> None:
+def result_rate(interface: InterfaceFacts, sample_rate: Fraction) -> Fraction:
+    """Return the responses per second of a core that takes `sample_rate` samples per second."""
+    return sample_rate * interface.copies_per_result / interface.samples_per_result
+
+
+def check_format(path: Path, rate: Fraction | None = None) -> None:
     """Check that `vector_files` knows the format that the suffix of `path` names.
 
     Raises
     ------
     SpecificationError
-        If it does not.
+        If it does not, or if it is sound, and `rate`, in responses per second, is not one of a WAV file.
     """
     if path.suffix not in FORMATS:
         raise SpecificationError(f"{path}: a file of vectors must end in {', '.join(FORMATS)}, not {path.suffix!r}")
+    if path.suffix == ".wav" and rate is not None:
+        check_rate(path, rate)
 
 
 def vector_files(path: Path, vectors: Vectors, interface: InterfaceFacts, sample_rate: Fraction) -> dict[str, bytes]:
@@ -115,7 +123,7 @@ def vector_files(path: Path, vectors: Vectors, interface: InterfaceFacts, sample
         ``.csv`` (a row for each sample of each channel, codes in decimal; output and status are empty where a sample
         brings no result), ``.npz`` (the arrays of `Vectors` by their names), ``.vcd`` (the codes of every channel at
         the times of the samples), or ``.hex`` (two files for ``$readmemh``, whose names end in ``_stimuli.hex`` and
-        ``_responses.hex``; a beat of several samples must be full).
+        ``_responses.hex``; a beat of several samples must be full), or ``.wav`` (the responses as sound).
     vectors : Vectors
         The samples.
     interface : InterfaceFacts
@@ -126,9 +134,9 @@ def vector_files(path: Path, vectors: Vectors, interface: InterfaceFacts, sample
     Raises
     ------
     SpecificationError
-        If the suffix is another one.
+        As `check_format`.
     """
-    check_format(path)
+    check_format(path, result_rate(interface, sample_rate))
     if path.suffix == ".hex":
         stimuli, responses = hex_words(vectors, interface)
         texts = {f"{path.stem}_stimuli.hex": stimuli, f"{path.stem}_responses.hex": responses}
@@ -139,6 +147,9 @@ def vector_files(path: Path, vectors: Vectors, interface: InterfaceFacts, sample
             content, stimuli=vectors.stimuli, responses=vectors.responses, status=vectors.status, allow_pickle=False
         )
         return {path.name: content.getvalue()}
+    if path.suffix == ".wav":
+        sound = wav_bytes(vectors.responses, interface.outputs.fields[0].port, result_rate(interface, sample_rate))
+        return {path.name: sound}
     text = _csv(vectors, interface) if path.suffix == ".csv" else _vcd(vectors, interface, sample_rate)
     return {path.name: text.encode()}
 

@@ -101,6 +101,15 @@ class Trace:
             reading=None if self.reading is None else self.reading[source],
         )
 
+    def first(self, count: int) -> Trace:
+        """Return the first `count` samples, at least one; all if there are fewer."""
+        return replace(
+            self,
+            codes=self.codes[:count],
+            truth=None if self.truth is None else self.truth[:count],
+            reading=None if self.reading is None else self.reading[:count],
+        )
+
     def every(self, count: int) -> Trace:
         """Return the trace with one sample out of `count`, the first among them."""
         return replace(

@@ -32,6 +32,10 @@ class Traces(Protocol):
         """Return the lowest number of samples, before there is a design."""
         ...
 
+    def told(self) -> list[str]:
+        """Return what tells them from those of another source; nothing for the default one."""
+        ...
+
 
 MAX_POINTS = 100_000
 """Combinations, at most."""
@@ -44,7 +48,7 @@ class Task:
     Attributes
     ----------
     key : str
-        Digest of all the others but `traces`, which are those of the version.
+        Digest of all the others; of `traces`, what they tell of themselves.
     changes : dict
         Values of the swept keys, with dots, in the types of JSON.
     tree : dict
@@ -109,6 +113,10 @@ class Subject:
         data = None if calibration is None else calibration.data
         return "" if data is None else hashlib.sha256(data.read_bytes()).hexdigest()
 
+    @cached_property
+    def _stimuli(self) -> list[str]:
+        return self.traces.told()
+
     def task(self, changes: dict[str, Any]) -> Task:
         """Make the task with these values.
 
@@ -118,7 +126,7 @@ class Subject:
             If a key is of a table that the specification lacks.
         """
         tree = changed(self.spec.source, changes)
-        told = [tree, self.core, self.samples, self.seed, self.board, self._measurements, __version__]
+        told = [tree, self.core, self.samples, self.seed, self.board, self._measurements, __version__, *self._stimuli]
         return Task(
             key=hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest(),
             changes=changes,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import wave
 from functools import partial
 from pathlib import Path
 from urllib.request import urlopen
@@ -48,6 +49,19 @@ def test_a_trace_goes_through_a_board(tmp_path: Path) -> None:
     status = made.core.datapath.compute_status(trace.codes)
     expected = zip(trace.time.tolist(), values, codes.tolist(), status.tolist(), strict=True)
     assert lines == [",".join(map(str, row)) for row in expected]
+
+
+def test_sound_goes_through_a_board_and_comes_out_as_sound(tmp_path: Path) -> None:
+    made = filter_design()
+    trace = made.trace("sweep", seconds=0.1)
+    trace.write(tmp_path / "in.wav")
+    with plugged(model_of(made.core)) as port:
+        STREAM.good(port, str(tmp_path / "in.wav"), "-o", str(tmp_path / "out.wav"))
+    with wave.open(str(tmp_path / "out.wav")) as file:
+        assert (file.getframerate(), file.getnchannels()) == (made.specification.sample_rate, 1)
+        played = np.frombuffer(file.readframes(1000), "<i2")
+    output = made.core.datapath.output
+    assert played.tolist() == (made.run_codes(x=trace.coded[0].codes[:, 0]) << (16 - output.bits)).tolist()
 
 
 def test_one_trace_drives_all_channels(tmp_path: Path) -> None:

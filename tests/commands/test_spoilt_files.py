@@ -95,6 +95,7 @@ SUBJECTS = (
         for kind in ("npy", "csv", "mat")
     ),
     Subject("trace.csv", ("spectrum trace.csv", "simulate demo.toml --trace trace.csv"), 8),
+    Subject("song.wav", ("simulate plain.toml --trace song.wav --realization df1",), 5),
     Subject("ride.csv", ("spectrum ride.csv",), 5),
     Subject("record.csv", ("wear record.csv --initial 1.5 --limit 9 --warning 7",), 20),
     Subject(
@@ -188,6 +189,7 @@ def write_valid_files(folder: Path) -> None:
     book.save(folder / "book.xlsx")
     for command in (
         "emulate demo.toml wear_ramp --seconds 2 -o trace.csv",
+        "emulate plain.toml noise --seconds 0.1 -o song.wav",
         "generate plain.toml --realization df1 -o .",
         "calibrate add measured.csv --store kept.db --date 2024-03-01",
         *(f"generate {kind}.toml -o ." for kind in ("npy", "csv", "mat")),

@@ -34,6 +34,7 @@ from sosmith.model.errors import SosmithError, SpecificationError
 from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
 from sosmith.model.tables import csv_table
+from sosmith.model.traces import wav_file
 from sosmith.model.traces.signal_file import read_signal_file
 from sosmith.model.traces.trace_file import read_traces
 from sosmith.sim.exploration import record
@@ -178,6 +179,49 @@ def test_tables_that_are_kept_whole_have_a_limit_of_cells(tmp_path: Path, monkey
     path.write_text("a,b\n" + "1,2\n" * 51)
     with pytest.raises(SpecificationError, match=r"csv, line 52: the table must have at most 100 cells, not go on$"):
         csv_table.read_csv_table(path, ["a", "b"])
+
+
+def wav(*chunks: bytes) -> bytes:
+    body = b"WAVE" + b"".join(chunks)
+    return b"RIFF" + struct.pack("<I", len(body)) + body
+
+
+FORMAT = b"fmt " + struct.pack("<IHHIIHH", 16, 1, 1, 100, 300, 3, 24)
+SOUNDS: dict[str, bytes] = {
+    "more samples than there are": wav(FORMAT, b"data\xff\xff\xff\xff", bytes(3)),
+    "sizes of 64 bits": wav(b"ds64" + struct.pack("<IQQQI", 28, 1 << 62, 1 << 62, 1 << 60, 0), FORMAT).replace(
+        b"RIFF", b"RF64"
+    ),
+    "chunks": wav(b"LIST\0\0\0\0" * 500_000, FORMAT, b"data\3\0\0\0", bytes(3)),
+    "channels": wav(
+        FORMAT[:10] + b"\xff\xff" + FORMAT[12:20] + b"\xfd\xff" + FORMAT[22:], b"data\0\0\1\0", bytes(65536)
+    ),
+    "zeros": b"",
+}
+
+
+@pytest.mark.parametrize("name", SOUNDS)
+def test_sounds(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(wav_file, "MAX_BYTES", 16 << 20)
+    path = tmp_path / "bomb.wav"
+    write(path, SOUNDS[name])
+    with little_memory(), pytest.raises(SpecificationError) as told:
+        wav_file.read_wav(path, (PORT,), Fraction(100))
+    one_sentence(told.value, path)
+
+
+def test_each_byte_of_a_sound_and_each_end(tmp_path: Path) -> None:
+    content, path = wav(FORMAT, b"LIST\1\0\0\0xx", b"data\6\0\0\0", bytes(6)), tmp_path / "spoilt.wav"
+    changed = [content[:k] + bytes([value]) + content[k + 1 :] for k in range(len(content)) for value in (0, 255)]
+    read = 0
+    for spoilt in changed + [content[:k] for k in range(len(content))]:
+        path.write_bytes(spoilt)
+        try:
+            wav_file.read_wav(path, (PORT,), Fraction(100))
+            read += 1
+        except SpecificationError as error:
+            one_sentence(error, path)
+    assert 0 < read < len(changed)
 
 
 TREES: dict[str, bytes] = {

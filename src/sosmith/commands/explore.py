@@ -47,6 +47,11 @@ from sosmith.terminal import JSON_OPTION, note, print_json, reader_may_leave, sh
     show_default=True,
     help="Samples to run each design on, for each channel.",
 )
+@click.option(
+    "--trace",
+    metavar="FILE.csv|wav|toml|SCENARIO",
+    help="Stimulus of the inputs; of a file, the first samples.  [default: that of `sosmith simulate`]",
+)
 @click.option("--simulate", is_flag=True, help="Co-simulate the designs of the front, each with a report.")
 @click.option(
     "--simulator",
@@ -68,6 +73,7 @@ def explore_command(
     core: str | None,
     board: str | None,
     samples: int,
+    trace: str | None,
     simulate: bool,
     simulator: str,
     parquet: bool,
@@ -108,6 +114,7 @@ def explore_command(
                 core=core,
                 board=board,
                 samples=samples,
+                trace=trace,
                 seed=seed,
                 simulate=simulate,
                 simulator=simulator,

@@ -35,6 +35,7 @@ from sosmith.interface.choices import (
     did_you_mean,
     fitting,
     is_scenario_file,
+    is_trace_file,
 )
 from sosmith.interface.files import default_folder, write_file, write_files
 from sosmith.model.errors import SpecificationError
@@ -88,7 +89,7 @@ def _empty_cache(ctx: click.Context, param: click.Parameter, wanted: bool) -> No
 @click.option(
     "--trace",
     "source",
-    metavar="FILE.csv|FILE.toml|SCENARIO",
+    metavar="FILE.csv|wav|toml|SCENARIO",
     help="Stimulus of the inputs.  [default: wear_ramp, or sweep without a calibration]",
 )
 @click.option(
@@ -125,8 +126,9 @@ def _empty_cache(ctx: click.Context, param: click.Parameter, wanted: bool) -> No
 @click.option(
     "--vectors",
     type=click.Path(path_type=Path),
-    metavar="FILE.csv|npz|vcd|hex",
-    help="Also write the codes of all samples, in and out; .hex gives two files for $readmemh.",
+    metavar="FILE.csv|npz|vcd|hex|wav",
+    help="Also write the codes of all samples, in and out; .hex gives two files for $readmemh, .wav what "
+    "came out, as sound.",
 )
 @click.option(
     "--empty-cache",
@@ -240,7 +242,7 @@ def simulate_command(
     help="Write the depot measurements of FILE.toml instead, for `sosmith calibrate add`.",
 )
 @SEED
-@output_option("CSV file to write.  [default: stdout]", stdout=True)
+@output_option("CSV file to write, or WAV file if its name ends so.  [default: stdout]", stdout=True)
 def emulate_command(
     spec: Path,
     scenario: str | None,
@@ -365,7 +367,7 @@ def _kind(spec: Specification, core: str | None) -> str:
 
 def _is_file(source: str) -> bool:
     """Tell whether a trace comes from a file: by its suffix, or because the file exists."""
-    return source not in SCENARIOS and (source.lower().endswith((".csv", ".toml")) or Path(source).exists())
+    return source not in SCENARIOS and (is_trace_file(source) or is_scenario_file(source) or Path(source).exists())
 
 
 def _write_measurements(spec: Path, source: str | None, seed: int, output: Path | None) -> None:

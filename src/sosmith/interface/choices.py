@@ -22,6 +22,7 @@ from sosmith.instrument.spectrum.settings import COVERAGE, DETRENDS, PASSBAND_LO
 from sosmith.instrument.vehicle.choices import LEVELS, MODELS, TRACK_NAMES
 from sosmith.instrument.wear.record_columns import CLEARANCES, TIMES
 from sosmith.model.suggestion import did_you_mean
+from sosmith.model.traces.suffixes import is_trace_file
 
 __all__ = [
     "BOARDS",
@@ -57,6 +58,7 @@ __all__ = [
     "fitting",
     "identifier_from",
     "is_scenario_file",
+    "is_trace_file",
     "picture_format",
 ]
 

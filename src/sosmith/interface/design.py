@@ -317,8 +317,8 @@ class Design:
         Parameters
         ----------
         source : str or path
-            Name of a built-in trace, one of `scenarios`, or a CSV or scenario file. By default a trace that exercises
-            most of the design.
+            Name of a built-in trace, one of `scenarios`, or a CSV, WAV or scenario file. By default a trace that
+            exercises most of the design.
         seconds : float
             Length of a built-in trace, in seconds of simulated time.
         seed : int
@@ -613,9 +613,9 @@ class Design:
         Parameters
         ----------
         trace : str, path or mapping of arrays
-            Stimulus of the inputs: the name of a built-in trace (`sosmith emulate SPEC` lists them), a CSV or scenario
-            file, or arrays as `run` takes them. By default a trace that exercises most of the core. If several channels
-            get the same trace, each lags the previous one by a sample.
+            Stimulus of the inputs: the name of a built-in trace (`sosmith emulate SPEC` lists them), a CSV, WAV or
+            scenario file, or arrays as `run` takes them. By default a trace that exercises most of the core. If several
+            channels get the same trace, each lags the previous one by a sample.
         folder : path
             Folder for the files, ``build/<name>`` by default.
         seconds : float
@@ -633,7 +633,8 @@ class Design:
         waves : bool
             Whether to write a waveform (VCD) as well.
         vectors : path
-            File for the input and output codes of all samples: .csv, .npz, .vcd, or .hex for ``$readmemh``.
+            File for the input and output codes of all samples: .csv, .npz, .vcd, or .hex for ``$readmemh``; .wav for
+            the output codes alone, as sound.
         seed : int
             Random seed for noise and handshakes.
         date : str
@@ -657,7 +658,7 @@ class Design:
             If the board does not answer.
         """
         # The simulation modules are slow to import; a design that only computes does not need them.
-        from sosmith.gen.output.vectors import check_format
+        from sosmith.gen.output.vectors import check_format, result_rate
         from sosmith.instrument.calibration.measurement_files import parse_date
         from sosmith.instrument.uncertainty.instrument_budget import budget_in_json
         from sosmith.interface.report import Report
@@ -669,7 +670,7 @@ class Design:
             if not 0 <= share <= 0.99:
                 raise SpecificationError(f"{name} must be from 0 to 0.99, not {share}")
         if vectors is not None:
-            check_format(Path(fspath(vectors)))
+            check_format(Path(fspath(vectors)), result_rate(self.facts.interface, self.core.spec.sample_rate))
         if date is not None:
             parse_date(date)
         board = None if gates is None else find_board(gates, MODELLED)

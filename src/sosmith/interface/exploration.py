@@ -141,6 +141,7 @@ def explore(
     core: str | None = None,
     board: str | None = None,
     samples: int = 20_000,
+    trace: str | PathLike[str] | None = None,
     seed: int = 1,
     simulate: bool = False,
     simulator: str = "verilator",
@@ -172,7 +173,9 @@ def explore(
         Name of a board: the cost is counted after synthesis for its FPGA, which takes seconds for each design, once.
         By default it is estimated for the parallel architecture, and the length of the program for the others.
     samples : int
-        Length of the trace for each channel, the default one of `Design.simulate`.
+        Length of the trace for each channel; of a file, as many of its first samples.
+    trace : str or path
+        Name of a built-in trace, or a CSV, WAV or scenario file; by default that of `Design.simulate`.
     seed : int
         Seed of its noise.
     simulate : bool
@@ -201,7 +204,7 @@ def explore(
     >>> found
     <sosmith.Exploration sos_filter: 4 points, ... on the front>
     """
-    from sosmith.instrument.scenarios.traces import DefaultTraces
+    from sosmith.instrument.scenarios.traces import ChosenTraces
     from sosmith.instrument.uncertainty.instrument_budget import budget_in_json
     from sosmith.sim.exploration.confirmation import confirmed
     from sosmith.sim.exploration.parameters import default_parameters
@@ -216,6 +219,8 @@ def explore(
     asked = specification_of(specification).checked
     swept = default_parameters(asked) if parameters is None else _plain(parameters)
     place = Path("build") / f"{asked.name}-exploration" if folder is None else Path(fspath(folder))
+    traces = ChosenTraces(None if trace is None else fspath(trace))
+    traces.check(asked, core)
     if scheduler is None:
         runner = partial(in_processes, jobs=jobs or processors())
     else:
@@ -227,7 +232,7 @@ def explore(
         swept,
         place,
         runner,
-        traces=DefaultTraces(),
+        traces=traces,
         search=search,
         core=core,
         samples=samples,

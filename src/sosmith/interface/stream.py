@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from fractions import Fraction
 from os import PathLike, fspath
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from sosmith.host.rows import columns, rows
 from sosmith.host.trace_samples import samples_for
 from sosmith.model.link.identity import Identity
 from sosmith.model.text_files import write_file
+from sosmith.model.traces.wav_file import check_rate, is_wav, wav_bytes
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +44,7 @@ class Streamed:
         baud: int = BAUD,
         progress: Callable[[str, int, int], None] = lambda step, done, total: None,
     ) -> Streamed:
-        """Send the samples of a CSV file through the board at a port, from reset.
+        """Send the samples of a CSV or WAV file through the board at a port, from reset.
 
         Raises
         ------
@@ -63,8 +65,20 @@ class Streamed:
         return as_csv([columns(self.identity), *rows(self.identity, self.results)])
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write the same rows to a CSV file, or to a new Parquet file if its name ends so."""
+        """Write the same rows to a CSV file, or to a new Parquet file if its name ends so; .wav: the codes as sound.
+
+        Raises
+        ------
+        SpecificationError
+            If the file cannot be written, or the sample rate is not one of a WAV file.
+        """
         target = Path(fspath(path))
+        if is_wav(target):
+            rate = Fraction(self.identity.sample_rate).limit_denominator(10**9)
+            check_rate(target, rate)
+            codes = self.results.codes.reshape(-1, self.identity.channels)
+            write_file(target, wav_bytes(codes, self.identity.output_port, rate))
+            return
         if target.suffix.lower() != ".parquet":
             write_file(target, self.csv())
             return

@@ -70,16 +70,17 @@ class Trace:
         return traces_csv(self.coded)
 
     def write(self, path: str | PathLike[str]) -> None:
-        """Write the CSV file.
+        """Write the CSV file, or sound if the name ends in .wav: codes of a core with one input.
 
         Raises
         ------
         SpecificationError
-            If the folder cannot be written.
+            If the folder cannot be written; for sound, if there are several inputs, or the sample rate is no whole
+            number of Hz.
         """
-        from sosmith.model.traces.trace_file import write_traces
+        from sosmith.model.traces.formats import write_trace_file
 
-        write_traces(Path(fspath(path)), self.coded)
+        write_trace_file(Path(fspath(path)), self.coded)
 
 
 def _columns(channels: Sequence[Floats]) -> Floats:

@@ -2,6 +2,7 @@
 
 import io
 import re
+import wave
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -138,12 +139,27 @@ def test_vcd_has_the_codes_at_the_times_of_the_samples() -> None:
     assert lines[-1] == "#20000000"
 
 
+def test_sound_has_the_codes_that_came_out_at_their_rate() -> None:
+    def sound(vectors: Vectors, interface: InterfaceFacts, rate: Fraction = RATE) -> tuple[int, list[int]]:
+        content = vector_files(Path("run.wav"), vectors, interface, rate)["run.wav"]
+        with wave.open(io.BytesIO(content)) as file:
+            return file.getframerate(), np.frombuffer(file.readframes(100), "<i2").tolist()
+
+    bits = 16 - filter_design().facts.interface.outputs.fields[0].port.bits
+    assert sound(samples([1, 2], [3, -4]), one_channel()) == (100, [3 << bits, -4 << bits])
+    assert sound(DECIMATED, one_channel(every=4)) == (25, [6 << bits, 7 << bits])
+    assert sound(HELD, one_channel(every=4, copies=4))[0] == 100
+    message = r"^run\.wav: the sample rate of a WAV file must be a whole number of Hz, not 33\.3333333333$"
+    with pytest.raises(SpecificationError, match=message):
+        sound(DECIMATED, one_channel(every=3))
+
+
 def test_negative_codes_are_extended_to_whole_bytes() -> None:
     stream = filter_design().facts.interface.inputs
     assert [f"{word:04x}" for word in words(np.array([[-1], [-512], [511]]), stream)] == ["ffff", "fe00", "01ff"]
 
 
 def test_an_unknown_format_is_refused() -> None:
-    message = r"^run\.fst: a file of vectors must end in \.csv, \.npz, \.vcd, \.hex, not '\.fst'$"
+    message = r"^run\.fst: a file of vectors must end in \.csv, \.npz, \.vcd, \.hex, \.wav, not '\.fst'$"
     with pytest.raises(SpecificationError, match=message):
         files("run.fst")

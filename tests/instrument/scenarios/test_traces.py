@@ -2,15 +2,16 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.interface.small import FILTER, INSTRUMENT, instrument_design
+from tests.interface.small import FILTER, INSTRUMENT, filter_design, instrument_design
 
 import sosmith
 from sosmith import SpecificationError
 from sosmith.gen.stimuli.core import bench_before, bench_of
-from sosmith.instrument.scenarios.traces import DefaultTraces
+from sosmith.instrument.scenarios.traces import ChosenTraces
 
 
 @pytest.mark.slow
@@ -38,8 +39,30 @@ def test_so_is_what_stands_before_a_decimator() -> None:
 
 def test_the_least_samples_are_enough_and_one_fewer_is_not() -> None:
     made = instrument_design().core
-    traces, rate = DefaultTraces(), float(made.spec.sample_rate)
+    traces, rate = ChosenTraces(), float(made.spec.sample_rate)
     least = traces.least(made.spec, None)
     assert traces(made, 1, least / rate)[0].reading.sum() == 1
     with pytest.raises(SpecificationError, match=r"^seconds must be at least \S+ for wear_ramp \("):
         traces(made, 1, (least - 1) / rate)
+
+
+def test_traces_of_a_file_are_its_first_samples_and_told_by_its_content(tmp_path: Path) -> None:
+    made = filter_design()
+    whole, path = made.trace("noise", seconds=0.5), tmp_path / "noise.wav"
+    whole.write(path)
+    traces = ChosenTraces(str(path))
+    traces.check(made.core.spec, None)
+    (trace,) = traces(made.core, 1, 0.1)
+    assert np.array_equal(trace.codes, whole.coded[0].codes[:100])
+    assert traces.least(made.core.spec, None) == 1
+    assert ChosenTraces().told() == []
+    assert ChosenTraces("noise").told() == ["noise"]
+    before = traces.told()
+    path.write_bytes(path.read_bytes()[:-1] + b"\x01")
+    assert len({*before, *traces.told()}) == 2
+    with pytest.raises(SpecificationError, match=r"^scenario for a plain filter must be one of .*, not 'noises'"):
+        ChosenTraces("noises").check(made.core.spec, None)
+    with pytest.raises(
+        SpecificationError, match=r"^none\.wav: the WAV file must be a readable file, not: no such file"
+    ):
+        ChosenTraces("none.wav").check(made.core.spec, None)

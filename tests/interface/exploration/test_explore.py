@@ -191,6 +191,17 @@ def test_options_that_do_not_fit(options: dict[str, Any], message: str, tmp_path
         explored(tmp_path, **options)
 
 
+def test_a_sound_is_the_trace_of_all_designs(tmp_path: Path) -> None:
+    spec, sweep = sosmith.Specification.load(FILTER), {"hardware.realization": ["df1"]}
+    sosmith.design(spec, realization="df1").trace("noise", seconds=0.1).write(tmp_path / "noise.wav")
+    made = [
+        sosmith.explore(spec, sweep, folder=tmp_path / "explored", samples=100, trace=trace, jobs=1).points[0]
+        for trace in (tmp_path / "noise.wav", "noise", None)
+    ]
+    assert len({point["key"] for point in made}) == 3
+    assert made[0]["trace_sha256"] == made[1]["trace_sha256"] != made[2]["trace_sha256"]
+
+
 def test_too_few_samples_for_every_design_are_told_before_the_first(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -10,7 +10,7 @@ import pytest
 from tests.interface.small import FILTER
 
 from sosmith import Specification, SpecificationError
-from sosmith.instrument.scenarios.traces import DefaultTraces
+from sosmith.instrument.scenarios.traces import ChosenTraces
 from sosmith.sim.exploration.front import pareto_front
 from sosmith.sim.exploration.grid import Subject, Task, changed, tasks_of
 from sosmith.sim.exploration.parameters import Span, Values, default_parameters, read_parameter
@@ -54,7 +54,7 @@ def test_parameters_that_cannot_be_read(text: str, message: str) -> None:
 
 
 def tasks(parameters: dict[str, Values], **changes: Any) -> list[Task]:
-    known: dict[str, Any] = {"core": None, "samples": 100, "seed": 1, "board": None, "traces": DefaultTraces()}
+    known: dict[str, Any] = {"core": None, "samples": 100, "seed": 1, "board": None, "traces": ChosenTraces()}
     return tasks_of(Subject(spec=SPEC, **(known | changes)), parameters)
 
 

@@ -14,7 +14,7 @@ from tests.suite.extras import needs
 
 import sosmith
 from sosmith import Specification, SpecificationError, ToolError
-from sosmith.instrument.scenarios.traces import DefaultTraces
+from sosmith.instrument.scenarios.traces import ChosenTraces
 from sosmith.sim.exploration.grid import Task
 from sosmith.sim.exploration.parameters import Parameters, Span
 from sosmith.sim.exploration.run import Outcome, explore
@@ -75,7 +75,7 @@ def searched(
     folder: Path, count: int = COUNT, *, seed: int = 1, machine: Machine | None = None, **more: Any
 ) -> Outcome:
     return explore(
-        SPEC, SPACE | more, folder, machine or Machine(), traces=DefaultTraces(), search=count, samples=100, seed=seed
+        SPEC, SPACE | more, folder, machine or Machine(), traces=ChosenTraces(), search=count, samples=100, seed=seed
     )
 
 
@@ -140,7 +140,7 @@ def test_architectures_whose_costs_count_different_things_are_searched_apart(tmp
 
 def test_a_space_that_is_small_enough_is_a_grid(tmp_path: Path) -> None:
     small = {"hardware.realization": ["df1", "df2t"], "output.bits": Span(12, 14), "output.max_error": [0.01]}
-    found = explore(SPEC, small, tmp_path, Machine(), traces=DefaultTraces(), search=6, samples=100)
+    found = explore(SPEC, small, tmp_path, Machine(), traces=ChosenTraces(), search=6, samples=100)
     assert [tuple(point["changes"].values())[:2] for point in found.points] == [
         (name, bits) for name in ("df1", "df2t") for bits in (12, 13, 14)
     ]
@@ -152,7 +152,7 @@ def test_a_space_that_is_used_up_ends_the_search(tmp_path: Path) -> None:
         "output.max_error": Span(0.01, 0.01001),
         "output.bits": [12],
     }
-    found = explore(SPEC, small, tmp_path, Machine(), traces=DefaultTraces(), search=100, samples=100)
+    found = explore(SPEC, small, tmp_path, Machine(), traces=ChosenTraces(), search=100, samples=100)
     assert 2 <= len(found.points) <= 4
 
 
