@@ -24,7 +24,7 @@ Half of full scale leaves room for the overshoot of common filters.
 def step(run: Run) -> Emulated:
     """Step through `STEP_LEVELS`, each held until the filter has settled; raises if the trace is too short."""
     steps = plateaus(run, STEP_LEVELS, _step_heights(run.bench))
-    codes = _scaled(run, steps.values)
+    codes = scaled(run, steps.values)
     return Emulated(codes, run.bench.ports[0].decode(codes[:, 0]), steps.reading)
 
 
@@ -43,7 +43,7 @@ def step_samples(bench: Bench) -> int:
 def sweep(run: Run) -> Emulated:
     """Generate a sine whose frequency rises linearly from zero to `SWEEP_END` of the sample rate."""
     cycles = SWEEP_END / 2 * np.arange(run.samples) * run.progress
-    return Emulated(_scaled(run, SWEEP_AMPLITUDE * np.sin(2 * np.pi * cycles)))
+    return Emulated(scaled(run, SWEEP_AMPLITUDE * np.sin(2 * np.pi * cycles)))
 
 
 def noise(run: Run) -> Emulated:
@@ -52,7 +52,7 @@ def noise(run: Run) -> Emulated:
     return Emulated(run.rng.integers(port.lowest, port.highest, (run.samples, 1), dtype=np.int64, endpoint=True))
 
 
-def _scaled(run: Run, signal: Values) -> Codes:
+def scaled(run: Run, signal: Values) -> Codes:
     """Return the codes of a signal in -1..1, where -1 and 1 are the ends of the input range."""
     port = run.bench.ports[0]
     middle, half = (port.highest + port.lowest) / 2, (port.highest - port.lowest) / 2

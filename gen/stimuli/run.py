@@ -13,6 +13,7 @@ from sosmith.model.arrays import Codes, Values
 from sosmith.model.errors import SpecificationError
 from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
+from sosmith.model.traces.trace import Tone
 
 MIN_SAMPLES = 4000
 """Lowest default number of samples of a trace."""
@@ -71,6 +72,19 @@ class Bench:
     def kind(self) -> str:
         """``"instrument"`` with a calibration, else ``"filter"``."""
         return "filter" if self.polynomial is None else "instrument"
+
+    @property
+    def bins(self) -> int:
+        """Number of frequencies from zero to half the sample rate at which the gain is computed."""
+        return (1 << max(len(self.impulse_response), 1 << 14).bit_length()) // 2 + 1
+
+    @cached_property
+    def _gains(self) -> Values:
+        return np.asarray(np.abs(np.fft.rfft(self.impulse_response, 2 * (self.bins - 1))))
+
+    def gain(self, frequency: Values) -> Values:
+        """Return the gain of the ideal filter, before its output is decimated, at frequencies in Hz."""
+        return np.interp(frequency, np.linspace(0, float(self.sample_rate) / 2, self.bins), self._gains)
 
     def settling(self, step: float) -> int:
         """Return the samples from an input step until the output stays within half an output LSB of its final value.
@@ -137,8 +151,11 @@ class Emulated:
         True values, in the unit of the core's output.
     reading : ndarray of bool, shape (n,), optional
         Samples at which the measurement is compared with `truth`.
+    tone : Tone, optional
+        What the signal is, where it is a sine.
     """
 
     codes: Codes
     truth: Values | None = None
     reading: npt.NDArray[np.bool_] | None = None
+    tone: Tone | None = None

@@ -14,6 +14,7 @@ import numpy as np
 from sosmith.gen.stimuli.filter_signals import noise, step, step_samples, sweep
 from sosmith.gen.stimuli.plateaus import stepped_samples
 from sosmith.gen.stimuli.run import MIN_SAMPLES, Bench, Emulated, Run
+from sosmith.gen.stimuli.sound import multitone, passband_sweep, pink_noise, tone, tone_samples
 from sosmith.gen.stimuli.worst_case_inputs import all_responses, worst_cases, worst_cases_samples
 from sosmith.instrument.scenarios.instrument_signals import (
     RAMP_CLEARANCE,
@@ -86,6 +87,7 @@ def emulate(name: str, bench: Bench, *, seed: int, seconds: float | None = None)
         codes=signal.codes,
         truth=signal.truth,
         reading=signal.reading,
+        tone=signal.tone,
         seed=seed,
     )
 
@@ -147,6 +149,26 @@ SCENARIOS: dict[str, Scenario] = {
             "noise",
             lambda _bench: 4 * MIN_SAMPLES,
             noise,
+        ),
+        Scenario(
+            "passband_sweep",
+            lambda _bench: 4 * MIN_SAMPLES,
+            passband_sweep,
+        ),
+        Scenario(
+            "tone",
+            tone_samples,
+            tone,
+        ),
+        Scenario(
+            "multitone",
+            lambda _bench: 4 * MIN_SAMPLES,
+            multitone,
+        ),
+        Scenario(
+            "pink_noise",
+            lambda _bench: 4 * MIN_SAMPLES,
+            pink_noise,
         ),
     )
 }

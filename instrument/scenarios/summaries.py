@@ -60,6 +60,22 @@ SUMMARIES = {
         "white noise, uniform over all codes",
         ("filter",),
     ),
+    "passband_sweep": Summary(
+        "sine at 1 dB below full scale, slow where the filter passes and fast elsewhere",
+        ("filter",),
+    ),
+    "tone": Summary(
+        "sine at 997 Hz, or in the passband, at 1 dB below full scale, for distortion and noise",
+        ("filter",),
+    ),
+    "multitone": Summary(
+        "sines at thirds of an octave with random phases, peaks at 1 dB below full scale",
+        ("filter",),
+    ),
+    "pink_noise": Summary(
+        "noise of equal power in each octave, peaks at 1 dB below full scale",
+        ("filter",),
+    ),
 }
 """All scenarios by name, in the order in which they are shown to the user."""
 

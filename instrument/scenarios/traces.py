@@ -16,6 +16,7 @@ from sosmith.instrument.scenarios.summaries import check_scenario
 from sosmith.instrument.scenarios.vehicle_clearance import vehicle_clearance
 from sosmith.model.errors import SpecificationError
 from sosmith.model.foreign_files import read_bytes
+from sosmith.model.full_scale import is_sound
 from sosmith.model.traces.formats import read_trace_file
 from sosmith.model.traces.suffixes import is_trace_file
 from sosmith.model.traces.trace import Trace
@@ -23,7 +24,9 @@ from sosmith.model.traces.trace import Trace
 
 def default_scenario(design: CoreDesign) -> str:
     """Return the default scenario of a core."""
-    return "sweep" if design.quantized.polynomial is None else "wear_ramp"
+    if design.quantized.polynomial is not None:
+        return "wear_ramp"
+    return "passband_sweep" if is_sound(design.datapath.inputs, design.datapath.output) else "sweep"
 
 
 def traces_for(design: CoreDesign, source: str, *, seed: int, seconds: float | None = None) -> tuple[Trace, ...]:

@@ -13,6 +13,22 @@ from sosmith.model.arrays import Codes, Values
 from sosmith.model.port import Port
 
 
+@dataclass(frozen=True)
+class Tone:
+    """A sine.
+
+    Attributes
+    ----------
+    frequency : Fraction
+        Frequency in Hz.
+    settled : int
+        Number of samples after which nothing is left of its beginning.
+    """
+
+    frequency: Fraction
+    settled: int
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Trace:
     """Input codes of a core, one row per sample. All arrays are read-only; those that already are so are not copied.
@@ -33,6 +49,8 @@ class Trace:
         Samples at which the measurement is compared with `truth`.
     seed : int, optional
         Seed of a generated trace.
+    tone : Tone, optional
+        What the only input is, where it is a sine.
     limited : tuple of int
         Number of values of each input that were out of its range before they became codes; empty if none can have been.
 
@@ -50,6 +68,7 @@ class Trace:
     truth: Values | None = None
     reading: npt.NDArray[np.bool_] | None = None
     seed: int | None = None
+    tone: Tone | None = None
     limited: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
@@ -99,6 +118,7 @@ class Trace:
             codes=self.codes[source],
             truth=None if self.truth is None else self.truth[source],
             reading=None if self.reading is None else self.reading[source],
+            tone=None if self.tone is None else replace(self.tone, settled=self.tone.settled + samples),
         )
 
     def first(self, count: int) -> Trace:
@@ -118,6 +138,7 @@ class Trace:
             codes=self.codes[::count],
             truth=None if self.truth is None else self.truth[::count],
             reading=None if self.reading is None else self.reading[::count],
+            tone=None if self.tone is None else replace(self.tone, settled=-(-self.tone.settled // count)),
         )
 
     def values(self) -> Values:

@@ -90,7 +90,7 @@ def _empty_cache(ctx: click.Context, param: click.Parameter, wanted: bool) -> No
     "--trace",
     "source",
     metavar="FILE.csv|wav|toml|SCENARIO",
-    help="Stimulus of the inputs.  [default: wear_ramp, or sweep without a calibration]",
+    help="Stimulus of the inputs.  [default: wear_ramp; without a calibration sweep, or passband_sweep for sound]",
 )
 @click.option(
     "--simulator",

@@ -80,7 +80,7 @@ def test_same_seed_same_trace_of_reasonable_length(name: str, bench: str) -> Non
     assert MIN_SAMPLES <= len(trace) <= MAX_SAMPLES
     assert len(trace) == SCENARIOS[name].default_samples(BENCHES[bench])
     assert (trace.name, trace.seed) == (name, 7)
-    random = name not in {"worst_case", "worst_case_errors", "step", "sweep"}
+    random = name not in {"worst_case", "worst_case_errors", "step", "sweep", "passband_sweep", "tone"}
     assert random == bool(np.any(trace.codes != emulate(name, BENCHES[bench], seed=8).codes))
 
 
@@ -227,10 +227,76 @@ def test_noise_is_white_and_covers_every_part_of_the_range() -> None:
     assert abs(np.mean(x[1:] * x[:-1])) < 0.03 * np.mean(x**2)
 
 
+TOP = 10 ** (-1 / 20)
+
+
+def high_pass(*edges: float) -> Bench:
+    impulse = np.zeros(1 << 12)
+    impulse[0] = 1.0
+    kind = "highpass" if len(edges) == 1 else "bandpass"
+    sos = signal.butter(2, edges if len(edges) > 1 else edges[0], kind, fs=48000, output="sos")
+    return replace(FILTER, impulse_response=signal.sosfilt(sos, impulse))
+
+
+SLOW = replace(FILTER, impulse_response=butterworth(1, 5, 48000))
+DOUBLED = replace(FILTER, impulse_response=4 * FILTER.impulse_response)
+
+
+@pytest.mark.parametrize(
+    ("bench", "frequency", "amplitude"),
+    [
+        (FILTER, 997, TOP),
+        (DOUBLED, 997, TOP / 4 * np.sqrt(2)),
+        (high_pass(10000), 15400, TOP),
+        (high_pass(2000, 3000), 2440, TOP),
+        (SLOW, 1.49, TOP),
+    ],
+)
+def test_the_tone_is_where_the_filter_passes_and_saturates_nothing(
+    bench: Bench, frequency: float, amplitude: float
+) -> None:
+    trace = emulate("tone", bench, seed=1, seconds=1)
+    assert trace.tone is not None
+    assert float(trace.tone.frequency) == frequency
+    x = trace.values()[:, 0]
+    np.testing.assert_allclose(x, amplitude * np.sin(2 * np.pi * frequency * trace.time), atol=0.01)
+    assert np.abs(signal.fftconvolve(x, bench.impulse_response)[trace.tone.settled : len(x)]).max() < 1
+    assert trace.delayed(3).tone == replace(trace.tone, settled=trace.tone.settled + 3)
+    assert trace.every(4).tone == replace(trace.tone, settled=-(-trace.tone.settled // 4))
+
+
+@pytest.mark.parametrize("bench", [FILTER, high_pass(10000), high_pass(2000, 3000)])
+def test_the_sweep_of_the_passband_stays_there_and_covers_the_rest(bench: Bench) -> None:
+    x = emulate("passband_sweep", bench, seed=1).values()[:, 0]
+    assert np.abs(x).max() == pytest.approx(TOP, abs=1e-3)
+    passes = np.mean(np.abs(signal.hilbert(signal.fftconvolve(x, bench.impulse_response)[: len(x)])) > 0.5 * TOP)
+    assert passes > 0.7
+    for part, expected in ((x[:1600], 20), (x[-40:], 0.49 * 48000)):
+        assert np.count_nonzero(np.diff(np.signbit(part))) / 2 / len(part) * 48000 == pytest.approx(expected, rel=0.8)
+
+
+def test_the_multitone_has_one_level_at_each_third_of_an_octave() -> None:
+    trace = emulate("multitone", FILTER, seed=1, seconds=1)
+    assert np.abs(trace.values()).max() == pytest.approx(TOP, abs=1e-3)
+    amplitudes = 2 * np.abs(np.fft.rfft(trace.values()[:, 0])) / 48000
+    exact = [10 ** (n / 10) for n in range(14, 44)]
+    found = [float(np.sqrt(np.sum(amplitudes[round(f) - 3 : round(f) + 4] ** 2))) for f in exact]
+    assert max(found) / min(found) < 1.2
+    assert np.sqrt(np.sum(amplitudes**2)) == pytest.approx(np.sqrt(np.sum(np.square(found))), rel=0.02)
+
+
+def test_pink_noise_has_equal_power_in_each_octave() -> None:
+    x = emulate("pink_noise", FILTER, seed=1, seconds=4).values()[:, 0]
+    assert np.abs(x).max() == pytest.approx(TOP, abs=1e-3)
+    power = np.abs(np.fft.rfft(x)) ** 2
+    octaves = [np.sum(power[4 * low : 8 * low]) for low in (100, 200, 400, 800, 1600, 3200, 6400)]
+    assert max(octaves) / min(octaves) < 1.25
+
+
 def test_an_unsigned_plain_filter_stays_in_its_range() -> None:
     port = Port.from_range("level", 12, Fraction(0), Fraction(5), unit="V")
     bench = replace(FILTER, ports=(port,))
-    for name in ("step", "sweep", "noise", "worst_case"):
+    for name in ("step", "sweep", "noise", "worst_case", "passband_sweep", "tone"):
         codes = emulate(name, bench, seed=1).codes
         assert 0 <= codes.min() < 1200
         assert 2900 < codes.max() <= 4095
@@ -271,7 +337,7 @@ def test_seconds_give_the_length() -> None:
             FILTER,
             {},
             "scenario for a plain filter must be one of worst_case, worst_case_errors, step, sweep, noise, "
-            "not 'wear_ramp'",
+            "passband_sweep, tone, multitone, pink_noise, not 'wear_ramp'",
         ),
         ("noise", FILTER, {"seed": -1}, "seed must be 0 or more, not -1"),
         (
