@@ -80,11 +80,11 @@ def pink_noise(run: Run) -> Emulated:
 def passband_sweep(run: Run) -> Emulated:
     """Generate a sine whose frequency rises slowly where the filter passes, and fast where it does not.
 
-    The time in an octave goes with the gain, but for `_EVENLY` of all time.
+    The time in an octave goes with the power that passes, but for `_EVENLY` of all time.
     """
     grid = _grid(run.bench)
-    gain = run.bench.gain(grid)
-    spent = gain * ((1 - _EVENLY) / float(gain.sum())) + _EVENLY / len(grid)  # steps of the grid are equal in octaves
+    power = run.bench.gain(grid) ** 2
+    spent = power * ((1 - _EVENLY) / float(power.sum())) + _EVENLY / len(grid)  # steps of the grid are equal in octaves
     spent = np.concatenate([[0.0], np.cumsum(spent[1:])])
     frequency = np.exp(np.interp(run.progress * spent[-1], spent, np.log(grid)))
     cycles = np.cumsum(frequency) / float(run.bench.sample_rate)

@@ -270,9 +270,9 @@ def test_the_sweep_of_the_passband_stays_there_and_covers_the_rest(bench: Bench)
     x = emulate("passband_sweep", bench, seed=1).values()[:, 0]
     assert np.abs(x).max() == pytest.approx(TOP, abs=1e-3)
     passes = np.mean(np.abs(signal.hilbert(signal.fftconvolve(x, bench.impulse_response)[: len(x)])) > 0.5 * TOP)
-    assert passes > 0.7
-    for part, expected in ((x[:1600], 20), (x[-40:], 0.49 * 48000)):
-        assert np.count_nonzero(np.diff(np.signbit(part))) / 2 / len(part) * 48000 == pytest.approx(expected, rel=0.8)
+    assert passes > 0.6
+    assert not np.signbit(x[:100]).any()  # below 240 Hz at first
+    assert np.count_nonzero(np.diff(np.signbit(x[-40:]))) / 80 == pytest.approx(0.49, rel=0.1)
 
 
 def test_the_multitone_has_one_level_at_each_third_of_an_octave() -> None:
