@@ -170,6 +170,19 @@ def decibels(value: float | None) -> str:
     return f"{value:.2f} dB".replace("-", MINUS)
 
 
+def full_scale_level(value: float | None) -> str:
+    """Level in dB of full scale.
+
+    Examples
+    --------
+    >>> full_scale_level(-94.44), full_scale_level(0.0), full_scale_level(None)
+    ('−94.4 dBFS', '0.0 dBFS', '—')
+    """
+    if value is None or not math.isfinite(value):
+        return "—"
+    return f"{round(value, 1) + 0.0:.1f} dBFS".replace("-", MINUS)
+
+
 def duration(seconds: float) -> str:
     """Duration with a unit: prefixed below a minute, minutes and hours above.
 

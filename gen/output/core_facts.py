@@ -24,6 +24,7 @@ from sosmith.model.dataflow.datapath import Datapath, Stage
 from sosmith.model.dataflow.graph import Graph, Op
 from sosmith.model.dataflow.program import Program
 from sosmith.model.dataflow.status import STATUS_BITS, Flag
+from sosmith.model.full_scale import is_sound
 from sosmith.model.port import Port
 from sosmith.model.reload.registers import INTERFACE
 from sosmith.model.sections.direct_form import DirectForm1
@@ -298,6 +299,8 @@ class CoreFacts:
         The decimator before the filter; None without one.
     cost : Cost
         Operators of the online architecture, or else of the parallel one.
+    clock : float
+        Rate of the clock in Hz, as specified.
     """
 
     core: str
@@ -327,6 +330,7 @@ class CoreFacts:
     aliasing: Aliasing | None
     decimation: DecimationFacts | None
     cost: Cost
+    clock: float
 
     @property
     def name(self) -> str:
@@ -348,6 +352,11 @@ class CoreFacts:
         """Smallest and largest value of the output, in `unit`."""
         low, high = self.output.decode(np.array([self.output.lowest, self.output.highest]))
         return float(low), float(high)
+
+    @property
+    def is_sound(self) -> bool:
+        """Whether it is a filter of signals whose full scale is 1."""
+        return self.core == "filter" and is_sound([each.port for each in self.interface.inputs.fields], self.output)
 
     @property
     def why(self) -> str:
@@ -388,6 +397,7 @@ def core_facts(design: CoreDesign) -> CoreFacts:
         aliasing=None if quantized.filter is None else quantized.filter.aliasing,
         decimation=decimation_facts(design),
         cost=architecture.cost,
+        clock=float(design.spec.hardware.clock),
     )
 
 

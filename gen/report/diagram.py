@@ -12,7 +12,7 @@ from sosmith.gen.quantity import MINUS
 from sosmith.gen.report.plots import COLOUR, NARROW, draw
 from sosmith.gen.report.recursion import Coefficient, Equation, Recursion, Term, gain_words
 
-_ROW, _GAP, _TOP = 27.0, 17.0, 12.0
+_ROW, _GAP, _TOP = 32.0, 17.0, 12.0
 _SIGNAL, _GAIN, _SUM, _ROUNDING, _NAME = 118.0, 200.0, 285.0, 345.0, 384.0
 """Places across the picture in pixels: ends of the signals' names, gains, sums, roundings, results."""
 
@@ -62,7 +62,7 @@ def _paint_term(axes: Axes, term: Term, y: float, known: dict[str, Coefficient])
     name, _, delay = term.signal.partition(f"(n{MINUS}")
     start = _SIGNAL + 4
     if not term.signal:
-        axes.text(_GAIN + 18, y, gain_words(term.gain), ha="right", va="center", fontsize=11)
+        axes.text(_GAIN + 18, y, gain_words(term.gain), ha="right", va="center", fontsize=12)
         return
     delays, after = int(delay.partition(")")[0] or 0), delay.partition(")")[2]
     wrapped = after and name[0] in "⌊tf"
@@ -78,19 +78,19 @@ def _paint_term(axes: Axes, term: Term, y: float, known: dict[str, Coefficient])
         words = f"{words}·{term.coefficient}" if words else term.coefficient
         value = known[term.coefficient]
         number = f"{value.integer / 2**value.frac:.4g}".replace("-", MINUS)
-        axes.text(_GAIN - 18, y + 2, number, ha="right", va="top", fontsize=8.5, color=COLOUR["muted"])
+        axes.text(_GAIN - 18, y + 2, number, ha="right", va="top", fontsize=12, color=COLOUR["muted"])
     if words:
-        corners = [(_GAIN - 14, y - 12), (_GAIN - 14, y + 12), (_GAIN + 20, y)]
+        corners = [(_GAIN - 14, y - 13), (_GAIN - 14, y + 13), (_GAIN + 20, y)]
         axes.fill(*zip(*corners, strict=True), facecolor=COLOUR["hardware"], alpha=0.18, lw=0)
         axes.plot(*zip(*corners, corners[0], strict=True), color=COLOUR["hardware"], lw=1.3)
-        axes.text(_GAIN - 18, y - 2, words, ha="right", va="bottom", fontsize=10.5, color=COLOUR["hardware"])
+        axes.text(_GAIN - 18, y - 2, words, ha="right", va="bottom", fontsize=12, color=COLOUR["hardware"])
 
 
 def _box(axes: Axes, x: float, y: float, words: str, width: float) -> None:
     corners = [(x - width / 2, y - 11), (x + width / 2, y - 11), (x + width / 2, y + 11), (x - width / 2, y + 11)]
     axes.fill(*zip(*corners, strict=True), facecolor=COLOUR["grid"], lw=0, zorder=3)
     axes.plot(*zip(*corners, corners[0], strict=True), color=COLOUR["muted"], lw=1.0, zorder=4)
-    axes.text(x, y, words, ha="center", va="center", fontsize=11, zorder=5)
+    axes.text(x, y, words, ha="center", va="center", fontsize=12, zorder=5)
 
 
 def _line(axes: Axes, points: list[tuple[float, float]], *, arrow: bool = False) -> None:

@@ -9,11 +9,14 @@ from typing import Any
 
 from sosmith.gen.facts.design_tables import ErrorUnit, lsb
 from sosmith.gen.facts.table import Fact, Table
-from sosmith.gen.quantity import count, decibels, duration, in_own_unit, plain_number, quantity
+from sosmith.gen.quantity import count, decibels, duration, full_scale_level, in_own_unit, plain_number, quantity
 from sosmith.gen.report.behaviour import Behaviour
 from sosmith.gen.report.evidence import Evidence
 
 Summary = Mapping[str, Any]
+
+SIMULATION = "The simulation"
+"""Title of the group that is no part of the result, and stands last."""
 
 
 def unbroken(text: str) -> str:
@@ -36,7 +39,8 @@ def headlines(evidence: Evidence, summary: Summary, found: Behaviour) -> list[di
     groups = {
         "The measurement": list(_measurement(run)),
         "The arithmetic": list(_arithmetic(run)),
-        "The simulation": [_speed(evidence)],
+        "The hardware": list(_hardware(evidence)),
+        SIMULATION: [_speed(evidence)],
     }
     return [{"title": title, "facts": [fact.as_dict() for fact in facts]} for title, facts in groups.items() if facts]
 
@@ -57,6 +61,8 @@ def report_table(summary: Summary) -> Table:
 
 
 def _measurement(run: _Run) -> Iterator[Fact]:
+    if (sound := run.summary["sound"]) is not None:
+        yield from _sound(sound)
     evidence, unit = run.evidence, run.evidence.facts.unit
     error, accuracy = run.found.true_error, run.summary["accuracy_percent"]
     if error is not None:
@@ -74,20 +80,33 @@ def _measurement(run: _Run) -> Iterator[Fact]:
         low, high = (plain_number(worth["expanded"][key]) for key in ("smallest", "largest"))
         share = f"with a probability of {100 * worth['probability']:g} %"
         yield Fact("Uncertainty of a reading", f"±{low} to ±{high} {worth['unit']}", sentence=share)
-    yield _delay(evidence, run.found)
+    if run.found.delay is not None and run.found.delay_hz is not None:
+        yield _delay(evidence, run.found.delay, run.found.delay_hz)
     if run.found.settling is not None and run.found.settling_to_lsb is not None and run.found.step is not None:
         yield _settling(run.found.settling, run.found.settling_to_lsb, run.found)
 
 
-def _delay(evidence: Evidence, found: Behaviour) -> Fact:
-    cycles, facts = evidence.facts.interface.latency_cycles, evidence.facts
-    if found.delay is None or found.delay_hz is None or facts.filter is None:
-        return Fact("Delay", count(cycles, "clock cycle"), sentence="from input to output; no filter")
+def _sound(sound: Mapping[str, Any]) -> Iterator[Fact]:
+    tone = sound["tone"]
+    if tone is not None:
+        exact = tone["exact_thd_n_db"]
+        beside = "" if exact is None else f"; the exact calculation on the same input has {decibels(exact)}"
+        at = f"{quantity(tone['frequency'], 'Hz')} at {full_scale_level(tone['level_dbfs'])}{beside}"
+        measured = "none at all" if tone["thd_n_db"] is None else tone["thd_n_db"]
+        yield Fact("Distortion and noise (THD+N)", measured, "dB", at, _level)
+    if sound["rms_dbfs"] is None:
+        yield Fact("Level of the output", "silence", sentence="every code is 0")
+    else:
+        peak = f"RMS; the largest value is at {full_scale_level(sound['peak_dbfs'])}"
+        yield Fact("Level of the output", sound["rms_dbfs"], "dBFS", peak, _full_scale_level)
+
+
+def _delay(evidence: Evidence, delay: float, at: float) -> Fact:
+    facts = evidence.facts
+    assert facts.filter is not None  # that has the delay
     rate = facts.filter.sample_rate * (1 if facts.decimation is None else facts.decimation.factor)
-    where = "of slow changes" if found.delay_hz == 0 else f"at {quantity(found.delay_hz, 'Hz')}"
-    hardware = f"the hardware takes {count(cycles, 'clock cycle')} from input to output"
-    sentence = f"{where}: {plain_number(found.delay * rate)} samples; {hardware}"
-    return Fact("Delay", found.delay, "s", sentence, quantity)
+    where = "of slow changes" if at == 0 else f"at {quantity(at, 'Hz')}"
+    return Fact("Delay of the filter", delay, "s", f"{where}: {plain_number(delay * rate)} samples", quantity)
 
 
 def _settling(time: float, to_lsb: float, found: Behaviour) -> Fact:
@@ -106,11 +125,13 @@ def _arithmetic(run: _Run) -> Iterator[Fact]:
     bound = facts.error_bound
     share = error["max_abs"] / bound if bound else None
     limit = f"{'' if share is None else f'{100 * share:.0f} % of '}the proven limit {shown.amount(bound)}"
+    sound = run.summary["sound"]
+    peak, rms = ("", "") if sound is None else (_also(sound["error_peak_dbfs"]), _also(sound["error_rms_dbfs"]))
     yield Fact(
         "Largest error of the arithmetic",
         error["max_abs"],
         facts.unit,
-        f"{lsb(error['max_lsb'])}, {limit}",
+        f"{lsb(error['max_lsb'])}{peak}, {limit}",
         lambda value, unit: shown.amount(value),
         share,
     )
@@ -118,7 +139,7 @@ def _arithmetic(run: _Run) -> Iterator[Fact]:
         "Typical error (RMS)",
         error["rms"],
         facts.unit,
-        f"{lsb(error['rms'] / facts.lsb)}, mean {shown.amount(error['mean'])}",
+        f"{lsb(error['rms'] / facts.lsb)}{rms}, mean {shown.amount(error['mean'])}",
         lambda value, unit: shown.amount(value),
     )
     taken = run.evidence.run
@@ -131,6 +152,31 @@ def _arithmetic(run: _Run) -> Iterator[Fact]:
     level = run.summary["sqnr_db"] if error["rms"] else "no error at all"
     step = f"one LSB is {shown.amount(facts.lsb)}"
     yield Fact("Signal to error", "—" if level is None else level, "dB", step, _level)
+
+
+def _also(level: float | None) -> str:
+    return "" if level is None else f", {full_scale_level(level)}"
+
+
+def _hardware(evidence: Evidence) -> Iterator[Fact]:
+    """Say what the hardware takes, of the FPGA and of time."""
+    facts, known = evidence.facts, evidence.provenance
+    if known is not None:
+        yield _cost(known.cost)
+    cycles = facts.interface.latency_cycles
+    clock = f"{count(cycles, 'clock cycle')} at {quantity(facts.clock, 'Hz')}, from an input sample to its result"
+    yield Fact("Latency of the hardware", cycles / facts.clock, "s", clock, quantity)
+
+
+def _cost(cost: Mapping[str, Any]) -> Fact:
+    blocks = count(cost["multiplier_blocks"] or 0, "multiplier block")
+    if cost["source"] == "synthesis":
+        return Fact("Cost", count(cost["luts"], "LUT"), sentence=f"{blocks}; synthesized for {cost['board']}")
+    if cost["source"] == "estimate":
+        rest = f"{blocks}, {count(cost['register_bits'], 'flip-flop')}; estimated before synthesis"
+        return Fact("Cost", count(cost["luts"], "LUT"), sentence=rest)
+    memory = f"{count(cost['memory_words'], 'word')} of memory, an accumulator of {cost['accumulator_bits']} bits"
+    return Fact("Cost", count(cost["instructions"], "instruction"), sentence=f"a sample, on one unit; {memory}")
 
 
 def _speed(evidence: Evidence) -> Fact:
@@ -150,6 +196,10 @@ def _clock(value: float, unit: str) -> str:
 
 def _level(value: float, unit: str) -> str:
     return decibels(value)
+
+
+def _full_scale_level(value: float, unit: str) -> str:
+    return full_scale_level(value)
 
 
 def _percent(value: float, unit: str) -> str:

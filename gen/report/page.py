@@ -5,9 +5,12 @@ This module says what stands on the page, as plain text; the templates make mark
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
+
+import numpy as np
 
 from sosmith.gen.facts.design_tables import ErrorUnit, budget_table, limit_cycles_table, uncertainty_table
 from sosmith.gen.facts.table import Table
@@ -15,18 +18,21 @@ from sosmith.gen.filter.decimation import SAMPLED
 from sosmith.gen.filter.response import FilterFacts
 from sosmith.gen.filter.step_response import SETTLED, StepResponse
 from sosmith.gen.fpga.synthesis import Netlist
+from sosmith.gen.output.core_facts import CoreFacts
 from sosmith.gen.output.decimation_facts import DecimationFacts
-from sosmith.gen.quantity import count, decibels, duration, plain_number, quantity, scale, unit_symbol
+from sosmith.gen.quantity import count, decibels, duration, full_scale_level, plain_number, quantity, scale, unit_symbol
 from sosmith.gen.report import plots
 from sosmith.gen.report.behaviour import behaviour
 from sosmith.gen.report.diagram import diagram
 from sosmith.gen.report.evidence import Evidence
-from sosmith.gen.report.headlines import Summary, unbroken
+from sosmith.gen.report.headlines import SIMULATION, Summary, unbroken
 from sosmith.gen.report.recursion import Recursion
 from sosmith.gen.report.samples import MAX_POINTS, viewer_data
+from sosmith.gen.report.spectrum_plot import LEAST_SPECTRUM, spectrum_figure
 from sosmith.gen.report.step_plot import step_figure
 from sosmith.gen.specification.values import listed
 from sosmith.gen.version import __version__
+from sosmith.model.full_scale import peak_dbfs
 from sosmith.model.templates import render
 
 
@@ -72,7 +78,7 @@ def _reasons(evidence: Evidence, summary: Summary) -> list[str]:
         f"The simulated {ran} agrees with its integer model bit for bit, and stays within {error} "
         f"of the exact calculation; the proven limit is {bound}."
     )
-    return [f"{arithmetic}{_of_the_signal(evidence, summary, bound)}"]
+    return [f"{arithmetic}{_of_the_signal(evidence, summary, bound)}{_of_the_sound(summary)}"]
 
 
 def _of_the_signal(evidence: Evidence, summary: Summary, bound: str) -> str:
@@ -85,6 +91,23 @@ def _of_the_signal(evidence: Evidence, summary: Summary, bound: str) -> str:
     return (
         f" This is about the arithmetic. The output is off by up to {off} from the true value, and the hardware adds "
         f"at most {bound} of that: the rest is in the exact calculation as well, from {listed(causes)}."
+    )
+
+
+def _of_the_sound(summary: Summary) -> str:
+    """Say the same in dB of full scale, and what becomes of a tone; empty for what is not sound."""
+    sound = summary["sound"]
+    if sound is None:
+        return ""
+    most, mean = (unbroken(full_scale_level(sound[key])) for key in ("error_peak_dbfs", "error_rms_dbfs"))
+    text = f" In dB of full scale, the error is at most {most}, and {mean} RMS."
+    tone = sound["tone"]
+    if tone is None or tone["thd_n_db"] is None:
+        return text
+    exact = "nothing" if tone["exact_thd_n_db"] is None else unbroken(decibels(tone["exact_thd_n_db"]))
+    return (
+        f"{text} Beside the tone of {_amount(tone['frequency'], 'Hz')}, distortion and noise are at "
+        f"{unbroken(decibels(tone['thd_n_db']))} of it; rounding the input alone leaves {exact}."
     )
 
 
@@ -147,15 +170,30 @@ def _looks(evidence: Evidence) -> Figure:
     )
 
 
+def _spectrum_figure(evidence: Evidence) -> Figure:
+    return Figure(
+        title="Spectrum",
+        drawing=spectrum_figure(evidence, plots.WIDE),
+        narrow=spectrum_figure(evidence, plots.NARROW),
+        caption="Mean over the run, by Welch's method: a sine over the whole scale reaches 0 dBFS. The level of noise "
+        "goes with the width of a line; compare its shapes, and the curves with each other.",
+        legend=[("hardware", "", "hardware"), ("golden", "", "hardware minus exact calculation")],
+    )
+
+
+def _limit_words(evidence: Evidence, limit: plots.Limit) -> str:
+    level = f", {unbroken(full_scale_level(peak_dbfs(limit.value)))}" if evidence.facts.is_sound else ""
+    return f"{limit.words} ±{_unit(evidence).amount(limit.value)}{level}"
+
+
 def _error_figure(evidence: Evidence) -> Figure:
     inside, outside = plots.error_limits(evidence)
-    unit = _unit(evidence)
     legend = [("hardware", "", "hardware minus exact calculation")]
     legend += [
         (
             limit.role,
             "dashed" if limit.dashes == "--" else "dotted",
-            f"{limit.words} ±{unit.amount(limit.value)}",
+            _limit_words(evidence, limit),
         )
         for limit in inside
     ]
@@ -163,7 +201,7 @@ def _error_figure(evidence: Evidence) -> Figure:
     if len(evidence.run) > plots.WIDE // 2:
         caption = "Smallest and largest error of each stretch of time; both must stay between the limits."
     if outside:
-        names = " and ".join(f"{limit.words} ±{unit.amount(limit.value)}" for limit in outside)
+        names = " and ".join(_limit_words(evidence, limit) for limit in outside)
         caption += f" Too far out to draw: {names}."
     if evidence.run.first_mismatch is not None:
         caption += (
@@ -180,11 +218,19 @@ def _error_figure(evidence: Evidence) -> Figure:
 
 
 def _histogram_figure(evidence: Evidence) -> Figure:
+    inside = float(np.mean(np.abs(evidence.run.error) <= evidence.facts.lsb / 2))
+    if inside == 1:
+        found = "All samples lie between the dotted lines at ±½\u00a0LSB, where rounding the output alone leaves them."
+    else:
+        share = f"{100 * inside:.3g}" if inside < 0.995 else "More than 99"
+        found = (
+            f"{share} % of the samples lie between the dotted lines at ±½\u00a0LSB, as far as rounding the output "
+            "alone reaches; to the others, errors from before the output have added."
+        )
     return Figure(
         title="How often each error occurs",
         drawing=plots.histogram_figure(evidence),
-        caption=f"One LSB is {_amount(evidence.facts.lsb, evidence.facts.unit)}. Rounding the output spreads the "
-        "error evenly between the dotted lines at ±½\u00a0LSB; what lies beyond them comes from inside.",
+        caption=f"One LSB is {_amount(evidence.facts.lsb, evidence.facts.unit)}. {found}",
     )
 
 
@@ -288,18 +334,34 @@ def _response_table(facts: FilterFacts, measures: Mapping[str, float | None]) ->
     return Table("", rows, ("with the integer coefficients", ""), numbers=(1,))
 
 
-def _filter_figures(facts: FilterFacts, decimation: DecimationFacts | None) -> dict[str, Figure]:
+def _least_gain(core: CoreFacts) -> float:
+    """Return the gain in dB with which the largest input, or result of a calibration, leaves half an LSB of output."""
+    low, high = core.range
+    (reach, *_) = [float(each.port.lsb * (1 << each.port.bits)) / 2 for each in core.interface.inputs.fields]
+    return 20 * math.log10(core.lsb / 2 / (reach if core.core == "filter" else (high - low) / 2))
+
+
+def _filter_figures(core: CoreFacts, facts: FilterFacts, decimation: DecimationFacts | None) -> dict[str, Figure]:
+    least = _least_gain(core)
     legend = [("golden", "broad", "ideal filter"), ("hardware", "dashed", "integer coefficients")]
     masked = (facts.passband_edge and facts.passband_loss) or (facts.stopband_edge and facts.stopband_loss)
     mask = [("limit", "area", "forbidden by the specification")] if masked else []
+    drawn = least > plots.lowest_gain_db(facts, least)
+    below = [("asked", "dotted", "the largest input leaves half an LSB")] if drawn else []
     alone = "" if decimation is None else " Of the filter alone, behind the decimator."
     later = "" if decimation is None else f" That adds {_amount(decimation.own_delay, 's')}."
     return {
         "gain": Figure(
             title="Gain",
-            drawing=plots.magnitude_figure(facts),
+            drawing=plots.magnitude_figure(facts, least),
             caption=f"Rounding the coefficients bends the ideal curve by the difference drawn below it.{alone}",
-            legend=legend + mask,
+            legend=legend + mask + below,
+        ),
+        "phase": Figure(
+            title="Phase",
+            drawing=plots.phase_figure(facts, least),
+            caption=f"Where the gain is drawn. At a zero on the unit circle the phase jumps by 180°.{alone}",
+            legend=legend,
         ),
         "delay": Figure(
             title="Group delay",
@@ -440,9 +502,14 @@ def render_page(evidence: Evidence, summary: Summary) -> str:
         parts["alternatives"] = _alternatives_figure(shown)
         parts["alternatives_table"] = _alternatives_table(shown, summary)
     if shown.facts.filter is not None:
-        parts |= _filter_figures(shown.facts.filter, evidence.facts.decimation)
+        parts |= _filter_figures(shown.facts, shown.facts.filter, evidence.facts.decimation)
         parts["step"] = None if found.step is None else _step_figure(found.step)
         parts["response"] = _response_table(shown.facts.filter, summary["frequency_response"])
+    if (
+        summary["sound"] is not None
+        and len(shown.run) - (0 if shown.run.tone is None else shown.run.tone.settled) >= LEAST_SPECTRUM
+    ):
+        parts["spectrum"] = _spectrum_figure(shown)
     if evidence.facts.decimation is not None:
         parts["decimation"] = _decimation_table(evidence.facts.decimation)
         parts["decimation_caption"] = _decimation_caption(evidence.facts.decimation, evidence.facts.unit)
@@ -468,6 +535,13 @@ def render_page(evidence: Evidence, summary: Summary) -> str:
         coefficients=_coefficient_table(shown),
         formats=_format_table(shown),
         facts=_run_facts(shown),
+        simulation=[
+            (fact["name"].lower(), f"{fact['text']}; {fact['sentence']}")
+            for group in summary["facts"]
+            if group["title"] == SIMULATION
+            for fact in group["facts"]
+        ],
+        shown_groups=[group for group in summary["facts"] if group["title"] != SIMULATION],
         count=count,
         **parts,
     )

@@ -24,6 +24,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullForm
 from sosmith.gen.filter.response import (
     Band,
     FilterFacts,
+    complex_response,
     frequency_grid,
     group_delay,
     magnitude_db,
@@ -79,6 +80,9 @@ STYLE: dict[Any, Any] = {
     "text.parse_math": False,  # a dollar sign in a name is a dollar sign
     "savefig.transparent": True,
 }
+
+MOST_DB = 200
+"""Largest attenuation that is drawn, in dB."""
 
 _PASSES_DB = 60
 """Attenuation, in dB, beyond which nothing is said to pass."""
@@ -451,8 +455,21 @@ def _paint_mask(axes: Axes, facts: FilterFacts, level: float, start: float) -> N
         axes.plot(ends, [border, border], color=COLOUR["limit"], lw=1.2)
 
 
-def magnitude_figure(facts: FilterFacts) -> str:
-    """Magnitude of the ideal and the quantized filter with the mask, and their difference below."""
+def lowest_gain_db(facts: FilterFacts, least: float) -> float:
+    """Return the gain in dB down to which a filter is drawn: below what it has to reach and what can be seen at all.
+
+    `least` is the gain in dB with which the largest input leaves half an LSB of the output.
+    """
+    level = passband_level_db(facts)
+    wanted = level - (facts.stopband_loss or 0) - 20
+    return min(level - 60, wanted, max(least - 12, level - MOST_DB))
+
+
+def magnitude_figure(facts: FilterFacts, least: float) -> str:
+    """Magnitude of the ideal and the quantized filter with the mask, and their difference below.
+
+    `least` is marked, the gain in dB with which the largest input leaves half an LSB of the output.
+    """
 
     def paint(figure: Figure) -> None:
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
@@ -460,8 +477,10 @@ def magnitude_figure(facts: FilterFacts) -> str:
         ideal = magnitude_db(facts.ideal_sos, frequency, facts.sample_rate)
         quantized = magnitude_db(facts.quantized_sos, frequency, facts.sample_rate)
         level = passband_level_db(facts)
-        floor = level - max(100.0, (facts.stopband_loss or 0) + 30)
+        floor = lowest_gain_db(facts, least)
         upper.set_ylim(floor, level + 8)
+        if least > floor:
+            upper.axhline(least, color=COLOUR["asked"], lw=1.4, ls=":")
         _paint_mask(upper, facts, level, float(frequency[0]))
         upper.plot(frequency, ideal, color=COLOUR["golden"], **IDEAL_LINE)
         upper.plot(frequency, quantized, color=COLOUR["hardware"], **REAL_LINE)
@@ -476,6 +495,39 @@ def magnitude_figure(facts: FilterFacts) -> str:
         frequency_axis(lower, frequency)
 
     return draw("magnitude", "Gain against frequency", NARROW, PANEL_HEIGHT, paint)
+
+
+def phase_figure(facts: FilterFacts, least: float) -> str:
+    """Phase of the ideal and the quantized filter where the magnitude is drawn, and their difference below."""
+
+    def paint(figure: Figure) -> None:
+        upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
+        frequency = frequency_grid(facts)
+        seen = magnitude_db(facts.ideal_sos, frequency, facts.sample_rate) >= lowest_gain_db(facts, least)
+        ideal = np.where(seen, phase(facts.ideal_sos, frequency, facts.sample_rate), np.nan)
+        quantized = np.where(seen, phase(facts.quantized_sos, frequency, facts.sample_rate), np.nan)
+        upper.plot(frequency, ideal, color=COLOUR["golden"], **IDEAL_LINE)
+        upper.plot(frequency, quantized, color=COLOUR["hardware"], **REAL_LINE)
+        upper.set_ylabel("phase in °")
+        upper.yaxis.set_major_locator(MaxNLocator(6, steps=[1, 1.5, 3, 4.5, 9, 10]))
+        difference = (quantized - ideal + 180) % 360 - 180
+        factor, unit = scale(float(np.nanmax(np.abs(difference))), "deg")
+        lower.plot(frequency, difference * factor, color=COLOUR["hardware"])
+        lower.set_ylabel(f"difference\nin {unit}")
+        lower.yaxis.set_major_locator(MaxNLocator(3))
+        lower.set_xlabel("frequency")
+        frequency_axis(lower, frequency)
+
+    return draw("phase", "Phase against frequency", NARROW, PANEL_HEIGHT, paint)
+
+
+def phase(sos: Array, frequency: Array, sample_rate: float) -> Array:
+    """Return the phase in degrees without jumps but those at zeros on the unit circle, within a turn at first."""
+    phase = np.zeros(len(frequency))
+    for section in sos:  # by itself, as one turns less from point to point than all together
+        phase += np.unwrap(np.angle(complex_response(section[np.newaxis], frequency, sample_rate)))
+    degrees = np.degrees(phase)
+    return np.asarray(degrees - 360 * np.round(degrees[0] / 360))
 
 
 def delay_figure(facts: FilterFacts) -> str:

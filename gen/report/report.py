@@ -19,6 +19,7 @@ from sosmith.gen.report.input_ranges import inputs_at_an_end, limited_inputs
 from sosmith.gen.report.mask import mask_shortfalls
 from sosmith.gen.report.page import render_page
 from sosmith.gen.report.provenance import Provenance
+from sosmith.gen.report.sound import sound_entry
 from sosmith.gen.version import __version__
 from sosmith.model.reference.accuracy import accuracy_percent, error_statistics, sqnr_db
 from sosmith.model.text_files import to_json, write_files
@@ -144,6 +145,7 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
         "lsb": facts.lsb,
         "range": list(facts.range),
         "sqnr_db": sqnr_db(run.golden, run.error),
+        "sound": sound_entry(evidence, statistics),
         "frequency_response": _response_summary(measures),
         "decimation": None if facts.decimation is None else facts.decimation.entries,
         "accuracy_percent": _accuracy(evidence),

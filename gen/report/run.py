@@ -13,7 +13,7 @@ from sosmith.gen.core import CoreDesign
 from sosmith.model.arrays import Codes, side_by_side
 from sosmith.model.dataflow.status import Flag
 from sosmith.model.port import Port
-from sosmith.model.traces.trace import Trace
+from sosmith.model.traces.trace import Tone, Trace
 
 Array = npt.NDArray[np.float64]
 Column = Array | Callable[[], Array]
@@ -83,6 +83,8 @@ class Run:
         The results that the hardware flags as settling; None if it has no flag for that.
     cycles : int
         Clock cycles from the end of reset to the last result.
+    tone : Tone or None
+        What went in, where it is a sine; in results, settled in all channels.
     shown_channel : int or None
         The channel that the arrays are of, where it is one of several.
     """
@@ -99,6 +101,7 @@ class Run:
     reading: Mask | None = None
     unsettled: Mask | None = None
     cycles: int = 0
+    tone: Tone | None = None
     shown_channel: int | None = None
 
     def __post_init__(self) -> None:
@@ -256,8 +259,13 @@ def run_of(
         reading=_stacked([trace.reading for trace in traces]),
         unsettled=unsettled,
         cycles=cycles,
+        tone=max((trace.tone for trace in traces if trace.tone is not None), key=_settled, default=None),
     )
     return run.of_channel(0) if len(traces) == 1 else run
+
+
+def _settled(tone: Tone) -> int:
+    return tone.settled
 
 
 def _smallest(port: Port) -> type[np.signedinteger[Any]]:

@@ -219,3 +219,8 @@ class Page(HTMLParser):
 def page_of(run: Evidence) -> str:
     """Page of `run`."""
     return render_page(run, summarise(run))
+
+
+def words_of(run: Evidence) -> str:
+    """Words of the page of `run`, with plain blanks."""
+    return " ".join(" ".join(Page(page_of(run)).words).replace("\u00a0", " ").split())

@@ -58,7 +58,7 @@ def test_figures_are_those_of_the_design(found: sosmith.Exploration) -> None:
     tables = {key: dict(value) if isinstance(value, dict) else value for key, value in FILTER.items()}
     tables["output"]["max_error"] = 0.004
     design = sosmith.design(tables, realization="df1")
-    (trace,) = traces_for(design.core, "sweep", seed=1, seconds=0.3)
+    (trace,) = traces_for(design.core, "passband_sweep", seed=1, seconds=0.3)
     error = design.run_codes(x=trace.codes[:, 0]) * 2 / 1024 - design.run_exact(x=trace.values()[:, 0])
     assert len(error) == 300
     assert point["error"]["max_abs"] == pytest.approx(np.abs(error).max(), rel=1e-12)

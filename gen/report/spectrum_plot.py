@@ -1,0 +1,50 @@
+"""Spectrum of a run of sound in dB of full scale: the output and its error."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+from scipy import signal
+
+from sosmith.gen.report.evidence import Evidence
+from sosmith.gen.report.plots import COLOUR, Array, draw, frequency_axis
+
+LEAST_SPECTRUM = 64
+"""Samples below which nothing is to be seen."""
+
+_SEGMENT = 4096
+_WINDOW = ("kaiser", 24.0)
+"""Window whose side lobes lie far below the noise of 24 bits."""
+
+_MARGIN_DB = 12
+
+
+def spectrum_figure(evidence: Evidence, width: int) -> str:
+    """Draw the spectrum of hardware and of hardware minus exact calculation; see `levels`."""
+
+    def paint(figure: Figure) -> None:
+        axes = figure.subplots()
+        assert evidence.facts.filter is not None  # as in all sound
+        rate = evidence.facts.filter.sample_rate
+        first = 0 if evidence.run.tone is None else evidence.run.tone.settled
+        frequency, output = levels(evidence.run.hardware[first:], rate)
+        _, error = levels(evidence.run.error[first:], rate)
+        axes.plot(frequency, output, color=COLOUR["hardware"])
+        axes.plot(frequency, error, color=COLOUR["golden"])
+        axes.set_ylim(max(float(np.min(error)), -220.0) - _MARGIN_DB, max(float(np.max(output)), 0.0) + _MARGIN_DB / 2)
+        axes.set_ylabel("level in dBFS")
+        axes.set_xlabel("frequency")
+        frequency_axis(axes, frequency)
+
+    return draw("spectrum", "Spectrum of output and error", width, 310, paint)
+
+
+def levels(values: Array, rate: float) -> tuple[Array, Array]:
+    """Return frequencies in Hz, without zero, and the mean level there in dB of full scale, by Welch's method.
+
+    A sine over the whole scale is at 0 dB, or up to 0.4 dB below where it lies between two lines. What is no sine, such
+    as noise, is told by the power in a line, which goes with the length of a segment of up to `_SEGMENT` samples.
+    """
+    segment = min(_SEGMENT, len(values))
+    frequency, power = signal.welch(values, rate, _WINDOW, segment, scaling="spectrum", detrend=False)
+    return frequency[1:], 10 * np.log10(np.maximum(2 * power[1:], 1e-30))
