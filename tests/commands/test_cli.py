@@ -32,7 +32,7 @@ NEEDED = {
     "build": ("SPEC", "--board BOARD", "tang_nano_20k", "--baud", "--program", "build.json"),
     "simulate": (
         "SPEC",
-        "--trace FILE.csv|FILE.toml|SCENARIO",
+        "--trace FILE.csv|wav|toml|SCENARIO",
         "report.json",
         "report.html",
         "[default: verilator]",

@@ -57,7 +57,8 @@ UNFIT = {
     ),
     "unknown scenario to simulate": (
         ("simulate", "plain.toml", "--trace", "drive"),
-        "scenario for a plain filter must be one of worst_case, worst_case_errors, step, sweep, noise, not 'drive'",
+        "scenario for a plain filter must be one of worst_case, worst_case_errors, step, sweep, noise, passband_sweep, "
+        "tone, multitone, pink_noise, not 'drive'",
     ),
     "scenario of the other kind": (
         ("simulate", "demo.toml", "--trace", "sweep"),
@@ -66,7 +67,8 @@ UNFIT = {
     ),
     "unknown scenario to emulate": (
         ("emulate", "plain.toml", "drive"),
-        "the scenario must be one of worst_case, worst_case_errors, step, sweep, noise, or a file whose name ends in "
+        "the scenario must be one of worst_case, worst_case_errors, step, sweep, noise, passband_sweep, tone, "
+        "multitone, pink_noise, or a file whose name ends in "
         ".toml, not drive",
     ),
     "simulator without netlists": (
