@@ -160,7 +160,8 @@ class IdealEntry(_Part):
 class BandEntry(_Part):
     """The largest gain of anything in the band around a multiple of the lower rate, half of it to both sides.
 
-    `at` is the frequency at the output, in units of the lower rate, at which hardly less is reached.
+    `at` is the frequency at the output, in units of the lower rate, at which hardly less is reached: `gain` is that,
+    a 1024th of it more, rounded up to the grid.
     """
 
     gain: Rational
@@ -174,7 +175,7 @@ class DecimationEntry(_Part):
     result is that of the first sample, as if that had been there for ever. `correction` is the weight g of the ideal
     section ``1 + g - g / z``, the last one. `edge` is the upper edge of the pass band, in units of the rate of the
     input, and `aliasing` bounds the gain of what folds into it from around each multiple of the lower rate. `bands` are
-    the largest gains to the output from the whole band around each of them; empty where none are claimed. It takes the
+    the largest gains to the output from the whole band around each of them. It takes the
     only input, or what a `calibration` makes of the inputs.
     """
 
@@ -185,7 +186,7 @@ class DecimationEntry(_Part):
     correction: Rational
     edge: Rational
     aliasing: Annotated[tuple[Rational, ...], Field(max_length=1 << 9)]
-    bands: Annotated[tuple[BandEntry, ...], Field(max_length=1 << 9)] = ()
+    bands: Annotated[tuple[BandEntry, ...], Field(min_length=1, max_length=1 << 9)]
     calibration: CalibrationEntry | None = None
 
 

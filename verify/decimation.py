@@ -23,7 +23,7 @@ from fractions import Fraction
 
 from flint import arb, ctx, fmpq, fmpz_poly
 
-from sosmith.verify.bounds.l1_response import UndecidedError
+from sosmith.verify.bounds.grid import rounded_up
 from sosmith.verify.certificate_file import (
     Certificate,
     DecimationEntry,
@@ -31,7 +31,6 @@ from sosmith.verify.certificate_file import (
     Operation,
     PortEntry,
     SectionEntry,
-    on_grid,
 )
 from sosmith.verify.graph import require
 from sosmith.verify.reader.source import read_source
@@ -193,16 +192,7 @@ def folding_gain(factor: int, stages: int, frequency: Fraction) -> Fraction:
         for doubling in range(factor.bit_length() - 1):
             angle = frequency * 2**doubling
             gain *= abs(arb.cos_pi_fmpq(fmpq(angle.numerator, angle.denominator)))
-        gain **= stages
-        ends = {on_grid(_exact(end)) for end in (gain.lower(), gain.upper())}
-    if len(ends) > 1:
-        raise UndecidedError(f"the gain of the decimator at {frequency} could not be rounded")
-    return ends.pop()
-
-
-def _exact(value: arb) -> Fraction:
-    mantissa, exponent = value.man_exp()
-    return Fraction(int(mantissa)) * Fraction(2) ** int(exponent)
+        return rounded_up(gain**stages, f"the gain of the decimator at {frequency}")
 
 
 def _check_correction(entry: DecimationEntry, section: SectionEntry) -> None:

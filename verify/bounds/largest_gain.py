@@ -22,6 +22,7 @@ from operator import mul
 
 from flint import arb, arb_poly, ctx, fmpq, fmpq_poly, fmpz_poly
 
+from sosmith.verify.bounds.grid import rounded_up
 from sosmith.verify.bounds.l1_response import UndecidedError, fraction
 from sosmith.verify.certificate_file import DecimationEntry, SectionEntry
 from sosmith.verify.graph import require
@@ -32,11 +33,11 @@ _PRECISION = 256
 _SMALLEST = Fraction(1, 1 << 80)
 """Shortest interval that is tried."""
 
-_EXCESS = Fraction(1, 1 << 9)
-"""Share by which a claimed gain may exceed one that is reached."""
+_PLACES = Fraction(1, 1 << 32)
+"""Distance of the places where a gain may be said to be reached, in units of the lower rate."""
 
-_GRID = Fraction(1, 1 << 63)
-"""What rounding adds to it at most."""
+_EXCESS = Fraction(1, 1 << 10)
+"""Share by which a claimed gain exceeds the one that is reached, which is then rounded up to the grid."""
 
 
 @dataclass(frozen=True)
@@ -94,17 +95,18 @@ class _LeftSide:
 
 
 def check_bands(entry: DecimationEntry, sections: Sequence[SectionEntry]) -> None:
-    """Check the gains that are claimed of whole bands; without any, nothing.
+    """Check the gains that are claimed of whole bands.
+
+    Each follows to the last digit from the place where it is said to be reached, so that only this place is a choice:
+    among those where hardly less than the largest gain is reached, which is what it claims.
 
     Raises
     ------
     RejectedError
-        If one is exceeded at some frequency, or is more than what is reached.
+        If one is exceeded at some frequency, or is not what follows from what is reached.
     UndecidedError
         If that cannot be decided.
     """
-    if not entry.bands:
-        return
     count = entry.factor // 2
     require(len(entry.bands) == count, f"largest gains must be given of {count} bands, not {len(entry.bands)}")
     left = _LeftSide(sections, entry.stages)
@@ -113,16 +115,25 @@ def check_bands(entry: DecimationEntry, sections: Sequence[SectionEntry]) -> Non
             0 <= claim.at <= Fraction(1, 2),
             f"band {band} must have its largest gain at 0 to 1/2 of the lower rate, not at {claim.at}",
         )
+        require(
+            claim.at % _PLACES == 0,
+            f"band {band} must have its largest gain at a multiple of {_PLACES} of the lower rate, not at {claim.at}",
+        )
         with ctx.workprec(_PRECISION):
             right = _right_side(entry, band, arb(_fmpq(claim.at)))
             reached = (left.at(claim.at) / right).sqrt()
-            tight = arb(_fmpq(claim.gain - _GRID)) <= reached * arb(_fmpq(1 + _EXCESS))
+            wanted = rounded_up(reached * arb(_fmpq(1 + _EXCESS)), f"the largest gain from band {band}")
             require(
-                tight,
+                claim.gain <= wanted,
                 f"the largest gain from band {band} must be that at {claim.at} of the lower rate, "
                 f"{float(reached):.6g}, or little more, not {float(claim.gain):.6g}",
             )
             _check_bound(left, entry, band, claim.gain)
+            require(
+                claim.gain == wanted,
+                f"the largest gain from band {band} must be {wanted}, which follows from that at {claim.at} of the "
+                f"lower rate, not {claim.gain}",
+            )
 
 
 def _check_bound(left: _LeftSide, entry: DecimationEntry, band: int, gain: Fraction) -> None:

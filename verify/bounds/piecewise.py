@@ -32,6 +32,7 @@ from typing import cast
 import numpy as np
 from flint import acb, arb, arb_mat, ctx, fmpq, fmpq_poly, fmpz, fmpz_mat, fmpz_poly
 
+from sosmith.verify.bounds.grid import fraction_of
 from sosmith.verify.bounds.l1_response import UndecidedError, fraction
 from sosmith.verify.bounds.summed_forms import Floats, Integers, SummedForms
 
@@ -228,7 +229,7 @@ class Pieces:
             while True:
                 rows = power.tolist()
                 upper = [sum(map(abs, row), arb(0)).upper() for row in rows]
-                self._norms.append(max(_fraction(value) for value in upper))
+                self._norms.append(max(fraction_of(value) for value in upper))
                 entries = power.entries()
                 if not all(value.rad() * arb(2) ** bits < 1 for value in entries):
                     raise UndecidedError("the responses of a denominator could not be enclosed")
@@ -322,8 +323,3 @@ def _integer(value: arb) -> int:
     """Round a narrow ball to an integer within two of all that it encloses."""
     mantissa, exponent = (int(part) for part in value.mid().man_exp())
     return mantissa << exponent if exponent >= 0 else mantissa >> -exponent
-
-
-def _fraction(value: arb) -> Fraction:
-    mantissa, exponent = (int(part) for part in value.man_exp())
-    return mantissa * Fraction(2) ** exponent

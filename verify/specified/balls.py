@@ -6,6 +6,8 @@ from fractions import Fraction
 
 from flint import arb, ctx, fmpq
 
+from sosmith.verify.bounds.grid import fraction_of
+
 
 def ball(value: Fraction | int) -> arb:
     """Enclose a rational number; exact where its denominator is a power of two.
@@ -25,13 +27,3 @@ def upper_limit(value: arb) -> Fraction:
     """
     with ctx.workprec(64):
         return fraction_of(value.upper())
-
-
-def fraction_of(point: arb) -> Fraction:
-    """Return what a ball without a radius holds.
-
-    >>> fraction_of(arb(0.75))
-    Fraction(3, 4)
-    """
-    mantissa, exponent = point.man_exp()
-    return Fraction(int(mantissa)) * Fraction(2) ** int(exponent)

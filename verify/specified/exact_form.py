@@ -15,9 +15,9 @@ from typing import Any
 
 from flint import arb, ctx
 
+from sosmith.verify.bounds.grid import fraction_of
 from sosmith.verify.bounds.l1_response import UndecidedError
 from sosmith.verify.certificate_file import SectionEntry
-from sosmith.verify.specified.balls import fraction_of
 from sosmith.verify.specified.ideal_filter import StatedFilter
 
 _FIRST_PRECISION = 512

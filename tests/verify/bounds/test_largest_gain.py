@@ -93,9 +93,31 @@ def test_a_generator_that_errs_is_found_out(right: str, wrong: str) -> None:
         check_bands(entry, sections)
 
 
+@pytest.mark.parametrize("by", [Fraction(1, 2**64), Fraction(-1, 2**64), Fraction(1, 3 * 2**90), Fraction(1, 2**40)])
+def test_no_digit_of_a_gain_is_free(by: Fraction) -> None:
+    """The bound is proven with a share to spare, of which nothing may be used."""
+    entry, sections = claimed(CASES[1])
+    gain = entry.bands[0].gain
+    sentence = (
+        rf"^the largest gain from band 1 must be (that at \d.*, or little more|{gain}, which follows from).*, not "
+    )
+    with pytest.raises(RejectedError, match=sentence):
+        check_bands(with_band(entry, 1, gain=gain + by), sections)
+
+
+def test_another_place_asks_for_another_gain() -> None:
+    entry, sections = claimed(CASES[1])
+    for by in (Fraction(1, 2**32), Fraction(-1, 2**32)):
+        with pytest.raises(RejectedError, match=r"^the largest gain from band 1 must be "):
+            check_bands(with_band(entry, 1, at=entry.bands[0].at + by), sections)
+    with pytest.raises(RejectedError, match=r"^band 1 must have its largest gain at a multiple of 1/4294967296 of the"):
+        check_bands(with_band(entry, 1, at=entry.bands[0].at + Fraction(1, 2**60)), sections)
+
+
 def test_a_certificate_without_such_claims() -> None:
     entry, sections = claimed(CASES[0])
-    check_bands(entry.model_copy(update={"bands": ()}), sections)
+    with pytest.raises(RejectedError, match=r"^largest gains must be given of 8 bands, not 0$"):
+        check_bands(entry.model_copy(update={"bands": ()}), sections)
 
 
 def test_another_filter_has_other_gains() -> None:
