@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import errno
+import fcntl
 import json
-from collections.abc import Iterable, Mapping
-from contextlib import suppress
+import os
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +27,12 @@ _UNUSABLE = {
     errno.EROFS,
 }
 """Errors that tell of the place that the user has named: another one helps. All others tell of the disk."""
+
+_PREFIX = ".sosmith-"
+"""How the names of scratch folders begin."""
+
+_STALE = 60.0
+"""Seconds after which a scratch folder that nobody holds is what a kill has left; it is not held at once."""
 
 
 def write_files(directory: Path, texts: Mapping[str, str]) -> list[Path]:
@@ -60,14 +69,11 @@ def write_contents(directory: Path, contents: Mapping[str, bytes | Iterable[str]
             check_file(path)
         own = {path.name for path in paths if not path.is_symlink()}
         if own:
-            import tempfile  # only writing needs it
-
-            # Unlike tempfile.mkstemp, a file created in a scratch folder has the permissions of the user's umask.
-            with tempfile.TemporaryDirectory(prefix=".sosmith-", dir=directory) as scratch:
+            with _scratch(directory) as scratch:
                 for name in own:
-                    _write(Path(scratch) / name, contents[name])
+                    _write(scratch / name, contents[name])
                 for name in own:
-                    (Path(scratch) / name).replace(directory / name)
+                    (scratch / name).replace(directory / name)
         for path in paths:
             if path.is_symlink():
                 target = path.resolve()
@@ -78,6 +84,39 @@ def write_contents(directory: Path, contents: Mapping[str, bytes | Iterable[str]
                 folder.rmdir()
         raise _failure(directory, error) from None
     return paths
+
+
+@contextmanager
+def _scratch(directory: Path) -> Iterator[Path]:
+    """Make a folder in `directory` that goes in the end, and hold it; remove those that kills have left.
+
+    Unlike a file of tempfile.mkstemp, one that is created in it has the permissions of the user's umask.
+    """
+    import tempfile  # only writing needs it
+
+    for place in directory.glob(f"{_PREFIX}*"):
+        with suppress(OSError):
+            _remove_left(place)
+    with tempfile.TemporaryDirectory(prefix=_PREFIX, dir=directory) as scratch:
+        held = os.open(scratch, os.O_RDONLY)
+        try:
+            with suppress(OSError):  # a file system without locks
+                fcntl.flock(held, fcntl.LOCK_SH)
+            yield Path(scratch)
+        finally:
+            os.close(held)
+
+
+def _remove_left(place: Path) -> None:
+    import shutil
+
+    held = os.open(place, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+    try:
+        fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        if time.time() - os.fstat(held).st_mtime > _STALE:
+            shutil.rmtree(place)
+    finally:
+        os.close(held)
 
 
 def write_pieces(path: Path, pieces: Iterable[str]) -> None:

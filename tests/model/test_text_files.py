@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import fcntl
 import os
 import re
 import socket
@@ -86,3 +87,42 @@ def test_a_full_disk_leaves_no_folder_and_is_the_fault_of_a_tool(
     with pytest.raises(ToolError, match=f"^{re.escape(message)}$"):
         write_files(folder, {"a": "text"})
     assert list(tmp_path.iterdir()) == []
+
+
+def test_what_a_kill_has_left_goes_with_the_next_writing(tmp_path: Path) -> None:
+    """A scratch folder stays while somebody holds it, and as long as somebody may be about to."""
+    old, held, new, other = (tmp_path / name for name in (".sosmith-a", ".sosmith-b", ".sosmith-c", ".sosmith"))
+    elsewhere = tmp_path / "elsewhere"
+    for place in (old, held, new, other, elsewhere):
+        place.mkdir()
+        (place / "part").write_text("a")
+    for place in (old, held, other):
+        os.utime(place, (0, 0))
+    link = tmp_path / ".sosmith-d"
+    link.symlink_to(elsewhere)
+    number = os.open(held, os.O_RDONLY)
+    fcntl.flock(number, fcntl.LOCK_SH)
+    write_files(tmp_path, {"file": "text"})
+    os.close(number)
+    assert {path.name for path in tmp_path.iterdir()} == {
+        held.name,
+        new.name,
+        other.name,
+        link.name,
+        "elsewhere",
+        "file",
+    }
+    assert (elsewhere / "part").read_text() == "a"
+    write_files(tmp_path, {"file": "text"})
+    assert not held.exists()
+
+
+def test_a_scratch_folder_is_held(tmp_path: Path) -> None:
+    def pieces() -> Iterator[str]:
+        (place,) = tmp_path.glob(".sosmith-*")
+        os.utime(place, (0, 0))
+        write_files(tmp_path, {"other": "text"})
+        yield "whole"
+
+    write_contents(tmp_path, {"file": pieces()})
+    assert (tmp_path / "file").read_text() == "whole"
