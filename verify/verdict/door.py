@@ -27,13 +27,12 @@ from sosmith.verify.specified.words import words_of
 from sosmith.verify.unit.check import UnitVerdict, check_unit
 from sosmith.verify.verdict.generated_files import (
     about_of,
+    ascii_text,
     check_about,
     check_files,
     check_measurements,
     check_seal,
     check_text,
-    content_of,
-    core_text,
     unicode_text,
 )
 from sosmith.verify.verdict.item import (
@@ -70,7 +69,8 @@ class Judgement:
 
     verdict: Verdict
     agreement: Agreement | None
-    files: int
+    files: Mapping[str, bytes]
+    """Contents of the files that were compared, by their names."""
     proofs: Proofs
     decimator: DecimatorVerdict | None
     scope: Mapping[str, Part] = field(default_factory=dict)
@@ -123,16 +123,17 @@ def _judged(
     if stated is not None:
         progress("specification", 0, 0)
         agreement, core = _held_against(certificate, item, stated, verdict, progress)
-    files, proofs, decimator = 0, None, None
+    contents: Mapping[str, bytes] = {}
+    proofs, decimator = None, None
     if folder is not None:
         progress("files", 0, 0)
         about = check_seal(certificate, content)
         names, wanted = [entry.name for entry in about.files], file_names(certificate.name, item)
         require(names == wanted, f"the files of the certificate must be {', '.join(wanted)}, not {', '.join(names)}")
-        files = check_files(about, folder)
-        proofs, decimator = _files_proven(certificate, item, folder, progress)
+        contents = check_files(about, folder)
+        proofs, decimator = _files_proven(certificate, item, contents, progress)
     scope = scope_of(certificate, item, agreement, core, proofs)
-    return Judgement(verdict, agreement, files, proofs or Proofs(), decimator, scope)
+    return Judgement(verdict, agreement, contents, proofs or Proofs(), decimator, scope)
 
 
 def _held_against(
@@ -162,24 +163,25 @@ def _held_against(
 
 
 def _files_proven(
-    certificate: Certificate, item: ItemEntry | None, folder: Path, progress: Progress
+    certificate: Certificate, item: ItemEntry | None, contents: Mapping[str, bytes], progress: Progress
 ) -> tuple[Proofs, DecimatorVerdict | None]:
-    text = core_text(folder / f"{certificate.name}.sv")
     require(_PLAIN.fullmatch(certificate.name) is not None, "the name of a core must be a plain identifier")
+    sv, c, h, il, json = (f"{certificate.name}.{end}" for end in ("sv", "c", "h", "il", "json"))
+    text = ascii_text(sv, contents[sv])
     modules = read_source(text, certificate.name).modules
     if item is None:
         return Proofs(), None
     progress("manifest", 0, 0)
     check_ports(modules[certificate.name], item)
-    manifest = read_manifest(content_of(folder / f"{certificate.name}.json"), certificate, item)
+    manifest = read_manifest(contents[json], certificate, item)
     proofs, decimator = _hardware_proven(certificate, item, text, progress)
     manifest.hold_clocks(proofs.hardware or proofs.unit if certificate.decimation is None else None)
     manifest.hold_program(None if proofs.program is None else _program_of(certificate, text))
     progress("C model", 0, 0)
-    source, header = (unicode_text(folder / f"{certificate.name}.{end}") for end in "ch")
+    source, header = (unicode_text(name, contents[name]) for name in (c, h))
     model = check_c_model(source, header, certificate, item)
     progress("RTLIL", 0, 0)
-    rtlil = check_rtlil(core_text(folder / f"{certificate.name}.il"), modules)
+    rtlil = check_rtlil(ascii_text(il, contents[il]), modules)
     return replace(proofs, unheld=tuple(manifest.open), model=model, rtlil=rtlil), decimator
 
 

@@ -92,19 +92,23 @@ def about_of(certificate: Certificate) -> AboutEntry:
     return about
 
 
-def check_files(about: AboutEntry, directory: Path) -> int:
-    """Check that all files in `directory` are those that were written with a certificate; return their number.
+def check_files(about: AboutEntry, directory: Path) -> dict[str, bytes]:
+    """Check that all files in `directory` are those that were written with a certificate; return their contents.
+
+    Each is read once: what is proven is what has the digest, whatever becomes of the file meanwhile.
 
     Raises
     ------
     RejectedError
         If a file is missing or was changed.
     """
+    found = {}
     for entry in about.files:
         require(Path(entry.name).name == entry.name, f"{entry.name!r} must be the name of a file without a folder")
         path = directory / entry.name
-        _compare(str(path), entry.sha256, content_of(path))
-    return len(about.files)
+        found[entry.name] = content_of(path)
+        _compare(str(path), entry.sha256, found[entry.name])
+    return found
 
 
 def check_text(about: AboutEntry, text: str) -> None:
@@ -136,32 +140,32 @@ def check_measurements(about: AboutEntry, path: Path) -> bytes:
     return content
 
 
-def core_text(path: Path) -> str:
-    """Return the SystemVerilog of a core.
+def ascii_text(name: str, content: bytes) -> str:
+    """Return the text of a file of hardware.
 
     Raises
     ------
     RejectedError
-        If there is none.
+        If it is none.
     """
     try:
-        return content_of(path).decode("ascii")
+        return content.decode("ascii")
     except UnicodeDecodeError:
-        raise RejectedError(f"{path} must be ASCII") from None
+        raise RejectedError(f"{name} must be ASCII") from None
 
 
-def unicode_text(path: Path) -> str:
+def unicode_text(name: str, content: bytes) -> str:
     """Return a text whose comments may have any letters, such as those of a unit.
 
     Raises
     ------
     RejectedError
-        If there is none.
+        If it is none.
     """
     try:
-        return content_of(path).decode("utf-8")
+        return content.decode("utf-8")
     except UnicodeDecodeError:
-        raise RejectedError(f"{path} must be UTF-8") from None
+        raise RejectedError(f"{name} must be UTF-8") from None
 
 
 def check_texts(about: AboutEntry, texts: Mapping[str, str]) -> int:

@@ -259,7 +259,7 @@ class Certificate:
         scope = dict(found.scope)
         if second_reader is not None and files is not None:
             progress("second reader", 0, 0)
-            readings = read_again(Path(fspath(files)) / f"{self.name}.sv", seconds)
+            readings = read_again(found.files[f"{self.name}.sv"].decode("ascii"), self.name, seconds)
             why = (
                 f"Yosys sees the same {readings.register_bits} bits of registers and {readings.words} words of "
                 f"memories in {readings.modules} modules, and what each of them becomes"
@@ -282,7 +282,7 @@ class Certificate:
             nodes=verdict.nodes,
             ranges=verdict.ranges,
             agreement=found.agreement,
-            files=found.files,
+            files=len(found.files),
             program=found.proofs.program,
             calibration=found.proofs.calibration,
             hardware=found.proofs.hardware,

@@ -11,20 +11,21 @@ from sosmith.verify.graph import RejectedError
 from sosmith.verify.reader.outside import SCRIPT
 from sosmith.verify.reader.second_reader import Readings, compare_readings
 from sosmith.verify.reader.source import read_source
-from sosmith.verify.verdict.generated_files import core_text
 from sosmith.verify.verdict.limits import limited
 
 SECOND_READERS = ("yosys",)
 _USE = "the second reader"
 
 
-def read_again(path: Path, seconds: float) -> Readings:
-    """Compare the reading of a core's SystemVerilog, whose top module has the name of the file, with that of Yosys.
+def read_again(text: str, top: str, seconds: float) -> Readings:
+    """Compare the reading of a core's SystemVerilog with that of Yosys.
 
     Parameters
     ----------
-    path : Path
-        The file, ``<name>.sv``, which `verify` has accepted.
+    text : str
+        What `verify` has accepted.
+    top : str
+        Name of its top module.
     seconds : float
         Time that the comparison may take, in s; 0 for any.
 
@@ -36,14 +37,15 @@ def read_again(path: Path, seconds: float) -> Readings:
         If Yosys is missing.
     """
     yosys_version(_USE)
-    text = core_text(path)
     with limited(seconds):
-        modules = read_source(text, path.stem).modules
+        modules = read_source(text, top).modules
         with TemporaryDirectory() as folder:
             (Path(folder) / "core.sv").write_text(text, encoding="ascii")
             try:
-                run_yosys(SCRIPT.format(top=path.stem), Path(folder), _USE)
+                run_yosys(SCRIPT.format(top=top), Path(folder), _USE)
             except ToolError as error:
-                raise RejectedError(f"the second reader must take {path}, and does not: {error}") from None
+                raise RejectedError(
+                    f"the second reader must take the SystemVerilog of {top}, and does not: {error}"
+                ) from None
             netlist = (Path(folder) / "core.json").read_text(encoding="utf-8")
         return compare_readings(modules, netlist)

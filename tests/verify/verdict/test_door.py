@@ -20,6 +20,7 @@ from sosmith.interface.certificate import Certificate, Proof
 from sosmith.verify.certificate_file import Certificate as Entries
 from sosmith.verify.certificate_file import certificate_text, sealed
 from sosmith.verify.graph import RejectedError
+from sosmith.verify.verdict import generated_files
 from sosmith.verify.verdict.scope import State
 
 Tree = dict[str, Any]
@@ -223,6 +224,21 @@ def test_nothing_is_free_that_nothing_is_proven_of(
 ) -> None:
     with pytest.raises(RejectedError, match=f"^({sentence})$"):
         proof(forge(copy(PARALLEL), edit))
+
+
+def test_each_file_is_read_once(copy: Callable[..., Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    """What has the digest is what is proven, though the file be another one a moment later."""
+    path, read = forge(copy(PARALLEL)), []
+
+    def once(given: Path) -> bytes:
+        read.append(given.name)
+        content = given.read_bytes()
+        given.write_bytes(b"changed")
+        return content
+
+    monkeypatch.setattr(generated_files, "content_of", once)
+    assert set(proof(path).missing) == {"manifest"}
+    assert sorted(read) == ["plain.c", "plain.h", "plain.il", "plain.json", "plain.sv"]
 
 
 @pytest.mark.parametrize("name", ["../plain", "/plain", "plain/../plain", "a b", "\x1b[2K", ""])

@@ -16,10 +16,11 @@ from sosmith.gen.specification.specification import load
 from sosmith.model.errors import SpecificationError
 from sosmith.verify.certificate_file import AboutEntry, read_certificate
 from sosmith.verify.verdict.generated_files import (
+    ascii_text,
     check_files,
     check_seal,
     check_texts,
-    core_text,
+    unicode_text,
 )
 from sosmith.verify.verification import RejectedError
 
@@ -97,10 +98,11 @@ def test_sentences(folder: Path) -> None:
 
 def test_what_is_no_text_is_not_read(folder: Path) -> None:
     path = folder / f"{NAME}.sv"
-    assert core_text(path) == path.read_text(encoding="ascii")
-    path.write_bytes(b"// \xe4")
-    with pytest.raises(RejectedError, match=r"\.sv must be ASCII$"):
-        core_text(path)
+    assert ascii_text(path.name, path.read_bytes()) == path.read_text(encoding="ascii")
+    with pytest.raises(RejectedError, match=rf"^{NAME}\.sv must be ASCII$"):
+        ascii_text(path.name, b"// \xe4")
+    with pytest.raises(RejectedError, match=rf"^{NAME}\.c must be UTF-8$"):
+        unicode_text(f"{NAME}.c", b"// \xe4")
 
 
 def test_files_generated_again_are_the_same(folder: Path) -> None:
