@@ -14,6 +14,9 @@ ROOT = Path(__file__).parents[2]
 _SHOWN = re.compile(r"```sh\n(?P<lines>[^`]*)```\n\n```text\n(?P<output>[^`]*)```")
 """Lines of a shell, directly followed by what they print."""
 
+_SILENT = re.compile(r"```sh\n(?P<lines>[^`]*)```\n(?!\n```text)")
+"""Lines of a shell that nothing is shown of."""
+
 
 def run(line: str, folder: Path) -> str:
     """Carry out a line of the README in `folder`; return what it prints on stdout."""
@@ -38,6 +41,13 @@ def with_output(text: str, folder: Path) -> str:
         return f"```sh\n{block['lines']}```\n\n```text\n{shown}```"
 
     return _SHOWN.sub(renewed, text)
+
+
+def carry_out(text: str, folder: Path) -> None:
+    """Run the lines of a document's shell blocks of which no output is shown."""
+    for block in _SILENT.finditer(text):
+        for line in block["lines"].splitlines():
+            run(line, folder)
 
 
 def furnish(folder: Path) -> Path:

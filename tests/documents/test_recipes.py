@@ -9,8 +9,11 @@ import sys
 import tempfile
 from pathlib import Path
 
+import numpy as np
 import pytest
-from tests.documents.shown import ROOT, furnish, with_output
+from tests.documents.shown import ROOT, carry_out, furnish, with_output
+
+import sosmith
 
 RECIPES = ROOT / "docs" / "recipes"
 PAGES = sorted(page.stem for page in RECIPES.glob("*.md") if page.stem != "README")
@@ -37,6 +40,7 @@ def test_a_recipe_prints_and_draws_what_its_page_shows(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(furnish(tmp_path))
+    carry_out(page(name), tmp_path)
     assert page(name) == with_output(page(name), tmp_path)
     assert (tmp_path / f"{name}.svg").read_bytes() == drawn(name).read_bytes()
 
@@ -45,6 +49,20 @@ def test_a_recipe_prints_and_draws_what_its_page_shows(
 def test_the_specification_shown_is_that_of_the_example(name: str) -> None:
     assert _SPECIFICATION.findall(page(name)) == [specification(name)]
     assert f"images/recipes/{name}.svg" in page(name)
+
+
+def test_the_sound_of_the_recipe_is_that_of_the_hardware(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The lines themselves are among the slow tests; here the integer model plays, and shorter."""
+    monkeypatch.chdir(tmp_path)
+    Path("telephone.toml").write_text(specification("telephone"), encoding="utf-8")
+    made = sosmith.design("telephone.toml", realization="df1")
+    made.trace("pink_noise", seconds=0.2).write("noise.wav")
+    noise = made.trace("noise.wav")
+    heard = made.run(**noise.inputs)
+    spectrum = np.abs(np.fft.rfft(heard)) / np.abs(np.fft.rfft(noise.inputs["x"]))
+    frequency = np.fft.rfftfreq(len(heard), 1 / 48000)
+    assert np.median(spectrum[(frequency > 500) & (frequency < 2000)]) == pytest.approx(1, abs=0.05)
+    assert np.median(spectrum[frequency > 15000]) < 0.02
 
 
 def test_each_recipe_is_listed() -> None:
@@ -56,6 +74,7 @@ if __name__ == "__main__":
     for name in sys.argv[1:] or PAGES:
         with tempfile.TemporaryDirectory() as scratch, contextlib.chdir(scratch):
             text = _SPECIFICATION.sub(lambda _, name=name: specification(name), page(name))
-            (RECIPES / f"{name}.md").write_text(with_output(text, furnish(Path(scratch))), encoding="utf-8")
+            carry_out(text, furnish(Path(scratch)))
+            (RECIPES / f"{name}.md").write_text(with_output(text, Path(scratch)), encoding="utf-8")
             drawn(name).parent.mkdir(parents=True, exist_ok=True)
             drawn(name).write_bytes((Path(scratch) / f"{name}.svg").read_bytes())

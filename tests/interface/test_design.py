@@ -277,6 +277,18 @@ def test_notebooks_get_escaped_text() -> None:
     html = sosmith.design(spec)._repr_html_()
     assert "&lt;b&gt;&amp;" in html
     assert "<b>" not in html
+    html = spec._repr_html_()
+    assert '<tr><th scope="row">output.unit</th><td>&lt;b&gt;&amp;</td></tr>' in html
+    assert html.startswith("<table><caption>Specification ")
+
+
+def test_notebooks_show_cost_and_proof() -> None:
+    made = filter_design()
+    html, counted = made.cost._repr_html_(), made.facts.cost
+    assert f'<th scope="row">Adder bits</th><td>{counted.adder_bits:,}</td>' in html
+    assert counted.multiplier_sizes in html
+    assert (made.cost.luts, made.cost.multipliers) == (counted.luts, counted.multipliers)
+    assert "Error budget, proven for all inputs in range" in made.verify()._repr_html_()
 
 
 def test_quantities_keep_their_unit() -> None:

@@ -83,7 +83,7 @@ def _specification(reports: Sequence[Report]) -> list[Difference]:
     trees = [fact(report, "provenance.specification") for report in reports]
     if any(tree is None for tree in trees):
         return []
-    flat = [_flat(tree) for tree in trees]
+    flat = [flat_keys(tree) for tree in trees]
     keys = dict.fromkeys(key for one in flat for key in one)
     rows = {key: tuple(one.get(key, MISSING) for one in flat) for key in keys}
     return [
@@ -91,13 +91,13 @@ def _specification(reports: Sequence[Report]) -> list[Difference]:
     ]
 
 
-def _flat(tree: Mapping[str, Any], depth: int = _DEPTH) -> dict[str, str]:
+def flat_keys(tree: Mapping[str, Any], depth: int = _DEPTH) -> dict[str, str]:
     """Keys with dots, and their values as text."""
     found: dict[str, str] = {}
     for name, value in tree.items():
         key = json.dumps(name)[1:-1]
         if isinstance(value, Mapping) and depth > 1:
-            found |= {f"{key}.{inner}": text for inner, text in _flat(value, depth - 1).items()}
+            found |= {f"{key}.{inner}": text for inner, text in flat_keys(value, depth - 1).items()}
         else:
             found[key] = _text(value)
     return found

@@ -193,8 +193,8 @@ def response_figure(reports: Sequence[Report], names: Sequence[str]) -> Figure |
     filters = [fact(report, "curves.filter") for report in reports]
     if any(each is None for each in filters):
         return None
-    nyquist = min(float(each["sample_rate"]) for each in filters) / 2
-    frequency = geometric(nyquist / 10**4, nyquist * 0.999, _POINTS)
+    nyquists = [float(each["sample_rate"]) / 2 for each in filters]
+    frequency = geometric(min(nyquists) / 10**4, max(nyquists) * 0.999, _POINTS)
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # a file may hold any numbers
         gains = [_gain(each, "quantized_sos", frequency) for each in filters]
@@ -230,7 +230,10 @@ def response_figure(reports: Sequence[Report], names: Sequence[str]) -> Figure |
 
 
 def _gain(filter_: Mapping[str, Any], name: str, frequency: Array) -> Array:
-    return magnitude_db(np.array(filter_[name], dtype=np.float64), frequency, float(filter_["sample_rate"]))
+    """Return a gain in dB, NaN above half the filter's own sample rate."""
+    rate = float(filter_["sample_rate"])
+    gain = magnitude_db(np.array(filter_[name], dtype=np.float64), frequency, rate)
+    return np.where(frequency < rate / 2, gain, np.nan)
 
 
 def _unlike(reports: Sequence[Report]) -> bool:

@@ -19,10 +19,10 @@ from sosmith.gen.fpga.boards import BUILDABLE, MODELLED, PROJECTS, RATE, find_bo
 from sosmith.gen.output.core_facts import CoreFacts, core_facts
 from sosmith.gen.output.manifest import manifest
 from sosmith.gen.quantity import number
-from sosmith.gen.word_lengths.cost import Cost
 from sosmith.interface.inputs import codes_of, encoded, real_numbers, traces_of
 from sosmith.interface.quantity import Quantity
 from sosmith.interface.specification import Specification, specification_of
+from sosmith.interface.tables.cost import Cost
 from sosmith.interface.trace import Trace
 from sosmith.model.errors import SpecificationError, falling_short
 
@@ -222,7 +222,7 @@ class Design:
     @property
     def cost(self) -> Cost:
         """Estimates before synthesis, for the parallel architecture: `multipliers`, `adder_bits`, `luts`, ..."""
-        return self.facts.cost
+        return Cost.of(self.facts.cost)
 
     @cached_property
     def manifest(self) -> dict[str, Any]:

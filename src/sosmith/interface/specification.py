@@ -9,6 +9,7 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from sosmith.gen.facts.table import Table, View
 from sosmith.gen.specification.choices import ARCHITECTURES, FAMILIES, KINDS, LOSSES, METHODS, REALIZATIONS, STARTS
 from sosmith.gen.specification.combinations import Combination, combinations
 from sosmith.gen.specification.exact_values import exact
@@ -29,7 +30,7 @@ _UNNAMED = Path("specification")
 
 
 @dataclass(frozen=True)
-class Specification:
+class Specification(View):
     """A checked specification; make one with `load`, `from_sos` or `example`.
 
     It is checked completely when it is made, and is immutable. The keys are those of the TOML file: `sosmith init`
@@ -312,6 +313,13 @@ class Specification:
     def toml(self) -> str:
         """Return the specification as the text of a TOML file, its own if it has one; `load` reads back the same."""
         return self.checked.text
+
+    def tables(self) -> list[Table]:
+        """Return the keys as given, with dots, and their values."""
+        from sosmith.gen.report.comparison.differences import flat_keys  # and with it numpy
+
+        rows = list(flat_keys(self.as_dict()).items())
+        return [Table(f"Specification {self.name}", rows, ("key", "value"))]
 
     def __repr__(self) -> str:
         rate = f"{self.sample_rate:g} Hz"

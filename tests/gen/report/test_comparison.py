@@ -18,6 +18,7 @@ from sosmith.gen.report.comparison.differences import alike, differences
 from sosmith.gen.report.comparison.fairness import fairness
 from sosmith.gen.report.comparison.markdown import comparison_markdown
 from sosmith.gen.report.comparison.page import comparison_page
+from sosmith.gen.report.comparison.pictures import response_figure
 from sosmith.gen.report.comparison.report_file import load_report
 from sosmith.gen.report.comparison.rows import Row, column_names, compare
 from sosmith.gen.report.comparison.summary import comparison_json
@@ -152,6 +153,23 @@ def test_what_differs() -> None:
     assert ("samples", "20,000") in alike([report(), other])
     assert not {"trace", "simulator", "realization"} & {title for title, _ in alike([report(), other])}
     assert differences([report(), report()]) == []
+
+
+def test_differences_are_rows_and_designs_columns() -> None:
+    page = comparison_page([report(), report(realization="df1")])
+    cells = '<td class="piece">df1_ef2</td><td class="piece">df1</td>'
+    assert f'<tr><th scope="row">datapath: realization</th>{cells}</tr>' in page
+
+
+def test_the_axis_of_frequency_reaches_to_the_fastest() -> None:
+    """At its own rate and at ten times that: the slower one ends where its Nyquist frequency is."""
+    slow, fast = report(), report()
+    fast["curves"]["filter"] = slow["curves"]["filter"] | {"sample_rate": 10 * slow["curves"]["filter"]["sample_rate"]}
+    figures = [response_figure(pair, ("a", "b")) for pair in ((slow, slow), (slow, fast), (fast, fast))]
+    labels = [re.findall(r">([\d.]+ k?Hz)</text>", figure.drawing) for figure in figures if figure is not None]
+    assert len(labels) == 3
+    assert labels[1][-1] == labels[2][-1] != labels[0][-1]
+    assert labels[1][0] == labels[0][0]
 
 
 NAMES = ("a", "b", "c")
