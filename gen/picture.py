@@ -82,10 +82,30 @@ def picture(
     with mpl.rc_context(_STYLE | {"svg.hashsalt": name} | (style or {})):
         figure = Figure(figsize=size, dpi=_DPI, layout="constrained")
         paint(figure)
+        if file_format == "svg":
+            return settled(svg_text(figure)).encode("utf-8")
         stream = io.BytesIO()
-        figure.savefig(stream, format=file_format, metadata={"Date": None} if file_format == "svg" else {})
-    content = stream.getvalue()
-    return settled(content.decode("utf-8")).encode("utf-8") if file_format == "svg" else content
+        figure.savefig(stream, format=file_format)
+    return stream.getvalue()
+
+
+def svg_text(figure: Figure) -> str:
+    """Draw a figure that has a layout engine as the text of an SVG file.
+
+    It is laid out first: whoever saves a figure with its engine draws it twice, the first time for the layout alone.
+    """
+    import matplotlib as mpl
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+
+    FigureCanvasSVG(figure)
+    with mpl.rc_context({"savefig.format": "svg"}):  # texts are measured as this format sets them
+        engine = figure.get_layout_engine()
+        if engine is not None:
+            engine.execute(figure)
+        figure.set_layout_engine(None)
+        stream = io.StringIO()
+        figure.savefig(stream, metadata={"Date": None})
+    return stream.getvalue()
 
 
 def legend_beside(axes: Axes) -> None:

@@ -1,7 +1,8 @@
-"""What holds for every test: which cases of a sweep run always, and how signals are taken."""
+"""What holds for every test: which cases of a sweep run always, how signals are taken, and what is no garbage."""
 
 from __future__ import annotations
 
+import gc
 import signal
 from collections.abc import Iterator
 
@@ -29,6 +30,11 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         for number, case in enumerate(fast):
             if number not in kept:
                 case.add_marker(pytest.mark.slow)
+
+
+def pytest_collection_finish() -> None:
+    """Keep the collector of garbage from looking at all tests again and again: they are not let go before the end."""
+    gc.freeze()
 
 
 def _unmoved(number: int, frame: object) -> None:

@@ -21,10 +21,20 @@ def modules() -> tuple[Path, ...]:
 
 
 @cache
-def imported(path: Path) -> set[str]:
+def _read(path: Path) -> tuple[frozenset[str], str | None]:
+    """Read a file once: the modules of the package that it names in its imports, and its docstring."""
+    tree = ast.parse((ROOT / path).read_text(encoding="utf-8"))
+    return _imported(tree, path), ast.get_docstring(tree)
+
+
+def imported(path: Path) -> frozenset[str]:
     """Modules of the package that the file at `path` names in its imports, with dots."""
+    return _read(path)[0]
+
+
+def _imported(tree: ast.Module, path: Path) -> frozenset[str]:
     found = set()
-    for node in ast.walk(ast.parse((ROOT / path).read_text(encoding="utf-8"))):
+    for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom) and node.level:
             raise AssertionError(f"{path} must import absolutely, not from {'.' * node.level}{node.module or ''}")
         if isinstance(node, ast.ImportFrom) and node.module:
@@ -33,7 +43,7 @@ def imported(path: Path) -> set[str]:
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.Constant) and isinstance(node.value, str):
             found.add(node.value)  # import_module("sosmith.x") counts, whoever calls it
-    return {name for name in found if name.startswith("sosmith.") and is_module(name)}
+    return frozenset(name for name in found if name.startswith("sosmith.") and is_module(name))
 
 
 @cache
@@ -75,10 +85,9 @@ def floors(room: str) -> list[list[str]]:
     return [sorted(part for part in level if level[part] == height) for height in range(max(level.values()) + 1)]
 
 
-@cache
 def summary(path: Path) -> str:
     """First line of the module's docstring, without its full stop."""
-    text = ast.get_docstring(ast.parse((ROOT / path).read_text(encoding="utf-8")))
+    text = _read(path)[1]
     assert text, f"{path} must have a docstring"
     return text.splitlines()[0].rstrip(".").replace("``", "`")
 

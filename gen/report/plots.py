@@ -6,7 +6,6 @@ and print follow the page. Texts stay texts, in the page's own font. The same ev
 
 from __future__ import annotations
 
-import io
 import itertools
 import math
 import re
@@ -34,7 +33,7 @@ from sosmith.gen.filter.response import (
     stopbands,
     zeros,
 )
-from sosmith.gen.picture import settled
+from sosmith.gen.picture import settled, svg_text
 from sosmith.gen.quantity import quantity, scale
 from sosmith.gen.report.evidence import Evidence
 from sosmith.gen.report.run import Instants
@@ -101,9 +100,8 @@ def draw(name: str, title: str, width: int, height: int, paint: Callable[[Figure
     with mpl.rc_context(STYLE | {"svg.hashsalt": f"{name}-{width}"}):
         figure = Figure(figsize=(width / 72, height / 72), dpi=72, layout="constrained")
         paint(figure)
-        stream = io.StringIO()
-        figure.savefig(stream, format="svg", metadata={"Date": None})
-    return _embed(settled(stream.getvalue(), f"{name}-{width}-"), title, width, height)
+        svg = svg_text(figure)
+    return _embed(settled(svg, f"{name}-{width}-"), title, width, height)
 
 
 def _embed(svg: str, title: str, width: int, height: int) -> str:

@@ -9,12 +9,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy import signal
 from tests.commands.command_line import FILTER
 from tests.gen.report.evidences import evidence
 
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.fpga.boards import find_board
 from sosmith.gen.fpga.synthesis import Netlist
+from sosmith.gen.report import curves
 from sosmith.gen.report.curves import STRETCHES, error_over_time, error_spectrum
 from sosmith.gen.report.provenance import Provenance, hardware_cost, provenance_of
 from sosmith.gen.report.report import summarise
@@ -88,6 +90,16 @@ def test_spectrum_of_the_error_has_its_power() -> None:
     power = sum(density**2 for density in found["density"]) * step
     assert math.sqrt(power) == pytest.approx(summarise(run)["error"]["rms"], rel=0.05)
     assert found["frequency"][-1] == pytest.approx(50.0)
+
+
+@pytest.mark.parametrize("samples", [33, 100, 3000])
+def test_the_spectrum_is_scipys(samples: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(curves, "_SEGMENTS", 4)
+    values = np.random.default_rng(samples).standard_normal(samples)
+    for found, wanted in zip(
+        curves._spectrum(values, 50.0), signal.welch(values, fs=50.0, nperseg=min(256, samples)), strict=True
+    ):
+        assert found == pytest.approx(wanted, rel=1e-9, abs=1e-15)
 
 
 def test_report_tells_the_provenance() -> None:

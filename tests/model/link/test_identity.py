@@ -1,6 +1,7 @@
 """The gate for what a device says of itself: plain names, numbers in ranges, each key once."""
 
 import json
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -22,8 +23,13 @@ from sosmith.model.link.identity import Identity
 from sosmith.model.link.integer_core import IntegerCore
 
 
+@cache
+def memory() -> bytes:
+    return device_of(instrument_design())._memory
+
+
 def tree() -> dict[str, Any]:
-    made: dict[str, Any] = json.loads(device_of(instrument_design())._memory.rstrip(b"\0"))
+    made: dict[str, Any] = json.loads(memory().rstrip(b"\0"))
     return made
 
 
