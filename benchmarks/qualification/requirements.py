@@ -67,7 +67,7 @@ def tables() -> dict[str, str]:
 
 
 def _links(tests: tuple[str, ...]) -> str:
-    return ", ".join(f"`{one.removeprefix('tests/')}`" for one in tests)
+    return ", ".join(f"`{one}`" for one in tests)
 
 
 def _tree() -> dict[str, list[dict[str, object]]]:
