@@ -102,7 +102,7 @@ class Table:
         """Return the table for a notebook or a page, with its title as the caption."""
         verdict = "" if self.passed is None else f": {'passed' if self.passed else 'fell short'}"
         title = f"<caption>{escape(self.title + verdict)}</caption>" if caption else ""
-        titles = "".join(f'<th scope="col"{self._aligned(k)}>{escape(name)}</th>' for k, name in enumerate(self.head))
+        titles = "".join(_title("col", escape(name), self._aligned(k)) for k, name in enumerate(self.head))
         head = f"<thead><tr>{titles}</tr></thead>" if any(self.head) else ""
         body = "".join(map(self._row, self.rows))
         notes = "".join(f"<p>{escape(note)}</p>" for note in self.notes)
@@ -115,7 +115,7 @@ class Table:
             for k, cell in enumerate(rest, start=1)
         )
         same = "" if first else ' class="same"'
-        return f'<tr{same}><th scope="row">{first}</th>{cells}</tr>'
+        return f"<tr{same}>{_title('row', first)}{cells}</tr>"
 
     def _aligned(self, column: int) -> str:
         return ' class="number"' if column in self.numbers else ""
@@ -126,6 +126,11 @@ class Table:
         head = {"head": list(self.head)} if any(self.head) else {}
         verdict = {} if self.passed is None else {"passed": self.passed}
         return {"title": self.title, **verdict, **head, "rows": rows, "notes": list(self.notes)}
+
+
+def _title(scope: str, text: str, attributes: str = "") -> str:
+    """Return the cell of a title; without one it is an empty cell, which a screen reader passes over."""
+    return f'<th scope="{scope}"{attributes}>{text}</th>' if text else f"<td{attributes}></td>"
 
 
 class View:

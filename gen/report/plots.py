@@ -109,6 +109,7 @@ def _embed(svg: str, title: str, width: int, height: int) -> str:
     body = svg[svg.index("<svg") :]
     body = body[body.index(">") + 1 :].removesuffix("\n")
     body = re.sub(r"<metadata>.*?</metadata>\s*", "", body, flags=re.DOTALL)
+    body = re.sub(r'<g id="[^"]*"/>\s*', "", body)
     body = re.sub(r'<g id="[^"]*">', "<g>", body)
     body = re.sub(r"<!--.*?-->\s*", "", body)
     body = body.replace("xlink:href", "href")
@@ -120,7 +121,9 @@ def _embed(svg: str, title: str, width: int, height: int) -> str:
     body = re.sub(r"\n\s*", "\n", body)
     for role, colour in COLOUR.items():
         body = body.replace(colour, f"var(--{role})")
-    return f'<svg viewBox="0 0 {width} {height}" role="img" aria-label="{title}">{body}'
+    body, links = re.subn(r'<a href="#([a-z]+)-(\d+)">', r'<a href="#\1-\2" aria-label="\1 \2">', body)
+    role = "group" if links else "img"  # what is within a picture cannot be reached
+    return f'<svg viewBox="0 0 {width} {height}" role="{role}" aria-label="{title}">{body}'
 
 
 def _shorten(attribute: re.Match[str]) -> str:

@@ -9,6 +9,7 @@ import subprocess
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 from urllib.request import urlopen
@@ -18,6 +19,10 @@ from websockets.sync.client import ClientConnection, connect
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 PATIENCE = 60.0
 """Seconds to wait for what must come."""
+
+
+_FAULTS = """axe.run(document, {resultTypes: ['violations']}).then((told) =>
+    told.violations.flatMap((one) => one.nodes.map((node) => one.help + ': ' + node.html.slice(0, 120))))"""
 
 
 class Tab:
@@ -70,6 +75,13 @@ class Tab:
     def value(self, expression: str) -> Any:
         """Return the value of an expression in the page."""
         return self.call("Runtime.evaluate", expression=expression, returnByValue=True)["result"].get("value")
+
+    def faults(self) -> list[str]:
+        """Return what keeps people from reading the page, by the rules of axe-core: what is wrong, and where."""
+        script = Path(str(files("axe_core_python") / "axe.min.js")).read_text(encoding="utf-8")
+        self.call("Runtime.evaluate", expression=script)
+        told = self.call("Runtime.evaluate", expression=_FAULTS, awaitPromise=True, returnByValue=True)
+        return [str(one) for one in told["result"]["value"]]
 
     def until(self, expression: str) -> None:
         """Wait until an expression in the page is true."""

@@ -15,6 +15,7 @@ from tests.host.browser import BROWSER, browser
 from tests.host.gauges import feed, gauge
 from tests.host.lines import device_of
 from tests.interface.small import filter_design
+from tests.suite.extras import needs
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
@@ -120,6 +121,22 @@ def test_what_the_board_says_is_text_and_no_markup() -> None:
     text = html(gauge(name=nasty, sosmith=nasty, output=("y", 12, False, 0.0, 1.0, nasty)), "nonce")
     assert "<img" not in text
     assert text.count("</script>") == 2
+
+
+@pytest.mark.skipif(BROWSER is None, reason="there is no Chromium on this machine")
+@needs("axe_core_python")
+@pytest.mark.parametrize(("width", "dark"), [(1280, False), (390, True)])
+def test_everybody_can_read_it(live: tuple[Readings, LivePage], tmp_path: Path, width: int, dark: bool) -> None:
+    readings, page = live
+    with browser(tmp_path) as tab:
+        tab.window(width, 900, dark=dark)
+        tab.open(page.address)
+        tab.until("document.getElementById('state')?.textContent === 'No alarm, connected'")
+        feed(readings)
+        readings.alarm(Alarm("wear_critical", 1, 200, 3.25, 1002.0))
+        page.update()
+        tab.until("document.querySelectorAll('#alarms tbody tr').length === 1")
+        assert tab.faults() == []
 
 
 @pytest.mark.skipif(BROWSER is None, reason="there is no Chromium on this machine")

@@ -13,6 +13,7 @@ from tests.host.browser import BROWSER, Tab, browser
 from tests.house import ROOT
 from tests.interface.small import INSTRUMENT
 from tests.studio.sessions import TEXT, session_in, state, until
+from tests.suite.extras import needs
 
 from sosmith import Specification
 from sosmith.studio.server import Studio
@@ -289,6 +290,13 @@ def test_it_fits_every_window(tab: Tab, page: Session, width: int, dark: bool) -
     assert width < 900 or tab.value(f"{tables}.length") == 0  # on a phone they are scrolled
     under = tab.value(f"{controls}.top > {plot}.bottom")
     assert under == (width < 900)  # what one looks at comes first on a phone
+
+
+@needs("axe_core_python")
+@pytest.mark.parametrize(("width", "dark"), [(1280, False), (390, True)])
+def test_everybody_can_use_it(tab: Tab, page: Session, width: int, dark: bool) -> None:
+    tab.window(width, 900, dark=dark)
+    assert tab.faults() == []
 
 
 def test_it_is_printed_without_its_controls(tab: Tab, page: Session, tmp_path: Path) -> None:

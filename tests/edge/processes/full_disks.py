@@ -71,7 +71,8 @@ PLACES = ("out", "tmp", "cache")
 SIZES = (4, 16, 64, 256)
 """Sizes of the full file system in KiB."""
 
-STATUSES = {0, 1, 2, 3}
+STATUSES = {0, 1, 2, 3, 130}
+"""Those that docs and commands name; the last one is that of a board, which is interrupted."""
 
 PATIENCE = 600.0
 """Seconds after which a command is taken to hang, on however busy a machine."""
@@ -79,7 +80,10 @@ PATIENCE = 600.0
 _BOARD = 30.0
 """Seconds after which a board is interrupted, which would run on."""
 
-_MOUNTED = 'mount -t tmpfs -o size="$1"k none "$2" && shift 2 && "$@"; status=$?; cp -r out after'
+_MOUNTED = (
+    'trap : INT; mount -t tmpfs -o size="$1"k none "$2" && shift 2 && "$@"; status=$?; cp -r out/. after; exit $status'
+)
+"""The script around a command: what it has written is copied before the file system goes."""
 
 
 @dataclass(frozen=True)
@@ -117,11 +121,11 @@ def tried(writer: tuple[str, str], place: str, size: int) -> Ended:
     """Run the line of a writer while a folder is on a file system of `size` KiB."""
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
-        for name in PLACES:
+        for name in (*PLACES, "after"):
             (folder / name).mkdir()
         _prepare(folder)
         with _board(folder, WRITERS[writer]) as line:
-            script = ["sh", "-c", f"{_MOUNTED}; exit $status", "sh", str(size), str(folder / place)]
+            script = ["sh", "-c", _MOUNTED, "sh", str(size), str(folder / place)]
             ended = _run(folder, ["unshare", "-rm", *script, *_program(line)])
         return Ended(ended.returncode, ended.stderr, tuple(_findings(ended, folder, place)))
 
@@ -163,8 +167,6 @@ def _run(folder: Path, line: list[str]) -> subprocess.CompletedProcess[str]:
     except subprocess.TimeoutExpired:
         os.killpg(process.pid, signal.SIGINT)  # a board runs until then
         _, said = process.communicate(timeout=PATIENCE)
-        stopped = process.returncode in {130, -signal.SIGINT}  # the latter is the shell's
-        return subprocess.CompletedProcess(line, 0 if stopped else process.returncode, "", said)
     return subprocess.CompletedProcess(line, process.returncode, "", said)
 
 

@@ -11,6 +11,7 @@ from tests.gen.report.behaviours import told
 from tests.gen.report.evidences import LSB, evidence, page_of
 from tests.gen.report.reports import WORSE, report
 from tests.host.browser import BROWSER, Tab, browser
+from tests.suite.extras import needs
 
 from sosmith.gen.report.comparison.baseline import judge
 from sosmith.gen.report.comparison.page import comparison_page
@@ -77,6 +78,14 @@ def test_report(tab: Tab, accuracy: Path, width: int, dark: bool) -> None:
     paper = tab.value("getComputedStyle(document.body).backgroundColor")
     assert (paper == "rgb(20, 22, 26)") == dark
     assert tab.is_quiet(accuracy)
+
+
+@needs("axe_core_python")
+@pytest.mark.parametrize(("width", "dark"), [(1280, False), (390, True)])
+def test_everybody_can_read_them(tab: Tab, accuracy: Path, comparison: Path, width: int, dark: bool) -> None:
+    for page in (accuracy, comparison):
+        tab.show(page, width, dark=dark)
+        assert tab.faults() == []
 
 
 def readout(tab: Tab) -> str:

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 from tests.host.browser import BROWSER, Tab, browser
+from tests.suite.extras import needs
 
 from sosmith.sim.exploration.page import exploration_page
 from sosmith.sim.exploration.run import Outcome
@@ -73,6 +74,13 @@ def test_it_fits_and_says_nothing(tab: Tab, page: Path, width: int, dark: bool) 
     assert tab.value(shown) == 1
     assert (tab.value("getComputedStyle(document.body).backgroundColor") == "rgb(20, 22, 26)") == dark
     assert tab.is_quiet(page)
+
+
+@needs("axe_core_python")
+@pytest.mark.parametrize(("width", "dark"), [(1280, False), (390, True)])
+def test_everybody_can_read_it(tab: Tab, page: Path, width: int, dark: bool) -> None:
+    tab.show(page, width, dark=dark)
+    assert tab.faults() == []
 
 
 def test_a_point_leads_to_its_design(tab: Tab, page: Path) -> None:
