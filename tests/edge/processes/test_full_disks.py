@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import errno
 import os
+import tempfile
 
 import pytest
 
+from sosmith import cli
 from tests.edge.processes.full_disks import PLACES, WRITERS, drawn, missing, possible, tried
 
 alone = pytest.mark.skipif(not possible(), reason="takes a file system of its own, which this machine does not allow")
@@ -24,7 +26,22 @@ def test_a_full_disk_for_the_output_is_told() -> None:
     assert ended.said == f"sosmith: error: out: the disk must take the output files, not: {FULL}\n"
 
 
+def test_where_nobody_knows_which_disk_is_full_both_are_named(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def full(*_arguments: object, **_options: object) -> int:
+        raise OSError(errno.ENOSPC, FULL)
+
+    monkeypatch.setattr(tempfile, "tempdir", "/scratch")
+    monkeypatch.setattr(cli.cli, "main", full)
+    with pytest.raises(SystemExit) as end:
+        cli.main()
+    said = f"sosmith: error: the disks of the output and of /scratch must have room, not: {FULL}\n"
+    assert (end.value.code, capsys.readouterr().err) == (3, said)
+
+
 @alone
+@pytest.mark.slow
 def test_a_full_disk_for_temporary_files_is_told() -> None:
     ended = tried(("package", "-o"), "tmp", 4)
     assert (ended.status, ended.findings) == (3, ())
