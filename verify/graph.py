@@ -226,7 +226,7 @@ class Transfer:
     @cached_property
     def denominator(self) -> fmpq_poly:
         """``det(I - w A)`` for the state matrix A."""
-        return _reversed_characteristic(self._matrix)
+        return _reversed_characteristic(self.matrix)
 
     def numerator(self, source: Source, node: int) -> fmpq_poly:
         """Numerator from `source` to `node`, over `denominator`.
@@ -235,25 +235,36 @@ class Transfer:
         det(I - w A)``, by the matrix determinant lemma. A source that enters with several delays contributes one such
         term for each.
         """
-        states = self._states
+        states = self.states
         c = [self._forms[node].get(state, fmpq(0)) for state in states]
         delays = {key[1] for form in self._forms for key in form if isinstance(key, tuple) and key[0] == source}
         total = fmpq_poly([0])
         for delay in delays:
             b = [self._next(state).get((source, delay), fmpq(0)) for state in states]
             d = self._forms[node].get((source, delay), fmpq(0))
-            changed = [[a - x * y for a, y in zip(row, c, strict=True)] for row, x in zip(self._matrix, b, strict=True)]
+            changed = [[a - x * y for a, y in zip(row, c, strict=True)] for row, x in zip(self.matrix, b, strict=True)]
             part = _reversed_characteristic(changed) + (d - 1) * self.denominator
             total += fmpq_poly([0] * delay + [1]) * part
         return total
 
     @cached_property
-    def _states(self) -> list[_State]:
+    def states(self) -> list[_State]:
+        """Indices of the DELAY nodes."""
         return [index for index, node in enumerate(self.stage.nodes) if node.op is Operation.DELAY]
 
     @cached_property
-    def _matrix(self) -> list[list[fmpq]]:
-        return [[self._next(state).get(other, fmpq(0)) for other in self._states] for state in self._states]
+    def matrix(self) -> list[list[fmpq]]:
+        """The state matrix A: what each state takes over is its row times the states."""
+        return [[self._next(state).get(other, fmpq(0)) for other in self.states] for state in self.states]
+
+    def weights(self, node: int) -> dict[int, fmpq]:
+        """Return the states that a node adds up, by index of the DELAY, with their factors."""
+        return {key: value for key, value in self._forms[node].items() if isinstance(key, int) and value}
+
+    def input_weights(self) -> list[fmpq]:
+        """Return the factors with which the states take over an input, of all states and inputs."""
+        entries = [(source, 0) for source in self.inputs]
+        return [self._next(state).get(entry, fmpq(0)) for state in self.states for entry in entries]
 
     def _next(self, state: _State) -> _Form:
         return self._forms[self.stage.nodes[state].operands[0]]
@@ -272,7 +283,7 @@ class Transfer:
         if node.op in {Operation.INPUT, Operation.CONSTANT}:
             return {((node.op, index, 0), 0): fmpq(1)}
         if node.op in {Operation.FLOOR, Operation.FRACTION, Operation.TRUNCATE}:
-            root, delay = self._undelayed(node.operands[0])
+            root, delay = self.undelayed(node.operands[0])
             kind = Operation.TRUNCATE if node.op is Operation.TRUNCATE else Operation.FLOOR
             error: _Form = {((kind, root, _kept(node)), delay): fmpq(1)}
             return error if node.op is Operation.FRACTION else _sum(operands[0], error, fmpq(-1))
@@ -288,7 +299,8 @@ class Transfer:
         )
         return {key: value * factor for key, value in operands[0].items()}
 
-    def _undelayed(self, index: int) -> tuple[int, int]:
+    def undelayed(self, index: int) -> tuple[int, int]:
+        """Return the node that a chain of DELAY nodes begins with, and by how many samples a node is behind it."""
         delay = 0
         while self.stage.nodes[index].op is Operation.DELAY:
             require(delay < len(self.stage.nodes), f"{label(self.stage, index)} must not be its own source")

@@ -179,7 +179,8 @@ class SectionFacts:
     input, output : str
         Q formats.
     error_feedback : tuple of int or None
-        Weights of the dropped bits of earlier samples; None if the realization has no error feedback.
+        Weights of the dropped bits of earlier samples; None if the realization has no error feedback, if the section
+        has no recursion, or if nothing is dropped.
     """
 
     name: str
@@ -444,7 +445,7 @@ def _wear(design: CoreDesign) -> tuple[WearFacts, ...] | None:
 
 def _sections(section: Stage) -> Sequence[SectionFacts]:
     """Facts about each recursion of a section."""
-    feedback = tuple(section.feedback) if isinstance(section, DirectForm1) else None
+    feedback = tuple(section.feedback) if isinstance(section, DirectForm1) and section.feeds_errors_back else None
     return [_section(name, graph, feedback) for name, graph in recursions(section).items()]
 
 

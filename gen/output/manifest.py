@@ -33,7 +33,6 @@ def manifest(facts: CoreFacts) -> dict[str, Any]:
         "schedule": _schedule(facts.program),
         "reload": None if facts.reload is None else _entry(facts.reload),
         "protect": facts.protect,
-        "reasons": dict(facts.reasons),
         "sections": [_section(section) for section in facts.sections],
         "formats": [_entry(row) for row in facts.formats],
         "error_bound": facts.error_bound,

@@ -162,7 +162,7 @@ class DirectForm1:
             products.append((product.y[0] != 0, (1, made)))
         terms = [term for is_newest, term in products if not is_newest]
         centre = 1 + sum(self.feedback)
-        if frac > self.y_frac and centre:
+        if self.drops and centre:
             terms.append((1, g.constant(centre, self.y_frac + 1, "centre")))
         for v, y, m, k in zip(past, taps_y, self.integer_part, self.feedback, strict=False):
             if m == k:
@@ -173,6 +173,16 @@ class DirectForm1:
         v = g.bound(g.floor(g.combine(terms), frac), *self.v_range, "v")
         g.connect(v1, v)
         return g.build([g.floor(v, self.y_frac, "y")])
+
+    @property
+    def drops(self) -> bool:
+        """Whether the output has fewer fraction bits than the exact total."""
+        return self.total_frac > self.y_frac
+
+    @property
+    def feeds_errors_back(self) -> bool:
+        """Whether there are dropped bits and a recursion, so that the error feedback means anything."""
+        return self.drops and any(self.denominator)
 
     @property
     def coefficients(self) -> dict[str, tuple[int, int]]:

@@ -36,6 +36,7 @@ from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.program.fault import Contribution, Group, fault
 from sosmith.verify.program.graph_forms import Graph, floored, joined
 from sosmith.verify.program.logic import Bit
+from sosmith.verify.program.memory import Kept, Memory
 from sosmith.verify.program.normal_form import ONE, Form, Forms, constant, plus, scaled, times, valuation
 from sosmith.verify.program.run import one_bit_away, samples
 from sosmith.verify.program.states import State, find_states
@@ -61,12 +62,15 @@ class ProgramVerdict:
         Number of instructions, of values that they store, and of states.
     judged : tuple of (int, int)
         Smallest and largest code of each input without the flag outside_calibration.
+    memory : Memory
+        Which words hold which values.
     """
 
     instructions: int
     values: int
     states: int
     judged: tuple[tuple[int, int], ...]
+    memory: Memory = field(repr=False, compare=False)
 
 
 def check_program(
@@ -113,7 +117,7 @@ def check_program(
             found == tuple(wanted),
             f"{who} must judge {port.name} by the codes {wanted[0]}..{wanted[1]}, not {found[0]}..{found[1]}",
         )
-    return ProgramVerdict(len(program.instructions), run.values, len(run.states), judged)
+    return ProgramVerdict(len(program.instructions), run.values, len(run.states), judged, run.memory())
 
 
 def _proven(program: ProgramText, graph: Graph, certificate: Certificate) -> _Run:
@@ -238,6 +242,9 @@ class _Run:
                 self._words[state.address + k] = self._word(
                     digit, (low, high) if top else None, self._frac(state.node) + state.shift, k
                 )
+        self._history = [(address, word.form) for address, word in enumerate(self._words)]
+        self._stored: list[tuple[int, ...]] = []
+        self._taken_at = list[int]()
         self._acc = _Accumulator()
         self._group = Group()
         self._operand = _Word(self._forms.variable("operand", -base, base - 1), -base, base - 1)
@@ -268,6 +275,25 @@ class _Run:
         for number, instruction in enumerate(self.program.instructions):
             self._step(number, instruction)
         self._finish_sample()
+
+    def memory(self) -> Memory:
+        """Return which words hold which values, once the program has run."""
+        nodes = self.graph.nodes
+        return Memory(
+            states=tuple(
+                Kept(
+                    tuple(range(state.address, state.address + state.digits)),
+                    nodes[state.node].name,
+                    self._frac(state.node) + state.shift,
+                )
+                for state in self.states
+            ),
+            stored=tuple(self._stored),
+            taken=frozenset(self._taken_at),
+            written=tuple(self._history),
+            nodes={node.name: index for index, node in enumerate(nodes)},
+            digits=lambda node, frac, count: self._digits(scaled(self._of[node], frac), count),
+        )
 
     def suspects(self) -> list[int]:
         """Return the instructions that work on the value at which the run has stopped."""
@@ -321,6 +347,7 @@ class _Run:
 
     def _take(self, number: int, address: int, value: int) -> None:
         self._store(number, address, self._taken(number, self.program.digits[value % (1 << NUMBER_BITS)]))
+        self._taken_at.append(address)
         self._acc = _Accumulator()
 
     def _taken(self, number: int, bits: Sequence[Bit]) -> _Word:
@@ -354,6 +381,7 @@ class _Run:
     def _store(self, number: int, address: int, word: _Word) -> None:
         self._words[address] = word
         self._writers[address] = number
+        self._history.append((address, word.form))
 
     def _add(self, word: _Word, factor: Form, ends: tuple[int, int]) -> None:
         acc = self._acc
@@ -416,8 +444,12 @@ class _Run:
         self._store_next(number, address, self._word(form, limits, frac, acc.shift // self._bits))
         self.values += 1
         self._groups[number] = [*self._group.instructions, number]
+        self._stored.append(tuple(self.program.instructions[end].target for end in self._group.ends if self._stores(end)))
         self.purpose |= dict.fromkeys(self._groups[number], node)
         self._acc, self._group = _Accumulator(), Group()
+
+    def _stores(self, number: int) -> bool:
+        return self.program.instructions[number].end in {"store", "finish"}
 
     def _node(self, total: Form, top: int) -> tuple[int, int] | None:
         """Find a node that is `total` modulo ``2**(top + 1)`` as a signed number, with some number of fraction bits.

@@ -7,7 +7,7 @@ The stages are joined, the inputs of each being the outputs of the one before. A
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from types import MappingProxyType
 
@@ -28,10 +28,13 @@ class GraphNode:
         The node; its operands are indices in the joined graph.
     label : str
         Its name in messages.
+    name : str
+        Its name behind that of its stage; its number in the joined graph, if it has none.
     """
 
     entry: NodeEntry
     label: str
+    name: str
 
     @property
     def limits(self) -> tuple[Fraction, Fraction]:
@@ -122,11 +125,12 @@ def joined(certificate: Certificate) -> Graph:
                 at.append(next(supply))
                 continue
             at.append(len(nodes))
-            nodes.append(GraphNode(entry, label(stage, index)))
+            name = f"{stage.name}.{entry.name}" if entry.name else f"value{len(nodes)}"
+            nodes.append(GraphNode(entry, label(stage, index), name))
         for i in range(start, len(nodes)):
             entry = nodes[i].entry
             moved = entry.model_copy(update={"operands": tuple(at[k] for k in entry.operands)})
-            nodes[i] = GraphNode(moved, nodes[i].label)
+            nodes[i] = replace(nodes[i], entry=moved)
         if not passed:
             inputs = [i for i, node in enumerate(nodes) if node.entry.op is Operation.INPUT]
         passed = [at[i] for i in stage.outputs]

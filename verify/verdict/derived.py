@@ -18,13 +18,11 @@ from sosmith.verify.certificate_file import (
     PortEntry,
     StageEntry,
 )
-from sosmith.verify.graph import Transfer, inputs_of
-from sosmith.verify.start import section_alone
+from sosmith.verify.graph import inputs_of
+from sosmith.verify.verdict.figures import Figure
+from sosmith.verify.verdict.recursions import Recursion
 
 _HALF = Fraction(1, 2)
-_ROUNDING = Fraction(1, 2**46)
-"""Relative distance from an exact figure that the arithmetic of doubles may have brought."""
-
 _GRID = Fraction(1, 2**40)
 """Part of an LSB that the grid of the certificate's claims may have added to them."""
 
@@ -33,25 +31,6 @@ _CLAIM_GRID = Fraction(1, 2**64)
 
 _DECIBELS = 1e-6
 """Distance from a gain in dB that the arithmetic of doubles may have brought."""
-
-
-@dataclass(frozen=True)
-class Figure:
-    """A number that a double must stand for: within the rounding of doubles, and `below` or `above` by as much more."""
-
-    value: Fraction
-    below: Fraction = Fraction(0)
-    above: Fraction = Fraction(0)
-
-    def holds(self, found: object) -> bool:
-        """Whether a number in a manifest is this one."""
-        if isinstance(found, bool) or not isinstance(found, int | float) or not -inf < found < inf:
-            return False
-        off, unsure = Fraction(found) - self.value, abs(self.value) * _ROUNDING
-        return -self.below - unsure <= off <= self.above + unsure
-
-    def __str__(self) -> str:
-        return repr(float(self.value))
 
 
 @dataclass(frozen=True)
@@ -142,23 +121,12 @@ def _format(stage: StageEntry, node: NodeEntry, output: PortEntry, *, plain: boo
     }
 
 
-def sections_of(certificate: Certificate) -> tuple[list[dict[str, Any]], list[str]]:
-    """Return the entries of the sections with one input and one output, and the names of the other sections."""
-    steady = any(stage.role == "start" for stage in certificate.stages)
-    stages = [stage for stage in certificate.stages if stage.role == "section"]
-    passes = steady and all(len(inputs_of(stage)) == len(stage.outputs) > 1 for stage in stages)
-    alone = [section_alone(stage) if passes else stage for stage in stages]
-    single = [len(inputs_of(stage)) == len(stage.outputs) == 1 for stage in alone]
-    entries = [_section(stage) for stage, whole in zip(alone, single, strict=True) if whole]
-    return entries, [stage.name for stage, whole in zip(alone, single, strict=True) if not whole]
-
-
-def _section(stage: StageEntry) -> dict[str, Any]:
-    transfer, nodes = Transfer(stage), stage.nodes
-    (given,) = stage.outputs
+def section_of(part: Recursion) -> dict[str, Any]:
+    """Return the entry of a recursion with one input and one output."""
+    transfer, nodes, given = part.transfer, part.stage.nodes, part.output
     numerator = transfer.numerator(transfer.inputs[0], given)
-    return {
-        "name": stage.name,
+    entry = {
+        "name": part.name,
         "coefficients": [
             {
                 "name": node.name.removeprefix("product_"),
@@ -172,9 +140,10 @@ def _section(stage: StageEntry) -> dict[str, Any]:
         "states": {node.name: format_of(node) for node in nodes if node.op is Operation.DELAY},
         "b": _padded([fraction(value) for value in numerator.coeffs()]),
         "a": _padded([fraction(value) for value in transfer.denominator.coeffs()]),
-        "input": format_of(nodes[inputs_of(stage)[0]]),
+        "input": format_of(nodes[inputs_of(part.stage)[0]]),
         "output": format_of(nodes[given]),
     }
+    return entry if part.error_feedback is None else entry | {"error_feedback": list(part.error_feedback)}
 
 
 def _padded(values: Sequence[Fraction]) -> list[Figure]:

@@ -176,7 +176,7 @@ def _files_proven(
     manifest = read_manifest(contents[json], certificate, item)
     proofs, decimator = _hardware_proven(certificate, item, text, progress)
     manifest.hold_clocks(proofs.hardware or proofs.unit if certificate.decimation is None else None)
-    manifest.hold_program(None if proofs.program is None else _program_of(certificate, text))
+    manifest.hold_program(None if proofs.program is None else _program_of(certificate, text), proofs.program)
     progress("C model", 0, 0)
     source, header = (unicode_text(name, contents[name]) for name in (c, h))
     model = check_c_model(source, header, certificate, item)

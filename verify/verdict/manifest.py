@@ -7,7 +7,7 @@ each must be the exact figure but for what their arithmetic rounds. An error mus
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
@@ -15,28 +15,28 @@ from typing import Any
 from sosmith.verify.certificate_file import Certificate, ItemEntry, PortEntry, StreamEntry
 from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.parallel.check import HardwareVerdict
+from sosmith.verify.program.check import ProgramVerdict
 from sosmith.verify.program.text import ProgramText
 from sosmith.verify.specified.words import table_of, words_of
 from sosmith.verify.unit.check import UnitVerdict
 from sosmith.verify.verdict.derived import (
-    Figure,
     bound_of,
     decimation_of,
     formats_of,
     operators_of,
     parts_of,
-    sections_of,
+    section_of,
     settling_of,
 )
+from sosmith.verify.verdict.figures import Figure
 from sosmith.verify.verdict.item import wear_limits
+from sosmith.verify.verdict.recursions import Recursion, is_realized_as, recursions_of
+from sosmith.verify.verdict.resting import limit_cycles_of
 
 _NO_MANIFEST = (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError, IndexError)
 """What is raised where a manifest has anything else."""
 
 _CLOCKS = ("reset_cycles", "latency_cycles", "cycles_per_sample")
-_WORDS = ("realization", "reasons", "limit_cycles")
-"""Names, sentences and bounds that nothing here derives."""
-
 _OPTIONAL = ("pipeline",)
 
 
@@ -68,23 +68,27 @@ class Manifest:
         for key, value in zip(_CLOCKS, clocks, strict=True):
             _compare(key, self.tree[key], value)
 
-    def hold_program(self, found: ProgramText | None) -> None:
-        """Hold the schedule against the program that was read from the hardware; None if none was."""
+    def hold_program(self, program: ProgramText | None, found: ProgramVerdict | None) -> None:
+        """Hold the schedule against the program of the hardware and what its words hold; None if it was not read."""
         schedule = self.tree["schedule"]
         if schedule is None:
             return
-        if found is None:
+        if program is None or found is None:
             self.open.append("schedule")
             return
         wanted = {
-            "digit_bits": found.digit_bits,
-            "accumulator_bits": found.accumulator_bits,
-            "words": found.words,
-            "instructions": [[each.opcode, each.address, each.constant, each.target] for each in found.instructions],
+            "digit_bits": program.digit_bits,
+            "accumulator_bits": program.accumulator_bits,
+            "states": found.memory.kept,
+            "words": program.words,
+            "instructions": [[each.opcode, each.address, each.constant, each.target] for each in program.instructions],
         }
-        for key, value in wanted.items():
-            _compare(f"schedule.{key}", schedule[key], value)
-        self.open += ["schedule.states", "schedule.places"]
+        places = schedule["places"]
+        _compare("schedule", {**schedule, "places": []}, wanted | {"places": []})
+        try:
+            found.memory.check(places)
+        except _NO_MANIFEST:
+            raise RejectedError("schedule.places in the manifest must be places of words") from None
 
 
 def read_manifest(content: bytes, certificate: Certificate, item: ItemEntry) -> Manifest:
@@ -136,14 +140,14 @@ def _check(manifest: Manifest, certificate: Certificate, item: ItemEntry) -> Non
         "formats": formats_of(certificate),
     }
     wanted |= _specified(certificate, item)
-    sections, named = sections_of(certificate)
-    keys = [*wanted, *_CLOCKS, *_WORDS, "reload", "schedule", "sections", "aliasing", "decimation", "cost"]
+    sections = recursions_of(certificate)
+    wanted |= _sections(certificate, sections)
+    keys = [*wanted, *_CLOCKS, "realization", "reload", "schedule", "aliasing", "decimation", "cost"]
     for key in tree:
         require(key in keys or key in _OPTIONAL, f"the manifest must not have the field {_cut(key)}")
     for key, value in wanted.items():
         _compare(key, tree[key], value)
-    manifest.open += [key for key in (*_WORDS, *_OPTIONAL) if tree.get(key)]
-    _check_sections(manifest, tree["sections"], sections, named)
+    _check_realization(tree, sections, _asked_for(certificate))
     _check_decimation(manifest, certificate, item)
     _check_reload(manifest, certificate, item)
     program = item.architecture in {"folded", "serial"}
@@ -184,22 +188,37 @@ def _as_json(value: Any) -> Any:
     return value if isinstance(value, str | bool | int) else float(value)
 
 
-def _check_sections(
-    manifest: Manifest, found: list[dict[str, Any]], wanted: list[dict[str, Any]], named: list[str]
-) -> None:
-    """Compare the sections with one input and output; the parts of others are named."""
-    rest = {entry["name"]: entry for entry in found}
-    require(len(rest) == len(found), "each section of the manifest must have a name of its own")
-    for entry in wanted:
-        name = entry["name"]
-        require(name in rest, f"sections in the manifest must have {name}")
-        other = rest.pop(name)
-        _compare(f"sections.{name}", {key: value for key, value in other.items() if key != "error_feedback"}, entry)
-    if any("error_feedback" in entry for entry in found):
-        manifest.open.append("sections.error_feedback")
-    for name in rest:
-        require(name.partition(" ")[0] in named, f"sections in the manifest must not have {_cut(name)}")
-        manifest.open.append(f"sections.{name}")
+def _sections(certificate: Certificate, sections: Sequence[Sequence[Recursion]]) -> dict[str, Any]:
+    parts = [part for section in sections for part in section]
+    return {
+        "sections": [section_of(part) for part in parts],
+        "limit_cycles": [limit_cycles_of(part, certificate.output) for part in parts],
+    }
+
+
+def _asked_for(certificate: Certificate) -> object:
+    """Return the realization that was asked for; None if the choice was left open."""
+    about = certificate.about
+    assert about is not None
+    stated = table_of(words_of(about.specification), "hardware").get("realization", "auto")
+    asked = about.options.get("realization", stated)
+    return None if asked == "auto" else asked
+
+
+def _check_realization(tree: Mapping[str, Any], sections: Sequence[Sequence[Recursion]], asked: object) -> None:
+    """Check that the name of the realization is the one asked for, or true of the graphs, and what it says of them."""
+    name = tree["realization"]
+    if not sections:
+        _compare("realization", name, None)
+    else:
+        require(
+            is_realized_as(name, sections),
+            f"realization in the manifest must be that of the sections in the certificate, not {_cut(name)}",
+        )
+    ahead = isinstance(name, str) and name.startswith("look_ahead_")
+    if sections and asked is not None and not ahead:
+        _compare("realization", name, asked)
+    _compare("pipeline", tree.get("pipeline"), "look-ahead" if ahead else None)
 
 
 def _check_decimation(manifest: Manifest, certificate: Certificate, item: ItemEntry) -> None:

@@ -17,7 +17,8 @@ from sosmith.gen.specification.specification import from_text
 from sosmith.verify.certificate_file import Certificate
 from sosmith.verify.graph import RejectedError
 from sosmith.verify.parallel.check import HardwareVerdict
-from sosmith.verify.program.text import read_program
+from sosmith.verify.program.check import ProgramVerdict, check_program
+from sosmith.verify.program.text import ProgramText, read_program
 from sosmith.verify.progress import Progress
 from sosmith.verify.unit.check import UnitVerdict
 from sosmith.verify.unit.going_on import Pace
@@ -57,7 +58,7 @@ class Core:
         """Return the manifest with another value at a path such as ``streams.s_axis.fields.0.lsb``."""
         tree = json.loads(self.manifest)
         place = tree
-        *way, last = [int(key) if key.isdigit() else key for key in path.split(".")]
+        *way, last = [int(key) if key.lstrip("-").isdigit() else key for key in path.split(".")]
         for key in way:
             place = place[key]
         if value is None:
@@ -80,20 +81,17 @@ def core() -> Callable[[str], Core]:
     return of
 
 
-ALWAYS = {"realization", "reasons", "limit_cycles"}
 RELOAD = {f"reload.{key}" for key in ("interface", "design", "words", "word_bits", "restarts")}
 AHEAD = {f"decimation.calibration.{key}" for key in ("cycles_per_sample", "latency_cycles", "instructions")}
 AROUND = {f"decimation.{key}" for key in ("deviation_db", "delay", "cycles_per_result", "direct_largest_db")}
-FEEDBACK = {"sections.error_feedback"}
 
 
 @pytest.mark.parametrize(
-    ("name", "unheld"),
-    [("parallel", FEEDBACK), ("folded", FEEDBACK), ("worn", FEEDBACK | RELOAD), ("decimated", AROUND | AHEAD)],
+    ("name", "unheld"), [("parallel", set()), ("folded", set()), ("worn", RELOAD), ("decimated", AROUND | AHEAD)]
 )
 def test_what_is_held_against_nothing_is_named(name: str, unheld: set[str], core: Callable[[str], Core]) -> None:
     read = core(name).read(core(name).manifest)
-    assert set(read.open) - FEEDBACK == ALWAYS | unheld - FEEDBACK
+    assert set(read.open) == unheld
 
 
 @pytest.mark.parametrize(
@@ -128,18 +126,25 @@ def test_what_is_held_against_nothing_is_named(name: str, unheld: set[str], core
         ("folded", "reload", {"x": 1}, "reload in the manifest must be None, as in the certificate, not .*"),
         ("worn", "reload.registers.0", "x.h", r"reload.registers\[0\] in the manifest must be .*_registers.h, .*"),
         ("folded", "protect", "detect", "protect in the manifest must be none, .*, not detect"),
-        ("folded", "sections.0.name", "section7", "sections in the manifest must have section0"),
-        ("folded", "sections.0.coefficients.0.integer", 7, r"sections.section0.coefficients\[0\].integer .*, not 7"),
-        ("folded", "sections.0.a.1", 0.5, r"sections.section0.a\[1\] in the manifest must be .*, not 0.5"),
-        ("folded", "sections.0.b.0", lambda b: b * (1 + 1e-12), r"sections.section0.b\[0\] .*"),
-        ("folded", "sections.0.output", "Q7.1", "sections.section0.output in the manifest must be .*, not Q7.1"),
-        ("folded", "sections", lambda found: found * 2, "each section of the manifest must have a name of its own"),
-        (
-            "folded",
-            "sections",
-            lambda found: [*found, {"name": "section9"}],
-            "sections in the manifest must not have section9",
-        ),
+        ("folded", "realization", "df1_ef2", "realization in the manifest must be df1_ef1, .*, not df1_ef2"),
+        ("folded", "realization", "normal", "realization in the manifest must be that of the sections .*, not normal"),
+        ("folded", "realization", ["df1"], "realization in the manifest must be that of the sections .*, not .*"),
+        ("folded", "pipeline", "look-ahead", "pipeline in the manifest must be None, .*, not look-ahead"),
+        ("folded", "reasons", {"df1_ef1": "a word"}, "the manifest must not have the field reasons"),
+        ("folded", "sections.0.name", "section7", r"sections\[0\].name in the manifest must be section0, .*"),
+        ("folded", "sections.0.coefficients.0.integer", 7, r"sections\[0\].coefficients\[0\].integer .*, not 7"),
+        ("folded", "sections.0.a.1", 0.5, r"sections\[0\].a\[1\] in the manifest must be .*, not 0.5"),
+        ("folded", "sections.0.b.0", lambda b: b * (1 + 1e-12), r"sections\[0\].b\[0\] .*"),
+        ("folded", "sections.0.output", "Q7.1", r"sections\[0\].output in the manifest must be .*, not Q7.1"),
+        ("folded", "sections.0.error_feedback.0", 1, r"sections\[0\].error_feedback\[0\] .* be 0, .*, not 1"),
+        ("folded", "sections.0.error_feedback", None, r"sections\[0\] in the manifest must have error_feedback"),
+        ("folded", "sections", lambda found: found * 2, "sections in the manifest must have 1 entries, not 2"),
+        ("folded", "limit_cycles.0.section", "section7", r"limit_cycles\[0\].section .* section0, .*, not section7"),
+        ("folded", "limit_cycles.0.largest", lambda value: value * 0.999, r"limit_cycles\[0\].largest .*"),
+        ("folded", "limit_cycles.0.dead_band", 0.0, r"limit_cycles\[0\].dead_band in the manifest must be .*, not 0.0"),
+        ("folded", "limit_cycles.0.none", True, r"limit_cycles\[0\].none in the manifest must be False, .*, not True"),
+        ("folded", "limit_cycles.0.lyapunov", ["1", "1"], r"limit_cycles\[0\].lyapunov\[1\] .* be \d+/\d+, .*, not 1"),
+        ("folded", "limit_cycles", [], "limit_cycles in the manifest must have 1 entries, not 0"),
         ("folded", "formats.2.format", "Q1.1", r"formats\[2\].format in the manifest must be .*, not Q1.1"),
         ("folded", "formats.2.high", 7.5, r"formats\[2\].high in the manifest must be .*, not 7.5"),
         ("folded", "formats.0", None, r"formats in the manifest must have \d+ entries, not \d+"),
@@ -210,16 +215,53 @@ def test_clocks_are_those_of_a_proven_unit(key: str, core: Callable[[str], Core]
         folded.read(folded.changed(key, lambda right: right + 1)).hold_clocks(found)
 
 
-@pytest.mark.parametrize("key", ["digit_bits", "accumulator_bits", "words", "instructions"])
-def test_the_schedule_is_the_program_of_the_hardware(key: str, core: Callable[[str], Core]) -> None:
+@pytest.fixture(scope="module")
+def program(core: Callable[[str], Core]) -> tuple[ProgramText, ProgramVerdict]:
     folded = core("folded")
-    program = read_program(folded.source, "plain")
+    return read_program(folded.source, "plain"), check_program(folded.source, folded.certificate)
+
+
+def test_the_schedule_is_held(core: Callable[[str], Core], program: tuple[ProgramText, ProgramVerdict]) -> None:
+    folded = core("folded")
     read = folded.read(folded.manifest)
-    read.hold_program(program)
-    assert read.open[-2:] == ["schedule.states", "schedule.places"]
-    path = "schedule.instructions.3.2" if key == "instructions" else f"schedule.{key}"
-    with pytest.raises(RejectedError, match=rf"^schedule\.{key}.* in the manifest must be .*$"):
-        folded.read(folded.changed(path, 77)).hold_program(program)
-    read = folded.read(folded.manifest)
-    read.hold_program(None)
-    assert read.open[-1] == "schedule"
+    read.hold_program(*program)
+    assert read.open == []
+    read.hold_program(None, None)
+    assert read.open == ["schedule"]
+
+
+_PLACE = "schedule.places of the manifest must say where"
+_MISSING = "schedule.places of the manifest must have"
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "sentence"),
+    [
+        ("digit_bits", 77, "schedule.digit_bits in the manifest must be 15, .*, not 77"),
+        ("accumulator_bits", 77, "schedule.accumulator_bits in the manifest must be .*, not 77"),
+        ("words", 77, "schedule.words in the manifest must be 16, .*, not 77"),
+        ("states", 77, "schedule.states in the manifest must be 8, .*, not 77"),
+        ("instructions.3.2", 77, r"schedule.instructions\[3\]\[2\] in the manifest must be .*, not 77"),
+        ("more", 77, "schedule in the manifest must not have more"),
+        ("places.0.name", "section0.x", f"{_PLACE} section0.x is"),
+        ("places.0.name", ["x"], "schedule.places in the manifest must be places of words"),
+        ("places.0.addresses.0", 5, f"{_PLACE} .* is"),
+        ("places.0.addresses", [], f"{_PLACE} .* is"),
+        ("places.0.frac", lambda frac: frac + 1, f"{_PLACE} .* is"),
+        ("places.0.state", False, f"{_PLACE} .* is"),
+        ("places.0.more", 1, f"{_PLACE} .* is"),
+        ("places.-1.name", "section0.nothing", f"{_PLACE} section0.nothing is"),
+        ("places.-1.frac", lambda frac: frac + 1, f"{_PLACE} .* is"),
+        ("places.-1.state", True, f"{_PLACE} .* is"),
+        ("places.0", None, f"{_MISSING} .*"),
+        ("places.3", None, f"{_MISSING} the words .*"),
+        ("places", lambda places: [*places, places[0]], "each place in the manifest must have a name of its own"),
+        ("places", 3, "schedule.places in the manifest must be places of words"),
+    ],
+)
+def test_another_schedule_is_refused(
+    path: str, value: Any, sentence: str, core: Callable[[str], Core], program: tuple[ProgramText, ProgramVerdict]
+) -> None:
+    folded = core("folded")
+    with pytest.raises(RejectedError, match=f"^{sentence}$"):
+        folded.read(folded.changed(f"schedule.{path}", value)).hold_program(*program)

@@ -1,0 +1,211 @@
+"""The recursions of a certificate's sections: one for each output that has a past, and what their structure is called.
+
+A realization's name is a claim about the graphs. It is decided here by what the states of the loops hold:
+
+- df1, df1_ef1, df1_ef2: the output before its quantizer, one and two samples ago; with the order of the error feedback;
+- look_ahead_N: the output N and 2 N samples ago, and nothing in between;
+- df2t, delta: the output is the first state and what the input adds; the second state feeds the first, and is itself
+  fed by the second (delta) or not (df2t);
+- state_space, normal: any others, with input weights that are powers of two; normal if states are truncated;
+- lattice_wdf: outputs of allpass functions, which the last section, without a past, adds up.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+
+from flint import fmpq
+
+from sosmith.verify.bounds.l1_response import fraction
+from sosmith.verify.certificate_file import Certificate, Operation, StageEntry
+from sosmith.verify.graph import Source, Transfer, inputs_of
+from sosmith.verify.start import section_alone
+
+_LOOK_AHEAD = re.compile(r"look_ahead_([0-9]{1,3})")
+_FEEDBACK = {"df1": (0, 0), "df1_ef1": (1, 0), "df1_ef2": (2, 1)}
+"""Largest weights of the error feedback."""
+_NAMES = {*_FEEDBACK, "df2t", "delta", "state_space", "normal"}
+
+
+@dataclass(frozen=True)
+class Recursion:
+    """The part of a section that leads to one output.
+
+    Attributes
+    ----------
+    name : str
+        Name of the section, followed by that of the output where there are several.
+    stage : StageEntry
+        The part.
+    """
+
+    name: str
+    stage: StageEntry
+
+    @cached_property
+    def transfer(self) -> Transfer:
+        """Its transfer functions."""
+        return Transfer(self.stage)
+
+    @property
+    def output(self) -> int:
+        """Index of its output."""
+        return self.stage.outputs[0]
+
+    @property
+    def is_single(self) -> bool:
+        """Whether it has one input."""
+        return len(inputs_of(self.stage)) == 1
+
+    @cached_property
+    def total(self) -> int:
+        """Index of the output before its quantizer."""
+        node = self.stage.nodes[self.output]
+        return node.operands[0] if node.op is Operation.FLOOR else self.output
+
+    @cached_property
+    def loop(self) -> list[int]:
+        """Positions of the states that what they hold comes back to."""
+        matrix = self.transfer.matrix
+        size = range(len(matrix))
+        reach = [[bool(matrix[i][j]) for j in size] for i in size]
+        for k in size:
+            for i in size:
+                if reach[i][k]:
+                    reach[i] = [a or b for a, b in zip(reach[i], reach[k], strict=True)]
+        return [k for k in size if reach[k][k]]
+
+    @cached_property
+    def loop_matrix(self) -> list[list[Fraction]]:
+        """Rows and columns of the state matrix that belong to the states in a loop."""
+        return [[fraction(self.transfer.matrix[i][j]) for j in self.loop] for i in self.loop]
+
+    def _holds(self, root: int) -> bool:
+        """Whether all states in a loop hold earlier values of one node."""
+        states = self.transfer.states
+        return bool(self.loop) and all(self.transfer.undelayed(states[k])[0] == root for k in self.loop)
+
+    @cached_property
+    def is_direct(self) -> bool:
+        """Whether it is a direct form I."""
+        return self.is_single and self._holds(self.total)
+
+    @cached_property
+    def error_feedback(self) -> tuple[int, ...] | None:
+        """Weights of the bits that earlier samples dropped; None if it is no direct form, or drops none."""
+        node = self.stage.nodes[self.output]
+        if not self.is_direct or node.op is not Operation.FLOOR:
+            return None
+        source: Source = (Operation.FLOOR, self.transfer.undelayed(self.total)[0], node.frac)
+        first, *weights = [-value for value in self.transfer.numerator(source, self.output).coeffs()]
+        if first != 1 or len(weights) > 2 or any(weight.q != 1 for weight in weights):
+            return None
+        return (*(int(weight.p) for weight in weights), 0, 0)[:2]
+
+
+def recursions_of(certificate: Certificate) -> list[list[Recursion]]:
+    """Return the recursions of each section of a certificate that was accepted."""
+    steady = any(stage.role == "start" for stage in certificate.stages)
+    stages = [stage for stage in certificate.stages if stage.role == "section"]
+    if steady and stages and len(inputs_of(stages[0])) > 1:
+        stages = [section_alone(stage) for stage in stages]
+    return [_recursions(stage) for stage in stages]
+
+
+def _recursions(stage: StageEntry) -> list[Recursion]:
+    if len(inputs_of(stage)) == len(stage.outputs) == 1:
+        return [Recursion(stage.name, stage)]
+    parts = [(stage.nodes[output].name, _leading_to(stage, output)) for output in stage.outputs]
+    return [
+        Recursion(f"{stage.name} {name}", part)
+        for name, part in parts
+        if any(node.op is Operation.DELAY for node in part.nodes)
+    ]
+
+
+def _leading_to(stage: StageEntry, output: int) -> StageEntry:
+    """Return the part of a section that leads to one of its nodes."""
+    reached, pending = {output}, [output]
+    while pending:
+        new = set(stage.nodes[pending.pop()].operands) - reached
+        reached |= new
+        pending += new
+    kept = sorted(reached)
+    place = {index: k for k, index in enumerate(kept)}
+    nodes = [
+        stage.nodes[index].model_copy(update={"operands": tuple(place[i] for i in stage.nodes[index].operands)})
+        for index in kept
+    ]
+    return stage.model_copy(update={"nodes": tuple(nodes), "outputs": (place[output],)})
+
+
+def is_realized_as(name: object, sections: Sequence[Sequence[Recursion]]) -> bool:
+    """Whether the name of a realization is true of all sections.
+
+    Parameters
+    ----------
+    name : object
+        The name; anything but one of those above is true of no section.
+    sections : sequence of sequence of Recursion
+        Recursions of each section, as `recursions_of` returns them.
+    """
+    if not isinstance(name, str):
+        return False
+    if name == "lattice_wdf":
+        *branches, last = sections
+        return bool(branches) and not last and all(_is_allpass(each) for section in branches for each in section)
+    single = [section[0] for section in sections if len(section) == 1]
+    return len(single) == len(sections) > 0 and all(_is(name, each) for each in single)
+
+
+def _is(name: str, part: Recursion) -> bool:
+    nodes = part.stage.nodes
+    found = _LOOK_AHEAD.fullmatch(name)
+    if found is not None:
+        powers = {k for k, value in enumerate(part.transfer.denominator.coeffs()) if value}
+        return not part.is_direct and powers <= {0, int(found[1]), 2 * int(found[1])}
+    if name in _FEEDBACK and part.loop:
+        most, weights = _FEEDBACK[name], part.error_feedback or (0, 0)
+        return part.is_direct and all(abs(weight) <= limit for weight, limit in zip(weights, most, strict=True))
+    if not part.loop and part.is_single:
+        return name in _NAMES
+    if part.is_direct or len(part.loop) > 2 or not part.is_single:
+        return False
+    truncates = any(node.op is Operation.TRUNCATE for node in nodes)
+    if name in {"df2t", "delta"}:
+        return not truncates and _is_transposed(part, delta=name == "delta")
+    return name == ("normal" if truncates else "state_space") and _has_plain_inputs(part)
+
+
+def _is_transposed(part: Recursion, *, delta: bool) -> bool:
+    """Whether the output is the first state and what the input adds, and the second state is a sum or not."""
+    transfer = part.transfer
+    first, *more = transfer.states
+    if transfer.weights(part.output) != {first: fmpq(1)}:
+        return False
+    return all(abs(row[k]) == int(delta) for k, row in enumerate(transfer.matrix[1:], start=1)) and len(more) < 2
+
+
+def _has_plain_inputs(part: Recursion) -> bool:
+    """Whether each state takes the input with a weight that is a power of two."""
+    weights = part.transfer.input_weights()
+    return all(_is_power(abs(fraction(weight))) for weight in weights if weight)
+
+
+def _is_power(value: Fraction) -> bool:
+    numbers = value.numerator, value.denominator
+    return all(number & (number - 1) == 0 for number in numbers)
+
+
+def _is_allpass(part: Recursion) -> bool:
+    """Whether a numerator is its denominator in reverse, but for a sign."""
+    transfer = part.transfer
+    if len(transfer.inputs) != 1:
+        return False
+    numerator = transfer.numerator(transfer.inputs[0], part.output).coeffs()
+    reverse = transfer.denominator.coeffs()[::-1]
+    return numerator in (reverse, [-value for value in reverse])
