@@ -30,6 +30,19 @@ def require(condition: bool, message: str) -> None:
         raise RejectedError(message)
 
 
+_MOST_TERMS, _MOST_FACTORS = 1 << 14, 64
+"""Of a product of polynomials: far more than a calibration or a section has."""
+
+
+def check_product(terms: int, factors: int) -> None:
+    """Reject a product of polynomials that nothing could be proven of in a bearable time.
+
+    `terms` is the product of the numbers of their terms, `factors` the degree of the result.
+    """
+    require(terms <= _MOST_TERMS, f"a product must have at most {_MOST_TERMS} terms, not {terms}")
+    require(factors <= _MOST_FACTORS, f"a product must have at most {_MOST_FACTORS} factors, not {factors}")
+
+
 def label(stage: StageEntry, index: int) -> str:
     """Name of a node, for messages."""
     node = stage.nodes[index]

@@ -13,7 +13,7 @@ from itertools import product
 from operator import add
 
 from sosmith.verify.certificate_file import Certificate, NodeEntry, Operation, PortEntry, StageEntry
-from sosmith.verify.graph import inputs_of, label, require
+from sosmith.verify.graph import check_product, inputs_of, label, require
 
 _Polynomial = dict[tuple[int, ...], Fraction]
 """Coefficients by the powers of the variables."""
@@ -39,6 +39,8 @@ class _Value:
 
     def times(self, other: _Value) -> _Value:
         """Product."""
+        degrees = [max(map(sum, value.exact), default=0) for value in (self, other)]
+        check_product(len(self.exact) * len(other.exact), sum(degrees))
         total: _Polynomial = {}
         for (p, a), (q, b) in product(self.exact.items(), other.exact.items()):
             key = tuple(map(add, p, q))

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from sosmith.verify.c_model.cursor import Cursor
-from sosmith.verify.graph import RejectedError
+from sosmith.verify.graph import RejectedError, check_product
 
 BITS = {"int": 32, "int64_t": 64, "__int128": 128}
 """Bits of the signed types, which rise in rank."""
@@ -57,6 +57,7 @@ def total(*terms: tuple[Form, int]) -> Form:
 
 def product(a: Form, b: Form) -> Form:
     """Return the product of two forms."""
+    check_product(len(a) * len(b), sum(max((len(atoms) for atoms, _ in form), default=0) for form in (a, b)))
     sums: dict[tuple[object, ...], int] = {}
     for left, x in a:
         for right, y in b:

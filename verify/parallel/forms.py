@@ -32,7 +32,8 @@ from math import gcd, lcm
 from types import MappingProxyType
 from typing import NamedTuple
 
-from sosmith.verify.program.normal_form import ONE, Form, Monomial, constant, plus
+from sosmith.verify.graph import check_product
+from sosmith.verify.program.normal_form import ONE, Form, Monomial, constant, degree, plus
 
 Limits = tuple[int | Fraction, int | Fraction]
 """Smallest and largest value."""
@@ -167,6 +168,7 @@ class Forms:
 
     def times(self, a: Form, b: Form) -> Form:
         """Return the product; of an atom that is 0 or 1, or 0 or -1, there are no powers."""
+        check_product(len(a) * len(b), degree(a) + degree(b))
         total: dict[Monomial, int | Fraction] = {}
         for p, x in a.items():
             for q, y in b.items():

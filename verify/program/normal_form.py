@@ -28,6 +28,8 @@ from collections.abc import Hashable, Mapping
 from fractions import Fraction
 from math import lcm
 
+from sosmith.verify.graph import check_product
+
 Monomial = tuple[int, ...]
 """Numbers of its atoms, in rising order."""
 
@@ -51,8 +53,14 @@ def plus(a: Form, b: Form, factor: int | Fraction = 1) -> Form:
     return {monomial: coefficient for monomial, coefficient in total.items() if coefficient}
 
 
+def degree(form: Form) -> int:
+    """Return the largest number of factors of a monomial."""
+    return max(map(len, form), default=0)
+
+
 def times(a: Form, b: Form) -> Form:
     """Return the product."""
+    check_product(len(a) * len(b), degree(a) + degree(b))
     total: dict[Monomial, int | Fraction] = {}
     for p, x in a.items():
         for q, y in b.items():

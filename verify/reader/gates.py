@@ -9,6 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
 
+from sosmith.verify.graph import require
+
+_WIDEST = 512
+"""Bits of a factor that is taken apart into gates."""
+
 Word = list[int]
 """The literals of a word, the lowest bit first."""
 
@@ -115,6 +120,7 @@ class Gates:
 
     def product_of(self, a: Word, b: Word) -> Word:
         """Return as many bits of a product as the factors have."""
+        require(len(a) <= _WIDEST, f"a product must have at most {_WIDEST} bits to be compared, not {len(a)}")
         first, second = sorted((a, b))
         total: Word = [LOW] * len(a)
         for place, bit in enumerate(second):

@@ -39,8 +39,10 @@ from sosmith.verify.reader.tokens import UNCHECKED, Tokens
 
 _NUMBER = re.compile(r"(\d+)'(?:h([0-9a-f]+)|d(\d+)|b([01]+))")
 _UNKNOWN = re.compile(r"(\d+)'[hb]x+")
-_MAX_WORDS = 1 << 24
-_MAX_WIDTH = 1 << 16
+MAX_WORDS = 1 << 20
+"""Words of all memories of a text: 4,096 channels with 256 each."""
+
+_MAX_WIDTH = 1 << 13
 _DEEPEST = 400
 """Blanks before a statement, at most: two for each ``if`` around it."""
 _BINARY = ("+", "-", "*", "&", "|", "^", "==", "!=", "<", ">", "<=", ">=")
@@ -182,7 +184,7 @@ class Reader:
                 if UNCHECKED in marks:
                     module.unchecked.add(name)
                 module.depths[name] = tokens.integer() + 1
-                require(module.depths[name] <= _MAX_WORDS, f"{name} must have at most {_MAX_WORDS} words")
+                require(module.depths[name] <= MAX_WORDS, f"{name} must have at most {MAX_WORDS} words")
                 tokens.expect(":", "0", "]")
             else:
                 module.registers[name] = self._number().value if tokens.take("=") else None
@@ -203,7 +205,7 @@ class Reader:
         tokens.expect("[", "i", "]", "=")
         value = self._number().value
         tokens.expect(";")
-        require(end - first <= _MAX_WORDS, f"a loop must be over at most {_MAX_WORDS} words, not {end - first}")
+        require(end - first <= MAX_WORDS, f"a loop must be over at most {MAX_WORDS} words, not {end - first}")
         self._hold(name, range(first, end), value)
 
     def _word(self) -> None:

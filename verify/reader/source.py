@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 from sosmith.verify.graph import RejectedError, require
-from sosmith.verify.reader.grammar import Reader
+from sosmith.verify.reader.grammar import MAX_WORDS, Reader
 from sosmith.verify.reader.syntax import (
     Bits,
     Choice,
@@ -26,6 +26,7 @@ from sosmith.verify.reader.widths import width_of
 
 _MAX_CHARACTERS = 1 << 28
 _MAX_MODULES = 400
+_MAX_INSTANCES = 1 << 12
 
 
 class Source(NamedTuple):
@@ -75,6 +76,7 @@ def read_source(text: str, top: str | None = None, *, unknowns: bool = True) -> 
         require(not others, f"one module must be in no other, not {', '.join((top, *others))}")
     require(top in modules, f"the SystemVerilog must have a module {top}, not {', '.join(modules)}")
     _check_tree(modules, top)
+    _check_size(modules, top)
     for name, module in modules.items():
         _check_nets(name, module, modules)
     _check_clocks(modules, top)
@@ -91,6 +93,27 @@ def read_modules(text: str, top: str | None = None) -> dict[str, Module]:
         As `read_source`.
     """
     return read_source(text, top, unknowns=False).modules
+
+
+def _check_size(modules: Mapping[str, Module], top: str) -> None:
+    """Check that all instances and memories together are not too many to be taken apart."""
+    instances: dict[str, int] = {}
+    words: dict[str, int] = {}
+
+    def count(name: str) -> None:
+        inside = [module for module, _, _ in modules[name].instances]
+        for module in inside:
+            if module not in instances:
+                count(module)
+        instances[name] = 1 + sum(instances[module] for module in inside)
+        words[name] = sum(modules[name].depths.values()) + sum(words[module] for module in inside)
+
+    count(top)
+    for found, most, what in (
+        (instances[top], _MAX_INSTANCES, "instances"),
+        (words[top], MAX_WORDS, "words of memories"),
+    ):
+        require(found <= most, f"{top} must have at most {most} {what}, not {found}")
 
 
 def _check_tree(modules: Mapping[str, Module], top: str) -> None:

@@ -274,6 +274,30 @@ def test_neither_depth_nor_size_ends_in_a_traceback() -> None:
     refused(TEXT.replace("module top(", "module m2000(") + chain, name="m0")
 
 
+def doubling(count: int, inside: str = "") -> str:
+    """Modules of which each has the next one twice."""
+    module = "module m{k}(i);\n  input i;\n  wire i;\n{inside}endmodule\n"
+    twice = "".join(f"  m{{next}} {name} (\n    .i(i)\n  );\n" for name in "ab")
+    made = [module.format(k=k, inside=twice.format(next=k + 1)) for k in range(count)]
+    return "".join([*made, module.format(k=count, inside=inside)])
+
+
+@pytest.mark.parametrize(
+    ("count", "inside", "sentence"),
+    [
+        (60, "", "^m0 must have at most 4096 instances, not 2305843009213693951$"),
+        (12, "", "^m0 must have at most 4096 instances, not 8191$"),
+        (9, "  reg table1 [4095:0];\n", "^m0 must have at most 1048576 words of memories, not 2097152$"),
+        (0, "  reg table1 [1048576:0];\n", "^table1 must have at most 1048576 words$"),
+        (0, "  wire [8192:0] n1;\n", "^n1 must have at most 8192 bits, not 8193$"),
+        (0, "  wire n1;\n  assign n1 = 8193'h0;\n", "^a number must have at most 8192 bits, not 8193$"),
+        (400, "", "^the SystemVerilog must have at most 400 modules$"),
+    ],
+)
+def test_a_short_text_is_no_large_core(count: int, inside: str, sentence: str) -> None:
+    refused(doubling(count, inside), sentence, name="m0")
+
+
 @pytest.mark.parametrize("make", [lambda: parallel().text, lambda: folded(PLAIN).text], ids=["parallel", "folded"])
 def test_any_name_that_is_written_otherwise_is_refused(make: object) -> None:
     """Wherever a name or number is changed by a sign, the text is another one, or none."""

@@ -2,10 +2,18 @@
 
 import signal
 import time
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Any
 
 import pytest
 
+from sosmith.verify.c_model import expressions
 from sosmith.verify.graph import RejectedError
+from sosmith.verify.parallel.forms import Forms
+from sosmith.verify.polynomial import _Value
+from sosmith.verify.program import normal_form
+from sosmith.verify.reader.gates import Gates
 from sosmith.verify.verdict.limits import limited
 
 
@@ -44,3 +52,45 @@ def test_what_cannot_be_computed_is_a_sentence(work: object, sentence: str) -> N
 def test_faults_of_the_verifier_itself_are_not_hidden() -> None:
     with pytest.raises(ValueError, match=r"^a fault$"), limited(1):
         raise ValueError("a fault")
+
+
+Squarer = tuple[Any, Callable[[Any], Any]]
+
+
+def hardware() -> Squarer:
+    forms = Forms()
+    return forms.variable("x", -8, 7), lambda x: forms.times(x, x)
+
+
+def graph() -> Squarer:
+    return _Value({(1, 0): Fraction(1)}, Fraction(0)), lambda x: x.times(x)
+
+
+SQUARERS: dict[str, Callable[[], Squarer]] = {
+    "hardware": hardware,
+    "graph": graph,
+    "program": lambda: ({(0,): 1}, lambda x: normal_form.times(x, x)),
+    "C model": lambda: (expressions.variable("x"), lambda x: expressions.product(x, x)),
+}
+
+
+@pytest.mark.parametrize("kind", SQUARERS)
+def test_squares_of_squares_end(kind: str) -> None:
+    """Forty in a row are short to write, and had no end."""
+    value, squared = SQUARERS[kind]()
+    for _ in range(6):
+        value = squared(value)
+    with pytest.raises(RejectedError, match=r"^a product must have at most 64 factors, not 128$"):
+        squared(value)
+
+
+def test_products_of_long_sums_end() -> None:
+    long: normal_form.Form = {(atom,): 1 for atom in range(200)}
+    with pytest.raises(RejectedError, match=r"^a product must have at most 16384 terms, not 40000$"):
+        normal_form.times(long, long)
+
+
+def test_a_multiplier_of_gates_is_no_larger_than_any_core_has() -> None:
+    gates = Gates()
+    with pytest.raises(RejectedError, match=r"^a product must have at most 512 bits to be compared, not 513$"):
+        gates.product_of([0] * 513, [0] * 513)
