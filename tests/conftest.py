@@ -52,6 +52,12 @@ SIGNALS = {
 """How each test finds the signals, and every process that it starts, whoever ignores some: nohup, a script's job."""
 
 
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave the figures of reports empty, which take longer than all else; for tests that look at something else."""
+    monkeypatch.setattr("sosmith.gen.report.plots._painted", lambda *_: "<svg>\n</svg>\n")
+
+
 @pytest.fixture(autouse=True)
 def _signals() -> Iterator[None]:
     """Put the signals right before a test, and what commands in this process make of them afterwards."""

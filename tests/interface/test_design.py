@@ -219,6 +219,7 @@ def test_files_and_certificate(tmp_path: Path) -> None:
     assert saved.text() == design.certificate.text()
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_co_simulation(tmp_path: Path) -> None:
     design = instrument_design()
     voltage = NOISE.uniform(0, 10, (60, 2))

@@ -10,6 +10,8 @@ from tests.interface.small import FILTER
 
 import sosmith
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 RATE, BITS = FILTER["sample_rate"], FILTER["input"]["x"]["bits"]
 TONE = np.sin(2 * np.pi * 20.0 * np.arange(400) / RATE)
 
