@@ -32,9 +32,15 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
                 case.add_marker(pytest.mark.slow)
 
 
+def pytest_collection() -> None:
+    """Collect no garbage while some ten thousand tests are made."""
+    gc.disable()
+
+
 def pytest_collection_finish() -> None:
     """Keep the collector of garbage from looking at all tests again and again: they are not let go before the end."""
     gc.freeze()
+    gc.enable()
 
 
 def _unmoved(number: int, frame: object) -> None:
@@ -50,12 +56,6 @@ SIGNALS = {
     signal.SIGHUP: _unmoved if IGNORED else signal.SIG_DFL,
 }
 """How each test finds the signals, and every process that it starts, whoever ignores some: nohup, a script's job."""
-
-
-@pytest.fixture
-def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Leave the figures of reports empty, which take longer than all else; for tests that look at something else."""
-    monkeypatch.setattr("sosmith.gen.report.plots._painted", lambda *_: "<svg>\n</svg>\n")
 
 
 @pytest.fixture(autouse=True)
