@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.gen.report.pictures import without_pictures
+from tests.gen.report.pictures import unpainted
 from tests.interface.small import FILTER
 
 import sosmith
@@ -17,8 +17,8 @@ TONE = np.sin(2 * np.pi * 20.0 * np.arange(400) / RATE)
 
 
 @pytest.fixture(autouse=True)
-def _without_pictures() -> Iterator[None]:
-    with without_pictures:
+def _unpainted() -> Iterator[None]:
+    with unpainted:
         yield
 
 
