@@ -8,7 +8,7 @@
 // A line of SAMPLES is "tdest tdata" in hexadecimal. A line of the outcome is the number of beats, whether a word with
 // a wrong bit was read, and the first beat that differs from the run without a flip, the first one with the flag
 // `fault`, and the first one that differs without it, each -1 if there is none; with `full`, all beats follow.
-#include "Vcore.h"
+#include "Vtop.h"
 #include "verilated.h"
 #include "verilated_sym_props.h"
 #include "verilated_syms.h"
@@ -88,7 +88,7 @@ uint32_t next(uint32_t& state) {  // xorshift, Marsaglia 2003
 
 Run run(const std::vector<Beat>& samples, const Flip& flip, long most) {
     VerilatedContext context;
-    Vcore core{&context, "TOP"};
+    Vtop core{&context, "TOP"};
     auto clock = [&] {
         core.aclk = 1;
         core.eval();
@@ -157,7 +157,7 @@ int main(int argc, char** argv) {
     const std::string command = argc > 1 ? argv[1] : "";
     if (command == "places") {
         VerilatedContext context;
-        Vcore core{&context, "TOP"};
+        Vtop core{&context, "TOP"};
         core.eval();
         for (const Place& place : places_of(context))
             if (!place.syndrome) std::printf("%llu %d %s\n", (unsigned long long)place.depth, place.width, place.name.c_str());

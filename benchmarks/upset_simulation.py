@@ -27,6 +27,7 @@ from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.model.errors import ToolError
 from sosmith.sim.beats import Beats
 from sosmith.sim.simulators import find_simulator
+from sosmith.sim.verilated_model import Builder
 
 _MAIN = Path(__file__).parent / "upset_simulation.cpp"
 _MODULE = re.compile(r"^module (\S+?)\s*\((.*?)^endmodule", re.MULTILINE | re.DOTALL)
@@ -238,17 +239,16 @@ def build(architecture: Architecture, sent: Beats, folder: Path) -> Target:
     name = architecture.datapath.name
     text = to_verilog(to_rtlil(architecture.component(), name))
     (folder / "core.sv").write_text(text, encoding="utf-8")
-    (folder / "public.vlt").write_text(_public(text), encoding="utf-8")
     rows = zip(sent.tdest.tolist(), sent.tdata.tolist(), strict=True)
     (folder / "samples.txt").write_text("".join(f"{dest:x} {data:x}\n" for dest, data in rows), encoding="utf-8")
-    dest = ["-CFLAGS", "-DDEST"] if architecture.channels > 1 else []
-    command = ["verilator", "--cc", "--exe", "--build", "--vpi", "-Wno-fatal", "-O3", "-CFLAGS", "-O2", *dest]
-    command += ["--prefix", "Vcore", "--top-module", name, "--Mdir", "build", "-o", "core"]
-    command += ["public.vlt", "core.sv", str(_MAIN.resolve())]
-    done = subprocess.run(command, cwd=folder, env=tool.environment, capture_output=True, text=True, check=False)
-    if done.returncode:
-        raise ToolError(f"Verilator must build the core, not fail: {(done.stdout + done.stderr)[-2000:]}")
-    program = (folder / "build" / "core").resolve()
+    program, source, main = folder.resolve() / "core", (folder / "core.sv").resolve(), _MAIN.resolve()
+    with (folder / "build.log").open("w", encoding="utf-8") as log:
+        try:
+            Builder(tool.version, tool.environment, folder.resolve() / "build", log).build_program(
+                source, name, main, main, program, control=_public(text), define="DEST" * (architecture.channels > 1)
+            )
+        except subprocess.CalledProcessError as error:
+            raise ToolError(f"{Path(error.cmd[0]).name} must build the core, not fail: see {log.name}") from None
     listed = _output([str(program), "places"]).splitlines()
     lines = [line.split(" ", 2) for line in listed]
     numbers = {found: number for number, (_, _, found) in enumerate(lines)}

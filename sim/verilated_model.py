@@ -133,10 +133,13 @@ class Builder:
         with self._cache.entry("model", key, lambda entry: self._make(model, control, flags, entry / "model")) as entry:
             shutil.copy(entry / "model", target)
 
-    def build_program(self, source: Path, top: str, main: Path, header: Path, target: Path) -> None:
+    def build_program(
+        self, source: Path, top: str, main: Path, header: Path, target: Path, *, control: str = "", define: str = ""
+    ) -> None:
         """Write an executable to `target` whose main program, in C++, runs the module `top` of `source` as ``Vtop``.
 
-        The main program includes `header`.
+        The main program includes `header`. `control` is the text of a control file of Verilator that makes signals
+        accessible by VPI, and `define` a macro of the main program, if they are not empty.
 
         Raises
         ------
@@ -144,14 +147,17 @@ class Builder:
             If a tool fails; it has said why.
         """
         texts = [path.read_text(encoding="utf-8") for path in (source, main, header)]
-        key = key_of(self._tools, _flags(waves=False), _ARGUMENTS, top, texts)
+        flags = [*_flags(waves=False), *([f"-D{define}"] if define else [])]
+        key = key_of(self._tools, flags, _ARGUMENTS, top, texts, control)
 
         def make(entry: Path) -> None:
             objects = self._emptied()
+            (objects / "control.vlt").write_text(control or "`verilator_config\n", encoding="utf-8")
             command = ["verilator", "-cc", "-Mdir", str(objects), "--prefix", "Vtop", "--top-module", top]
-            self._compilers.run([*command, *_ARGUMENTS, str(source)], objects)
+            command += [*_ARGUMENTS, *(["--vpi"] if control else []), "control.vlt", str(source)]
+            self._compilers.run(command, objects)
             sources = _together([*sorted(objects.glob("Vtop*.cpp")), main], objects)
-            compiled = self._compile(sources, [*_flags(waves=False), f"-I{objects}", f"-I{header.parent}"], objects)
+            compiled = self._compile(sources, [*flags, f"-I{objects}", f"-I{header.parent}"], objects)
             names = _library(waves=False)
             library_key = self._library_key(names, _flags(waves=False))
             with self._cache.entry(

@@ -32,9 +32,15 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
                 case.add_marker(pytest.mark.slow)
 
 
+def pytest_collection() -> None:
+    """Collect no garbage while some ten thousand tests are made."""
+    gc.disable()
+
+
 def pytest_collection_finish() -> None:
     """Keep the collector of garbage from looking at all tests again and again: they are not let go before the end."""
     gc.freeze()
+    gc.enable()
 
 
 def _unmoved(number: int, frame: object) -> None:

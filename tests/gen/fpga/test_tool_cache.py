@@ -1,16 +1,15 @@
 """The programs that compile themselves run where the user's cache folder cannot be written, too."""
 
-import subprocess
+import os
 import sys
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import pytest
+import wasmtime
 
 from sosmith.gen.fpga.tool_cache import tool_cache
 from sosmith.gen.fpga.tools import Tool
-from sosmith.gen.output.verilog import converted
+from sosmith.gen.output import amaranth_yosys
 
 
 def test_the_users_cache_is_used_where_it_can_be_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -40,16 +39,19 @@ def test_else_a_folder_of_this_process(name: str, tmp_path: Path, monkeypatch: p
     monkeypatch.setenv(name, str(tmp_path / "file"))
     made = Path(tool_cache()["XDG_CACHE_HOME"])
     assert made.is_dir()
-    environments: list[dict[str, str]] = []
+    found: list[tuple[str, str]] = []
 
-    def runs(command: Any, **options: Any) -> SimpleNamespace:
-        environments.append(options["env"])
-        return SimpleNamespace(returncode=0, stdout="", stderr="")
+    class Config:
+        def __setattr__(self, key: str, value: object) -> None:
+            found.append((key, os.environ["XDG_CACHE_HOME"]))
+            raise KeyError(key)
 
-    with monkeypatch.context() as patched:
-        patched.setattr(subprocess, "run", runs)
-        converted(f"another text for {name}")  # what has been converted is not converted again
-    assert environments[0]["XDG_CACHE_HOME"] == str(made)
+    before = dict(os.environ)
+    monkeypatch.setattr(wasmtime, "Config", Config)
+    with pytest.raises(KeyError):
+        amaranth_yosys._program.__wrapped__()
+    assert found == [("cache", str(made))]
+    assert dict(os.environ) == before
     log, show = tmp_path / "log.txt", "import os; print(os.environ['XDG_CACHE_HOME'])"
     assert Tool("python", Path(sys.executable), "3").run(["-c", show], tmp_path, log) == 0
     assert log.read_text(encoding="utf-8").splitlines()[-1] == str(made)

@@ -1,14 +1,14 @@
-"""Reports whose pictures are empty, for tests of what else is on the page: drawing takes most of a report's time."""
+"""Reports whose pictures are empty, for tests of something else: drawing takes most of a report's time.
 
-from typing import Any, TextIO
+Each decorates a test, or opens a block.
+"""
+
 from unittest.mock import patch
 
-from matplotlib.figure import Figure
+_EMPTY = "<svg>\n</svg>\n"
 
+without_pictures = patch("sosmith.gen.report.plots.svg_text", lambda _figure: _EMPTY)
+"""Pictures are painted, but not laid out and written."""
 
-def _empty(_figure: Figure, stream: TextIO, **_options: Any) -> None:
-    stream.write("<svg>\n</svg>\n")
-
-
-without_pictures = patch.object(Figure, "savefig", _empty)
-"""Decorates a test, or opens a block."""
+unpainted = patch("sosmith.gen.report.plots._painted", lambda *_: _EMPTY)
+"""Nor are they painted: for tests that do not look at a page."""

@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.gen.report.pictures import unpainted
 from tests.interface.small import FILTER
 
 import sosmith
 
 RATE, BITS = FILTER["sample_rate"], FILTER["input"]["x"]["bits"]
 TONE = np.sin(2 * np.pi * 20.0 * np.arange(400) / RATE)
+
+
+@pytest.fixture(autouse=True)
+def _unpainted() -> Iterator[None]:
+    with unpainted:
+        yield
 
 
 @pytest.fixture(scope="module", name="design")

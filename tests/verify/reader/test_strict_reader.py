@@ -304,7 +304,7 @@ def test_any_name_that_is_written_otherwise_is_refused(make: object) -> None:
     assert callable(make)
     text = make()
     right = read_source(text, "plain").text
-    for place in list(re.finditer(r"[\w']+", text))[::37]:
+    for place in list(re.finditer(r"[\w']+", text))[::97]:
         for sign in ("$", ".", "#", "\\", '"', "`", "/", "//", "/*", "(*", "@", "'"):
             wrong = text[: place.start()] + sign + text[place.start() :]
             try:
