@@ -142,3 +142,6 @@ def test_the_phase_of_a_low_pass_falls_by_a_right_angle_for_each_pole() -> None:
         assert f">{degrees}</text>" in drawn
     frequency = np.array([1.0, 1000.0, 20000.0])
     assert phase(facts.ideal_sos, frequency, 48000.0) == pytest.approx([0, -90, -175], abs=4)
+    two_samples = np.array([[0.0, 0.0, 1.0, 1.0, 0.0, 0.0]])
+    frequency = np.linspace(0, 24000, 100)
+    assert phase(two_samples, frequency, 48000.0) == pytest.approx(-720 * frequency / 48000)
