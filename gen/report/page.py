@@ -217,7 +217,8 @@ def _error_figure(evidence: Evidence) -> Figure:
     )
 
 
-def _histogram_figure(evidence: Evidence) -> Figure:
+def histogram_caption(evidence: Evidence) -> str:
+    """Say how many errors the rounding of the output alone could explain."""
     inside = float(np.mean(np.abs(evidence.run.error) <= evidence.facts.lsb / 2))
     if inside == 1:
         found = "All samples lie between the dotted lines at ±½\u00a0LSB, where rounding the output alone leaves them."
@@ -227,10 +228,14 @@ def _histogram_figure(evidence: Evidence) -> Figure:
             f"{share} % of the samples lie between the dotted lines at ±½\u00a0LSB, as far as rounding the output "
             "alone reaches; to the others, errors from before the output have added."
         )
+    return f"One LSB is {_amount(evidence.facts.lsb, evidence.facts.unit)}. {found}"
+
+
+def _histogram_figure(evidence: Evidence) -> Figure:
     return Figure(
         title="How often each error occurs",
         drawing=plots.histogram_figure(evidence),
-        caption=f"One LSB is {_amount(evidence.facts.lsb, evidence.facts.unit)}. {found}",
+        caption=histogram_caption(evidence),
     )
 
 

@@ -110,6 +110,11 @@ class ChosenTraces:
         return tuple(trace.first(count) for trace in traces_for(design, source, seed=seed))
 
     @property
+    def name(self) -> str | None:
+        """Name of the scenario or of the file, wherever it lies; None for the default scenario."""
+        return self.source if self.source is None or not self._is_file else Path(self.source).name
+
+    @property
     def _is_file(self) -> bool:
         return self.source is not None and self.source not in SCENARIOS
 

@@ -32,6 +32,11 @@ class Traces(Protocol):
         """Return the lowest number of samples, before there is a design."""
         ...
 
+    @property
+    def name(self) -> str | None:
+        """Name of the source; None for the default one."""
+        ...
+
     def told(self) -> list[str]:
         """Return what tells them from those of another source; nothing for the default one."""
         ...

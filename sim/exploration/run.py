@@ -58,6 +58,8 @@ class Outcome:
         Number of designs that were searched for; None for a grid.
     samples : int
         Length of the trace for each channel.
+    trace : str or None
+        Name of the scenario or of the file; None for the default one.
     board : str or None
         Board of the synthesis.
     points : tuple of dict
@@ -71,6 +73,7 @@ class Outcome:
     parameters: dict[str, Any]
     search: int | None
     samples: int
+    trace: str | None
     board: str | None
     points: tuple[Point, ...]
     tasks: tuple[Task, ...]
@@ -87,6 +90,7 @@ class Outcome:
             "parameters": self.parameters,
             "search": self.search,
             "samples": self.samples,
+            "trace": self.trace,
             "board": self.board,
             "front": self.front,
             "points": list(self.points),
@@ -186,6 +190,7 @@ def explore(
         parameters=in_json(parameters),
         search=search,
         samples=samples,
+        trace=traces.name,
         board=board,
         points=points,
         tasks=tuple(tasks),

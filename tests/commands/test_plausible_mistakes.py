@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.io
+import scipy.io.wavfile
 import scipy.signal
 from click.testing import CliRunner
 
@@ -132,6 +133,18 @@ COMMANDS = [
     (["design", "good.toml", "--board", "icebraker"], "the board must be one of .* .did you mean icebreaker.."),
     (["design", "good.toml", "--realization", "df2"], "Invalid value for '--realization': .* .did you mean df2t.*"),
     (["simulate", "good.toml", "--trace", "sweeep"], "scenario .* must be one of .*, not 'sweeep'.*"),
+    (
+        ["simulate", "good.toml", "--trace", "cd.wav"],
+        "cd.wav: the sample rate must be the 48000 Hz of the specification, not 44100 Hz; state sample_rate = 44100 .*",
+    ),
+    (
+        ["simulate", "good.toml", "--trace", "stereo.wav"],
+        "stereo.wav: the channels must be the 1 of the design, or one that drives all, not 2; state channels = 2 .*",
+    ),
+    (["simulate", "good.toml", "--trace", "song.mp3"], "song.mp3: sound must be a WAV file, not .mp3; convert it, .*"),
+    (["simulate", "good.toml", "--trace", "missing.wav"], "missing.wav: the WAV file must be a readable file, not: .*"),
+    (["simulate", "good.toml", "--vectors", "out.mp3"], "out.mp3: a file of vectors must end in .*, .wav, not '.mp3'"),
+    (["emulate", "good.toml", "tome"], "the scenario must be one of .* .did you mean tone.*"),
     (["import", "good.toml"], "Missing option '--sample-rate'."),
     (["import", "tone.wav", "--sample-rate", "48000"], "tone.wav: the filter must be .*, not a recording .*"),
     (["import", "fir.txt", "--sample-rate", "48000"], "fir.txt: the filter must be .*, as of an FIR filter"),
@@ -172,6 +185,8 @@ def test_a_mistake_in_a_specification(old: str, new: str, expected: str) -> None
 @pytest.mark.parametrize(("arguments", "expected"), COMMANDS)
 def test_a_mistake_on_the_command_line(arguments: list[str], expected: str) -> None:
     Path("tone.wav").write_bytes(b"RIFF\x24\x00\x00\x00WAVEfmt ")
+    scipy.io.wavfile.write("cd.wav", 44100, np.zeros(10, np.int16))
+    scipy.io.wavfile.write("stereo.wav", 48000, np.zeros((10, 2), np.int16))
     Path("x.xlsx").write_bytes(b"PK")
     Path("fir.txt").write_text("0.1\n0.2\n0.4\n0.2\n0.1\n", encoding="utf-8")
     Path("rew.txt").write_text("Filter Settings file\n\nRoom EQ V5.20\nFilter  1: ON  PK  Fc 63 Hz\n", encoding="utf-8")

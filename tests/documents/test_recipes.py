@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.io import wavfile
 from tests.documents.shown import ROOT, carry_out, furnish, with_output
 
 import sosmith
@@ -43,6 +44,11 @@ def test_a_recipe_prints_and_draws_what_its_page_shows(
     carry_out(page(name), tmp_path)
     assert page(name) == with_output(page(name), tmp_path)
     assert (tmp_path / f"{name}.svg").read_bytes() == drawn(name).read_bytes()
+    if name == "telephone":
+        made = sosmith.design("telephone.toml")
+        rate, heard = wavfile.read("heard.wav")
+        assert (rate, heard.dtype) == (48000, np.int16)
+        assert np.array_equal(heard, made.run_codes(x=made.trace("noise.wav").coded[0].codes[:, 0]))
 
 
 @pytest.mark.parametrize("name", PAGES)

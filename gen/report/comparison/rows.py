@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sosmith.gen.quantity import decibels, number, plain_number, quantity
+from sosmith.gen.quantity import decibels, full_scale_level, number, plain_number, quantity
 from sosmith.gen.report.comparison.differences import UNKNOWN
 from sosmith.gen.report.comparison.fairness import fairness, source_name
 from sosmith.gen.report.comparison.report_file import Report, fact
@@ -72,6 +72,10 @@ def _level(value: float, _unit: str) -> str:
     return decibels(value)
 
 
+def _full_scale_level(value: float, _unit: str) -> str:
+    return full_scale_level(value)
+
+
 FIGURES = (
     Figure("run", "name", "name", _text),
     Figure("run", "realization", "realization", _text),
@@ -85,6 +89,9 @@ FIGURES = (
     Figure("accuracy", "error.max_abs", "largest error", quantity, min),
     Figure("accuracy", "error.max_lsb", "largest error in LSB", lambda value, _: f"{plain_number(value)} LSB"),
     Figure("accuracy", "error.rms", "typical error (RMS)", quantity, min),
+    Figure("accuracy", "sound.error_peak_dbfs", "largest error in dBFS", _full_scale_level),
+    Figure("accuracy", "sound.error_rms_dbfs", "typical error in dBFS (RMS)", _full_scale_level),
+    Figure("accuracy", "sound.tone.thd_n_db", "distortion and noise (THD+N)", _level, min),
     Figure("accuracy", "sqnr_db", "signal to error", _level, max),
     Figure("accuracy", "accuracy_percent.hardware", "accuracy, hardware", _percent, max),
     Figure("accuracy", "accuracy_percent.golden", "accuracy, exact calculation", _percent),

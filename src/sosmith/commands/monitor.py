@@ -27,7 +27,7 @@ REFRESHES = 8
 @click.option(
     "--trace",
     type=click.Path(path_type=Path),
-    metavar="TRACE.csv",
+    metavar="TRACE.csv|wav",
     help="Samples to feed, as for `sosmith stream`; for a board without converters.",
 )
 @click.option(

@@ -53,7 +53,7 @@ class Exploration(View):
         return self.outcome.front
 
     def as_dict(self) -> dict[str, Any]:
-        """Return `name`, `parameters`, `search`, `samples`, `board`, `front` and `points`, in JSON types."""
+        """Return `name`, `parameters`, `search`, `samples`, `trace`, `board`, `front` and `points`, in JSON types."""
         return self.outcome.as_dict()
 
     def page(self) -> str:

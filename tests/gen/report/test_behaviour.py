@@ -21,6 +21,7 @@ from sosmith.gen.output.core_facts import SettlingFacts
 from sosmith.gen.report.behaviour import behaviour
 from sosmith.gen.report.evidence import Evidence
 from sosmith.gen.report.headlines import report_table
+from sosmith.gen.report.page import histogram_caption
 from sosmith.gen.report.report import summarise
 
 FIRST_ORDER = np.array([[0.1, 0.0, 0.0, 1.0, -0.9, 0.0]])
@@ -161,6 +162,19 @@ def test_figures_of_the_speed_agree() -> None:
     assert "6.00 kHz clock 9,007 clock cycles with verilator in 1.50 s" in told
     assert told.endswith("took 1 min 45 s")
     assert "not measured" in tiles_of(evidence(cycles_per_second=math.inf))
+
+
+def test_the_histogram_says_how_many_errors_rounding_the_output_explains() -> None:
+    told = "One LSB is 244 nm. All samples lie between the dotted lines at ±½ LSB, where rounding the output alone"
+    run = evidence()
+    assert histogram_caption(run).replace("\u00a0", " ").startswith(told)
+    moved = run.run.hardware.copy()
+    moved[::10] += LSB
+    some = histogram_caption(changed(run, hardware=moved))
+    assert " 90 % of the samples lie between the dotted lines" in some
+    moved = run.run.hardware.copy()
+    moved[0] += LSB
+    assert " More than 99 % of the samples" in histogram_caption(changed(run, hardware=moved))
 
 
 def test_errors_have_one_unit(words: str) -> None:

@@ -162,14 +162,12 @@ def test_differences_are_rows_and_designs_columns() -> None:
 
 
 def test_the_axis_of_frequency_reaches_to_the_fastest() -> None:
-    """At its own rate and at ten times that: the slower one ends where its Nyquist frequency is."""
+    """Of filters at 100 Hz and at 1 kHz: the first ends at 50 Hz, the axis does not."""
     slow, fast = report(), report()
-    fast["curves"]["filter"] = slow["curves"]["filter"] | {"sample_rate": 10 * slow["curves"]["filter"]["sample_rate"]}
-    figures = [response_figure(pair, ("a", "b")) for pair in ((slow, slow), (slow, fast), (fast, fast))]
-    labels = [re.findall(r">([\d.]+ k?Hz)</text>", figure.drawing) for figure in figures if figure is not None]
-    assert len(labels) == 3
-    assert labels[1][-1] == labels[2][-1] != labels[0][-1]
-    assert labels[1][0] == labels[0][0]
+    fast["curves"]["filter"] = slow["curves"]["filter"] | {"sample_rate": 1000.0}
+    figure = response_figure((slow, fast), ("a", "b"))
+    assert figure is not None
+    assert ">100 Hz</text>" in figure.drawing
 
 
 NAMES = ("a", "b", "c")

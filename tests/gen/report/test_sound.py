@@ -12,6 +12,7 @@ import pytest
 from tests.gen.report.evidences import words_of
 
 import sosmith
+from sosmith.gen.report.comparison.rows import compare
 from sosmith.gen.report.evidence import Evidence
 from sosmith.gen.report.plots import lowest_gain_db, phase, phase_figure
 from sosmith.gen.report.report import summarise
@@ -46,6 +47,11 @@ def played(source: str) -> Evidence:
     )  # fmt: skip
 
 
+def facts_of(evidence: Evidence) -> dict[str, str]:
+    told = [fact for group in summarise(evidence)["facts"] for fact in group["facts"]]
+    return {fact["name"]: f"{fact['text']}; {fact['sentence']}" for fact in told}
+
+
 def test_levels_are_those_of_the_codes() -> None:
     assert peak_dbfs(1.0) == 0
     assert peak_dbfs(0.0) is rms_dbfs(0.0) is None
@@ -71,18 +77,23 @@ def test_a_tone_has_its_distortion_and_noise() -> None:
     lsb = evidence.facts.lsb
     worse = replace(evidence, run=replace(evidence.run, received=broken, values=broken * lsb))
     assert summarise(worse)["sound"]["tone"]["thd_n_db"] > tone["thd_n_db"] + 15
+    told = [summarise(each) for each in (evidence, worse)]
+    rows, facts = {row.title: row.cells for row in compare(told)}, facts_of(evidence)
+    assert rows["distortion and noise (THD+N)"][0] == facts["Distortion and noise (THD+N)"].partition(";")[0]
+    assert rows["largest error in dBFS"][0].endswith(" dBFS")
     late = replace(evidence.run, tone=replace(evidence.run.tone, settled=len(evidence.run) - 100))
     assert summarise(replace(evidence, run=late))["sound"]["tone"] is None
 
 
-def test_page_and_figures_say_it() -> None:
-    summary = summarise(played("tone"))
-    facts = {
-        fact["name"]: f"{fact['text']}; {fact['sentence']}" for group in summary["facts"] for fact in group["facts"]
-    }
+def test_the_figures_say_it() -> None:
+    facts = facts_of(played("tone"))
     assert re.match(r"−9[345]\.\d\d dB; 997 Hz at −4.0 dBFS; the exact", facts["Distortion and noise (THD+N)"])
     assert re.match(r"−4\.\d dBFS; RMS; the largest value is at −3\.\d dBFS", facts["Level of the output"])
     assert ", −94." in facts["Largest error of the arithmetic"]
+
+
+@pytest.mark.slow
+def test_so_does_the_page() -> None:
     words = words_of(played("tone"))
     assert "Beside the tone of 997 Hz, distortion and noise are at −9" in words
     assert "Spectrum hardware hardware minus exact calculation" in words
@@ -131,3 +142,6 @@ def test_the_phase_of_a_low_pass_falls_by_a_right_angle_for_each_pole() -> None:
         assert f">{degrees}</text>" in drawn
     frequency = np.array([1.0, 1000.0, 20000.0])
     assert phase(facts.ideal_sos, frequency, 48000.0) == pytest.approx([0, -90, -175], abs=4)
+    two_samples = np.array([[0.0, 0.0, 1.0, 1.0, 0.0, 0.0]])
+    frequency = np.linspace(0, 24000, 100)
+    assert phase(two_samples, frequency, 48000.0) == pytest.approx(-720 * frequency / 48000)

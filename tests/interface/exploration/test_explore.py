@@ -199,6 +199,8 @@ def test_a_sound_is_the_trace_of_all_designs(tmp_path: Path) -> None:
         for trace in (tmp_path / "noise.wav", "noise", None)
     ]
     assert len({point["key"] for point in made}) == 3
+    page = (tmp_path / "explored" / "exploration.html").read_text(encoding="utf-8")
+    assert "100 samples each, bit-true" in page
     assert made[0]["trace_sha256"] == made[1]["trace_sha256"] != made[2]["trace_sha256"]
 
 

@@ -52,6 +52,7 @@ def _page(tmp_path_factory: pytest.TempPathFactory) -> Path:
         parameters={"hardware.realization": list(REALIZATIONS), "output.max_error": list(ERRORS)},
         search=None,
         samples=20_000,
+        trace="song.wav",
         board=None,
         points=tuple(points),
         tasks=(),
