@@ -388,7 +388,7 @@ def ranking_figure(
         axes.set_yticks(range(len(rows)), [clip(name, width // 20) for name, _value, _role in rows])
         axes.grid(visible=False, axis="y")
         axes.tick_params(axis="y", length=0)
-        decades(axes.xaxis, low, high, unit, width // 75)
+        decades(axes.xaxis, low, high, unit, width // 110)
         axes.set_xlabel("largest error")
 
     return draw("ranking", "Largest errors beside each other", width, 80 + 40 * len(rows), paint)
