@@ -63,20 +63,38 @@ def error_spectrum(evidence: Evidence) -> dict[str, Any] | None:
 
 
 def _spectrum(values: Array, rate: float) -> tuple[Array, Array]:
-    """Return frequencies and power densities by Welch's method, of some thousand segments at a time.
-
-    The segments overlap by half, lose their means and are weighted with Hann's window. `scipy.signal` has the same,
-    but takes longer to load than most simulations run.
-    """
+    """Return frequencies and power densities by Welch's method, with Hann's window and without the means."""
     size = min(_SEGMENT, len(values))
     window = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(size) / size)
+    frequency, power = welch(values, rate, window, constant=False)
+    return frequency, power / (rate * (window**2).sum())
+
+
+def welch(values: Array, rate: float, window: Array, *, constant: bool = True) -> tuple[Array, Array]:
+    """Return frequencies, and the mean squares of the lines of segments that overlap by half, both sides together.
+
+    Some thousand segments are taken at a time. `scipy.signal` has the same, but takes longer to load than most
+    simulations run.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        The signal.
+    rate : float
+        Samples per second.
+    window : ndarray, shape (m,)
+        Weights of a segment, at most n.
+    constant : bool
+        Whether the mean of a segment counts.
+    """
+    size = len(window)
     segments = np.lib.stride_tricks.sliding_window_view(values, size)[:: size - size // 2]
     power: Array = np.zeros(size // 2 + 1)
     for first in range(0, len(segments), _SEGMENTS):
         block = segments[first : first + _SEGMENTS]
-        lines = np.fft.rfft((block - block.mean(axis=1, keepdims=True)) * window)
+        lines = np.fft.rfft((block if constant else block - block.mean(axis=1, keepdims=True)) * window)
         power += (lines.real**2 + lines.imag**2).sum(axis=0)
-    power /= len(segments) * rate * (window**2).sum()
+    power /= len(segments)
     power[1 : (size + 1) // 2] *= 2  # those of negative frequencies; zero and half the rate have none
     return np.arange(len(power), dtype=np.float64) * (rate / size), power
 

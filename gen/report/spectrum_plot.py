@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.figure import Figure
-from scipy import signal
 
+from sosmith.gen.report.curves import welch
 from sosmith.gen.report.evidence import Evidence
 from sosmith.gen.report.plots import COLOUR, Array, draw, frequency_axis
 
@@ -13,8 +13,8 @@ LEAST_SPECTRUM = 64
 """Samples below which nothing is to be seen."""
 
 _SEGMENT = 4096
-_WINDOW = ("kaiser", 24.0)
-"""Window whose side lobes lie far below the noise of 24 bits."""
+_BETA = 24.0
+"""Of a Kaiser window, whose side lobes lie far below the noise of 24 bits."""
 
 _MARGIN_DB = 12
 
@@ -45,6 +45,6 @@ def levels(values: Array, rate: float) -> tuple[Array, Array]:
     A sine over the whole scale is at 0 dB, or up to 0.4 dB below where it lies between two lines. What is no sine, such
     as noise, is told by the power in a line, which goes with the length of a segment of up to `_SEGMENT` samples.
     """
-    segment = min(_SEGMENT, len(values))
-    frequency, power = signal.welch(values, rate, _WINDOW, segment, scaling="spectrum", detrend=False)
-    return frequency[1:], 10 * np.log10(np.maximum(2 * power[1:], 1e-30))
+    window = np.kaiser(min(_SEGMENT, len(values)) + 1, _BETA)[:-1]  # of a period, with its largest value in the middle
+    frequency, power = welch(values, rate, window)
+    return frequency[1:], 10 * np.log10(np.maximum(2 * power[1:] / window.sum() ** 2, 1e-30))

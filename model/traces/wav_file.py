@@ -17,7 +17,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.io import wavfile
 
 from sosmith.model.arrays import Codes
 from sosmith.model.errors import SpecificationError
@@ -149,13 +148,20 @@ def _samples(path: Path, content: bytes) -> tuple[int, npt.NDArray[Any]]:
         raise SpecificationError(
             f"{path} must have at most {MAX_SAMPLES:,} samples over all channels, not {len(data) // size:,}"
         )
-    # Without what stands beside samples: chunks of others bring a warning each, and rates may be beyond 32 bits.
-    plain = struct.pack("<HHIIHH", tag, channels, 1, block, block, 8 * size)
-    body = b"WAVE" + b"fmt " + struct.pack("<I", len(plain)) + plain + b"data" + struct.pack("<I", len(data)) + data
-    _, samples = wavfile.read(io.BytesIO(b"RIFF" + struct.pack("<I", len(body)) + body))
-    if samples.dtype == np.uint8:
-        samples = (samples ^ 0x80).view(np.int8)
-    return rate, samples.reshape(-1, channels)
+    return rate, _decoded(data, tag, size).reshape(-1, channels)
+
+
+def _decoded(data: bytes, tag: int, size: int) -> npt.NDArray[Any]:
+    """Return samples of `size` bytes: floats, or integers whose highest bit is that of the full scale."""
+    if tag == _FLOAT:
+        return np.frombuffer(data, f"<f{size}")
+    if size == 1:  # the only ones without a sign
+        return (np.frombuffer(data, np.uint8) ^ 0x80).view(np.int8)
+    if size == 3:
+        words = np.zeros((len(data) // 3, 4), np.uint8)
+        words[:, 1:] = np.frombuffer(data, np.uint8).reshape(-1, 3)
+        return words.view("<i4")
+    return np.frombuffer(data, f"<i{size}")
 
 
 def _chunks(path: Path, content: bytes) -> tuple[bytes, bytes]:
