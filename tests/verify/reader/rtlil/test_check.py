@@ -176,7 +176,7 @@ def test_sentences(texts: Callable[[str], Texts]) -> None:
         (
             r"parameter \\WIDTH 1\n",
             r"parameter \\WITH 1\n",
-            r"a cell \$\w+ must have the parameters .*WITH",
+            r"a cell .* must have the parameters .*WITH",
         ),
         (r"parameter \\WIDTH 1\n", "", r"a cell \$\w+ .* must have the parameters .*"),
         (r"parameter \\WIDTH 1\n", r"parameter \\WIDTH 2\n", r"WIDTH of a cell \$\w+ must be that of \w"),
