@@ -32,7 +32,7 @@ from math import gcd, lcm
 from types import MappingProxyType
 from typing import NamedTuple
 
-from sosmith.verify.graph import check_product
+from sosmith.verify.graph import check_product, require
 from sosmith.verify.program.normal_form import ONE, Form, Monomial, constant, degree, plus
 
 Limits = tuple[int | Fraction, int | Fraction]
@@ -42,6 +42,10 @@ _Key = frozenset[tuple[Monomial, int]]
 
 
 NOTHING: Mapping[Hashable, Form] = MappingProxyType({})
+
+
+_MOST_WORK = 1 << 20
+"""Terms that may be looked at in a proof; those of the examples take some thousands."""
 
 
 class _Atom(NamedTuple):
@@ -96,12 +100,13 @@ class Forms:
         self._known: ChainMap[_Key, Limits] = ChainMap()
         self._limits: dict[int, tuple[int, int]] = {}
         self._always = self
+        self._work = [0]
 
     def narrowed(self, form: Form, low: int | Fraction, high: int | Fraction) -> Forms:
         """Return the same atoms, where in addition `form` lies in low..high."""
         other = Forms()
         other._numbers, other._atoms, other._known = self._numbers, self._atoms, self._known.new_child()
-        other._always = self._always
+        other._always, other._work = self._always, self._work
         other.know(form, low, high)
         return other
 
@@ -131,10 +136,16 @@ class Forms:
                 step = Fraction(1, lcm(*(value.denominator for value in inside.values())))
                 self.know(inside, ends[0].__ceil__(), ends[1].__floor__() + 1 - step)
 
+    def _spend(self, terms: int) -> None:
+        """Count terms that were looked at, all of a proof together: a short text must not ask for ever more."""
+        self._work[0] += terms
+        require(self._work[0] <= _MOST_WORK, f"the hardware must be proven by looking at {_MOST_WORK} terms, not more")
+
     def limits(self, form: Form) -> Limits:
         """Return limits of a form."""
         low: int | Fraction = 0
         high: int | Fraction = 0
+        self._spend(len(form))
         for monomial, coefficient in form.items():
             ends: list[int | Fraction] = [coefficient]
             for atom in monomial:
@@ -169,6 +180,7 @@ class Forms:
     def times(self, a: Form, b: Form) -> Form:
         """Return the product; of an atom that is 0 or 1, or 0 or -1, there are no powers."""
         check_product(len(a) * len(b), degree(a) + degree(b))
+        self._spend(len(a) * len(b))
         total: dict[Monomial, int | Fraction] = {}
         for p, x in a.items():
             for q, y in b.items():

@@ -313,8 +313,8 @@ def test_what_no_node_says_is_checked(old: str, new: str, sentence: str) -> None
             f"{'{ ' * 30_000}aresetn;",
             "expressions and statements of plain must not be nested as deep as that",
         ),
-        ("full = 1'h0;", "full = 99999999999999'h1;", "a number must have at most 65536 bits, not 99999999999999"),
-        ("  reg full ", "  reg [2:0] words [999999999:0];\n  reg full ", "words must have at most 16777216 words"),
+        ("full = 1'h0;", "full = 99999999999999'h1;", "a number must have at most 8192 bits, not 99999999999999"),
+        ("  reg full ", "  reg [2:0] words [999999999:0];\n  reg full ", "words must have at most 1048576 words"),
     ],
 )
 def test_a_text_that_asks_for_much_is_refused(old: str, new: str, sentence: str) -> None:

@@ -10,6 +10,7 @@ import pytest
 
 from sosmith.verify.c_model import expressions
 from sosmith.verify.graph import RejectedError
+from sosmith.verify.parallel import forms as parallel_forms
 from sosmith.verify.parallel.forms import Forms
 from sosmith.verify.polynomial import _Value
 from sosmith.verify.program import normal_form
@@ -94,3 +95,15 @@ def test_a_multiplier_of_gates_is_no_larger_than_any_core_has() -> None:
     gates = Gates()
     with pytest.raises(RejectedError, match=r"^a product must have at most 512 bits to be compared, not 513$"):
         gates.product_of([0] * 513, [0] * 513)
+
+
+def test_choices_of_choices_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each is a little longer than the last one: a thousand lines asked for hours."""
+    monkeypatch.setattr(parallel_forms, "_MOST_WORK", 1000)
+    forms = Forms()
+    value = forms.variable("x", 0, 255)
+    for k in range(40):
+        value = normal_form.plus(value, forms.variable(k, 0, 1))
+        forms.limits(value)
+    with pytest.raises(RejectedError, match=r"^the hardware must be proven by looking at 1000 terms, not more$"):
+        forms.narrowed(value, 0, 1).times(value, value)

@@ -96,6 +96,7 @@ class RtlilLogic:
                 else:
                     self.given[f"{plain}.{self._names[kind][port]}"] = bits
             return
+        _check_shape(cell)
         output = {"$dff": "Q", "$memrd_v2": "DATA", "$memwr_v2": "", "$meminit_v2": ""}.get(cell.kind, "Y")
         drivers = self._held if cell.kind in _STORES else self._from_cell
         for place, bit in enumerate(cell.ports[output] if output else []):
@@ -314,6 +315,42 @@ class RtlilLogic:
             sides = (extended(each, most, signed=signed) for each in (a, b))
             return extended([compared(gates, _COMPARED[kind], *sides, signed=signed)], size, signed=False)
         raise RejectedError(f"the RTLIL must not have a cell {kind}")
+
+
+_UNARY = {"A", "Y"}, {"A_SIGNED", "A_WIDTH", "Y_WIDTH"}
+_BINARY = {"A", "B", "Y"}, {"A_SIGNED", "A_WIDTH", "B_SIGNED", "B_WIDTH", "Y_WIDTH"}
+_MEMORY = {"MEMID", "ABITS", "WIDTH"}
+_SHAPES: dict[str, tuple[set[str], set[str]]] = {
+    "$dff": ({"CLK", "D", "Q"}, {"CLK_POLARITY", "WIDTH"}),
+    "$mux": ({"A", "B", "S", "Y"}, {"WIDTH"}),
+    "$memrd_v2": (
+        {"ADDR", "ARST", "CLK", "DATA", "EN", "SRST"},
+        _MEMORY
+        | {"ARST_VALUE", "CE_OVER_SRST", "CLK_ENABLE", "CLK_POLARITY", "COLLISION_X_MASK", "INIT_VALUE", "SRST_VALUE"}
+        | {"TRANSPARENCY_MASK"},
+    ),
+    "$memwr_v2": ({"ADDR", "CLK", "DATA", "EN"}, _MEMORY | {"CLK_ENABLE", "CLK_POLARITY", "PORTID", "PRIORITY_MASK"}),
+    "$meminit_v2": ({"ADDR", "DATA", "EN"}, _MEMORY | {"PRIORITY", "WORDS"}),
+    "$not": _UNARY,
+    **dict.fromkeys(_REDUCED, _UNARY),
+}
+"""Ports and parameters that Yosys' manual gives each kind of cell; those that are not named are binary."""
+
+_SAME = {"$dff": ("D", "Q"), "$mux": ("A", "B", "Y")}
+"""Ports that are as wide as WIDTH says."""
+
+
+def _check_shape(cell: Cell) -> None:
+    """Check that a cell has the ports and parameters of its kind, and no others: tools do not take it otherwise."""
+    ports, parameters = _SHAPES.get(cell.kind, _BINARY)
+    for what, found, wanted in (("ports", cell.ports, ports), ("parameters", cell.parameters, parameters)):
+        require(
+            set(found) == wanted,
+            f"a cell {cell.kind} of the RTLIL must have the {what} {', '.join(sorted(wanted))}, "
+            f"not {', '.join(sorted(found))}",
+        )
+    for port in _SAME.get(cell.kind, ()):
+        require(len(cell.ports[port]) == cell.number("WIDTH"), f"WIDTH of a cell {cell.kind} must be that of {port}")
 
 
 def _shifted(gates: Gates, kind: str, word: Literals, places: Literals, *, signed: bool) -> Literals:

@@ -168,3 +168,36 @@ def test_sentences(texts: Callable[[str], Texts]) -> None:
     with pytest.raises(RejectedError, match=sentence):
         folded.check(changed)
     assert set(read_rtlil(folded.rtlil)) == {"plain"}
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "sentence"),
+    [
+        (
+            r"parameter \\WIDTH 1\n",
+            r"parameter \\WITH 1\n",
+            r"a cell .* must have the parameters .*WITH",
+        ),
+        (r"parameter \\WIDTH 1\n", "", r"a cell \$\w+ .* must have the parameters .*"),
+        (r"parameter \\WIDTH 1\n", r"parameter \\WIDTH 2\n", r"WIDTH of a cell \$\w+ must be that of \w"),
+        (r"(parameter \\WIDTH 1\n)", r"\1 parameter \\A_SIGNED 1\n", r"a cell .* must have the parameters .*"),
+        (
+            r"(parameter \\CLK_POLARITY \S+\n)",
+            r"\1 connect \\EN \\rst\n",
+            r"a cell \$dff .* the ports CLK, D, Q, not .*",
+        ),
+        (
+            r"(cell \$mux \S+\n)",
+            r"\1 connect \\T \\rst\n",
+            r"a cell \$mux of the RTLIL must have the ports A, B, S, Y, .*",
+        ),
+    ],
+)
+def test_a_cell_is_one_that_every_tool_takes(
+    right: str, wrong: str, sentence: str, texts: Callable[[str], Texts]
+) -> None:
+    made = texts("parallel")
+    changed, count = re.subn(right, wrong, made.rtlil, count=1)
+    assert count == 1
+    with pytest.raises(RejectedError, match=f"^{sentence}"):
+        made.check(changed)
