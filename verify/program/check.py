@@ -444,7 +444,9 @@ class _Run:
         self._store_next(number, address, self._word(form, limits, frac, acc.shift // self._bits))
         self.values += 1
         self._groups[number] = [*self._group.instructions, number]
-        self._stored.append(tuple(self.program.instructions[end].target for end in self._group.ends if self._stores(end)))
+        self._stored.append(
+            tuple(self.program.instructions[end].target for end in self._group.ends if self._stores(end))
+        )
         self.purpose |= dict.fromkeys(self._groups[number], node)
         self._acc, self._group = _Accumulator(), Group()
 

@@ -9,6 +9,7 @@ from math import inf
 _ROUNDING = Fraction(1, 2**46)
 """Relative distance from an exact figure that the arithmetic of doubles may have brought."""
 
+
 @dataclass(frozen=True)
 class Figure:
     """A number that a double must stand for: within the rounding of doubles, and `below` or `above` by as much more."""
