@@ -161,6 +161,13 @@ def _load(name: str, header: str, source: str, level: str) -> ctypes.CDLL:
     compiler = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
     if compiler is None:
         raise ToolError("a C compiler is needed for the bit-true model, and none was found: apt-get install gcc")
+    return _built(compiler, name, header, source, level)
+
+
+@functools.lru_cache(
+    maxsize=16
+)  # models of one datapath are asked for again and again; they keep no state of their own
+def _built(compiler: str, name: str, header: str, source: str, level: str) -> ctypes.CDLL:
     with tempfile.TemporaryDirectory(prefix="sosmith-") as folder:
         directory = Path(folder)
         (directory / f"{name}.h").write_text(header, encoding="utf-8")
