@@ -1,4 +1,4 @@
-"""Measures how often intervals hold for sensors that are not as their type: `python -m benchmarks.calibration_coverage`.
+"""Measures how often intervals hold for sensors unlike their type: `python -m benchmarks.calibration_coverage`.
 
 Each case emulates ten days of a sensor of the type equation 5a with one thing wrong, and calibrates it for the last of
 these days and for the day after. Printed are the shares of true clearances inside their 95 % intervals, on both days,
