@@ -49,10 +49,9 @@ _NOT_ALL = 4
 @click.option(
     "--time-limit",
     type=click.FloatRange(0),
-    default=600.0,
-    show_default=True,
     metavar="SECONDS",
-    help="End with a refusal if the proof takes longer; 0 for no limit.",
+    help="End with a refusal if the proof takes more processor time, or Rocq longer; 0 for no limit.  "
+    "[default: 60, and 600 for Rocq]",
 )
 @JSON_OPTION
 def verify(
@@ -65,7 +64,7 @@ def verify(
     rocq: bool,
     export: Path | None,
     partial: bool,
-    time_limit: float,
+    time_limit: float | None,
     as_json: bool,
 ) -> None:
     """Prove CERTIFICATE by an independent method: the error bound, and no internal overflow.
@@ -84,6 +83,7 @@ def verify(
     from sosmith.model.errors import ShortfallError
 
     read = Certificate.load(certificate)
+    limit = {} if time_limit is None else {"seconds": time_limit}
     with show_progress() as step:
         try:
             proof = read.verify(
@@ -93,10 +93,10 @@ def verify(
                 rebuild=rebuild,
                 core=core,
                 second_reader=second_reader,
-                seconds=time_limit,
+                **limit,
             )
             written = [] if export is None else read.export_rocq(export)
-            checked = read.check_in_rocq(step, seconds=time_limit) if rocq else None
+            checked = read.check_in_rocq(step, **limit) if rocq else None
         except ShortfallError as error:
             raise ShortfallError(f"{certificate}: {error}") from None
     if as_json:

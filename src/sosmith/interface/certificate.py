@@ -25,6 +25,7 @@ from sosmith.verify.rocq.check import RocqVerdict, check_in_rocq, rocq_texts
 from sosmith.verify.specified.stated_specification import Agreement
 from sosmith.verify.verdict.door import Stated, judge
 from sosmith.verify.verdict.generated_files import about_of, check_texts
+from sosmith.verify.verdict.limits import SECONDS
 from sosmith.verify.verdict.scope import Part, State
 
 __all__ = [
@@ -203,7 +204,7 @@ class Certificate:
         rebuild: bool = False,
         core: str | None = None,
         second_reader: str | None = None,
-        seconds: float = 600.0,
+        seconds: float = SECONDS,
     ) -> Proof:
         """Prove the certificate by a different method than the one that made it, and hold it against its subject.
 
@@ -230,7 +231,7 @@ class Certificate:
             With `files`, "yosys": an outside front end reads the SystemVerilog as well, and every register, memory,
             port and instance must be the same, bit by bit, as what the proof reads.
         seconds : float
-            Time that the proof may take, in s, where it runs in the main thread; 0 for any.
+            Processor time that the proof may take, in s, where it runs in the main thread; 0 for any.
 
         Returns
         -------

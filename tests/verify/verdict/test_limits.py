@@ -1,5 +1,6 @@
 """Limits of a verification: whatever is given, it ends with a sentence."""
 
+import re
 import signal
 import time
 from collections.abc import Callable
@@ -18,12 +19,23 @@ from sosmith.verify.reader.gates import Gates
 from sosmith.verify.verdict.limits import limited
 
 
-def test_what_takes_too_long_is_refused_and_the_alarm_is_as_it_was() -> None:
-    before = signal.getsignal(signal.SIGALRM)
-    with pytest.raises(RejectedError, match=r"^the proof must end within 0\.05 s, which .*$"), limited(0.05):
-        time.sleep(60)
-    assert signal.getsignal(signal.SIGALRM) is before
-    assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
+def forever() -> None:
+    while True:
+        pass
+
+
+@pytest.mark.parametrize("work", [forever, lambda: time.sleep(600)], ids=["works", "waits"])
+def test_what_takes_too_long_is_refused_and_the_alarms_are_as_they_were(work: Callable[[], None]) -> None:
+    before = [signal.getsignal(number) for number in (signal.SIGALRM, signal.SIGPROF)]
+    sentence = (
+        "the proof must end within 0.05 s of processor time, which this certificate or text does not allow; "
+        "--time-limit gives it more"
+    )
+    with pytest.raises(RejectedError, match=f"^{re.escape(sentence)}$"), limited(0.05):
+        work()
+    assert [signal.getsignal(number) for number in (signal.SIGALRM, signal.SIGPROF)] == before
+    for timer in (signal.ITIMER_REAL, signal.ITIMER_PROF):
+        assert signal.getitimer(timer) == (0.0, 0.0)
 
 
 def test_no_limit_is_none() -> None:
