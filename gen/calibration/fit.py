@@ -14,6 +14,7 @@ import datetime
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -23,13 +24,16 @@ from sosmith.gen.calibration.least_squares import Solution, Sums, Term
 from sosmith.model.arrays import Values
 from sosmith.model.errors import SpecificationError
 from sosmith.model.polynomial import Polynomial
-from sosmith.model.tables.csv_table import CsvTable, check_rows, read_csv_table
+from sosmith.model.tables.csv_table import LARGEST, NUMBER, CsvTable, check_rows, read_csv_table
 
 COLUMNS = ("clearance_mm", "voltage_V", "temperature_C")
 """Columns of a measurement file, in their documented order."""
 
 DATE_COLUMN = "date"
 """Optional column with the date of each measurement, such as 2024-03-01."""
+
+UNCERTAINTY_COLUMNS = ("uncertainty_mm", "uncertainty_V", "uncertainty_C")
+"""Optional columns with the standard uncertainty of a measurement's clearance, voltage and temperature."""
 
 MAX_ORDER = 6
 """Highest order tried: 28 terms. The paper needs order 2."""
@@ -101,6 +105,8 @@ class Measurements:
         Origin of the measurements, for messages.
     days : tuple of int
         Proleptic ordinal of the day of each measurement; empty if unknown.
+    uncertainty : ndarray, shape (3, n), or None
+        Standard uncertainties in mm, V and degC where they are stated, else 0; None if none is.
     """
 
     clearance: Values
@@ -108,6 +114,7 @@ class Measurements:
     temperature: Values
     source: str = "measurements"
     days: tuple[int, ...] = ()
+    uncertainty: Values | None = None
 
     def __post_init__(self) -> None:
         for name in ("clearance", "voltage", "temperature"):
@@ -118,6 +125,13 @@ class Measurements:
                 raise ValueError(f"{name} must be finite, not {values[~np.isfinite(values)][0]}")
         if len(self.days) not in (0, len(self.clearance)):
             raise ValueError(f"days must be of length {len(self.clearance)}, not {len(self.days)}")
+        if self.uncertainty is not None:
+            if self.uncertainty.shape != (3, len(self.clearance)):
+                raise ValueError(
+                    f"uncertainty must be of shape (3, {len(self.clearance)}), not {self.uncertainty.shape}"
+                )
+            if not np.all(np.isfinite(self.uncertainty) & (self.uncertainty >= 0)):
+                raise ValueError("uncertainty must be 0 or more and finite")
 
     def __len__(self) -> int:
         """Return the number of measurements."""
@@ -126,7 +140,9 @@ class Measurements:
     def of(self, chosen: Values) -> Measurements:
         """Return those measurements for which `chosen`, shape (n,), is true."""
         days = tuple(day for day, one in zip(self.days, chosen.tolist(), strict=True) if one) if self.days else ()
-        return Measurements(self.clearance[chosen], self.voltage[chosen], self.temperature[chosen], self.source, days)
+        stated = None if self.uncertainty is None else self.uncertainty[:, chosen]
+        columns = (self.clearance[chosen], self.voltage[chosen], self.temperature[chosen])
+        return Measurements(*columns, self.source, days, stated)
 
     @property
     def covered(self) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -205,19 +221,33 @@ class Fit:
 
 
 def read_measurements(path: Path) -> Measurements:
-    """Read a CSV file with the columns clearance_mm, voltage_V, temperature_C and, if present, date, in any order.
+    """Read a CSV file with the columns clearance_mm, voltage_V and temperature_C, in any order.
+
+    If present, also those for the date and for uncertainties, whose cells may be empty.
 
     Raises
     ------
     SpecificationError
         As for `read_csv_table`; if a clearance is negative; if two rows are equal, which those of two days are not.
     """
-    table = read_csv_table(path, (*COLUMNS, DATE_COLUMN), required=COLUMNS, readers={DATE_COLUMN: _ordinal})
+    readers = {DATE_COLUMN: _ordinal, **dict.fromkeys(UNCERTAINTY_COLUMNS, _stated)}
+    table = read_csv_table(path, (*COLUMNS, *readers), required=COLUMNS, readers=readers)
     clearance, voltage, temperature = (table.column(name) for name in COLUMNS)
     days = tuple(map(int, table.column(DATE_COLUMN).tolist())) if DATE_COLUMN in table else ()
     check_rows(table, clearance < 0, lambda k: f"clearance_mm must be 0 or more, not {clearance[k]}")
     _refuse_repeated_row(table)
-    return Measurements(clearance, voltage, temperature, str(path), days)
+    absent = np.zeros(len(clearance))
+    stated = np.array([table.column(name) if name in table else absent for name in UNCERTAINTY_COLUMNS])
+    return Measurements(clearance, voltage, temperature, str(path), days, stated if stated.any() else None)
+
+
+def _stated(text: str) -> float:
+    """Read an uncertainty; 0 for an empty cell."""
+    if not text:
+        return 0.0
+    if not NUMBER.fullmatch(text) or not 0 < float(text) <= LARGEST:
+        raise ValueError("more than 0, or empty where it is not known")
+    return float(text)
 
 
 def _ordinal(text: str) -> float:
@@ -232,7 +262,8 @@ def _ordinal(text: str) -> float:
 
 def _refuse_repeated_row(table: CsvTable) -> None:
     first_line: dict[tuple[float, ...], int] = {}
-    for index, row in enumerate(table.values.tolist()):
+    own = [table.header.index(name) for name in (*COLUMNS, DATE_COLUMN) if name in table]
+    for index, row in enumerate(table.values[:, own].tolist()):
         line = first_line.setdefault(tuple(row), table.lines[index])
         if line != table.lines[index]:
             raise table.refuse(index, f"row must be a new measurement, not a duplicate of line {line}")
@@ -263,6 +294,8 @@ def fit(
     by iteratively reweighted least squares). RSS and TSS are weighted likewise. An outlier in clearance that is also
     far out in voltage or temperature can still pull the fit towards itself; its leverage shows that.
 
+    Where uncertainties are stated, squared residuals, RSS and TSS are weighted by them; see `stated_weights`.
+
     With `accept`, a polynomial must also keep its largest interval within a limit, or the orders are raised further.
 
     `progress` receives the number of orders tried and the number of all orders.
@@ -271,13 +304,15 @@ def fit(
     ------
     SpecificationError
         If there are fewer measurements than the linear polynomial needs; if a quantity does not vary, or voltage and
-        temperature vary only together; if no polynomial up to `MAX_ORDER` reaches `required_r`, or keeps `accept`.
+        temperature vary only together; if uncertainties are stated in some rows only; if no polynomial up to
+        `MAX_ORDER` reaches `required_r`, or keeps `accept`.
     """
     check_variation(measurements)
     count = len(measurements)
     rejected: list[Trial] = []
     widths: list[float] = []
-    minimize = _huber(measurements) if robust else _least_squares(measurements)
+    stated = stated_weights(measurements)
+    minimize = _huber(measurements, stated) if robust else _least_squares(measurements, stated)
     every = candidate_orders()
     for tried, orders in enumerate(every):
         progress(tried, len(every))
@@ -326,18 +361,62 @@ _Minimize = Callable[[tuple[Term, ...]], tuple[Solution, tuple[float, ...]] | No
 """Maps terms to coefficients and weights; None if the measurements do not determine them."""
 
 
-def _least_squares(measurements: Measurements) -> _Minimize:
-    sums = Sums(measurements.clearance, measurements.voltage, measurements.temperature)
+WIDEST = Fraction(10) ** 18
+"""Largest ratio of two squared uncertainties."""
+
+
+def stated_weights(measurements: Measurements) -> Values | None:
+    """Return the weights of squared residuals, from 0 to 1; None if no uncertainties are stated.
+
+    A weight is the smallest squared uncertainty over that of the row, rounded to a double once. The squared uncertainty
+    of a row is ``u_d**2 + (a u_V)**2 + (b u_T)**2``, with the slopes a and b of the linear polynomial that fits all
+    rows by unweighted least squares: it is the same whatever orders are tried.
+
+    Raises
+    ------
+    SpecificationError
+        If uncertainties are stated in some rows only: the rule does not know how the others scatter. If they differ by
+        more than a factor of 1e9.
+    """
+    if measurements.uncertainty is None:
+        return None
+    u_d, u_v, u_t = ([Fraction(value) for value in row] for row in measurements.uncertainty.tolist())
+    slopes = [Fraction(0), Fraction(0)]
+    if any(u_v) or any(u_t):
+        sums = Sums(measurements.clearance, measurements.voltage, measurements.temperature)
+        linear = sums.solve(terms_of((1, 1)))
+        if linear is not None:  # else there will be no polynomial either
+            (_, of_temperature), (of_voltage,) = linear.polynomial.coefficients
+            slopes = [Fraction(of_voltage), Fraction(of_temperature)]
+    squares = [d**2 + (slopes[0] * v) ** 2 + (slopes[1] * t) ** 2 for d, v, t in zip(u_d, u_v, u_t, strict=True)]
+    least = min(squares)
+    if not least > 0:
+        raise SpecificationError(
+            f"{measurements.source}: uncertainties must be stated in every row or in none for the paper's rule, "
+            f"not in {sum(map(bool, squares)):,} of {len(squares):,}"
+        )
+    if max(squares) > WIDEST * least:
+        raise SpecificationError(
+            f"{measurements.source}: uncertainties must be within a factor of 1e9 of each other, not "
+            f"{float(max(squares) / least) ** 0.5:.3g}"
+        )
+    return np.array([float(least / square) for square in squares])
+
+
+def _least_squares(measurements: Measurements, weights: Values | None) -> _Minimize:
+    sums = Sums(measurements.clearance, measurements.voltage, measurements.temperature, weights)
+    given = () if weights is None else tuple(weights.tolist())
 
     def minimize(terms: tuple[Term, ...]) -> tuple[Solution, tuple[float, ...]] | None:
         solution = sums.solve(terms)
-        return None if solution is None else (solution, ())
+        return None if solution is None else (solution, given)
 
     return minimize
 
 
-def _huber(measurements: Measurements) -> _Minimize:
-    equal = np.ones(len(measurements))
+def _huber(measurements: Measurements, weights: Values | None) -> _Minimize:
+    equal = np.ones(len(measurements)) if weights is None else weights
+    narrow = np.sqrt(equal)
     unweighted = Sums(measurements.clearance, measurements.voltage, measurements.temperature, equal)
 
     def minimize(terms: tuple[Term, ...]) -> tuple[Solution, tuple[float, ...]] | None:
@@ -348,10 +427,10 @@ def _huber(measurements: Measurements) -> _Minimize:
             if solution is None:
                 return None
             rounds.append((solution, weights))
-            off = np.abs(residuals(measurements, solution.polynomial))
+            off = np.abs(residuals(measurements, solution.polynomial)) * narrow
             allowed = HUBER * max(NORMAL_CONSISTENCY * float(np.median(off)), MIN_SCATTER)
             exact = allowed / np.maximum(off, allowed)
-            weights = np.maximum(np.rint(exact * WEIGHT_STEPS), 1.0) / WEIGHT_STEPS
+            weights = np.maximum(np.rint(exact * WEIGHT_STEPS), 1.0) / WEIGHT_STEPS * equal
             again = [k for k, (_, earlier) in enumerate(rounds) if np.array_equal(weights, earlier)]
             if again or len(rounds) == MAX_ROUNDS:
                 # Equal weights repeat every later iteration: the weights cycle, a fixed point being a cycle of one.
@@ -375,8 +454,8 @@ def terms_of(orders: tuple[int, int]) -> tuple[Term, ...]:
     return tuple((i, j) for i in range(m + 1) for j in range(n + 1) if i + j <= max(m, n))
 
 
-def check_variation(measurements: Measurements) -> None:
-    """Refuse measurements that are too few or do not vary; raises `SpecificationError`."""
+def check_variation(measurements: Measurements, names: tuple[str, ...] = COLUMNS) -> None:
+    """Raise `SpecificationError` for measurements that are too few, or do not vary in the columns of these names."""
     fewest = len(terms_of((1, 1))) + 1
     if len(measurements) < fewest:
         raise SpecificationError(
@@ -385,5 +464,5 @@ def check_variation(measurements: Measurements) -> None:
         )
     columns = (measurements.clearance, measurements.voltage, measurements.temperature)
     for name, values in zip(COLUMNS, columns, strict=True):
-        if values.min() == values.max():
+        if name in names and values.min() == values.max():
             raise SpecificationError(f"{measurements.source}: {name} must vary, not be {values[0]} in every row")

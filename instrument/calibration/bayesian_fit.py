@@ -8,12 +8,14 @@ like the paper's.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import cached_property
 
 import numpy as np
 
 from sosmith.gen.calibration.fit import (
+    COLUMNS,
     MIN_SCATTER,
     NORMAL_CONSISTENCY,
     Fit,
@@ -28,6 +30,7 @@ from sosmith.gen.calibration.fit import (
 from sosmith.gen.calibration.least_squares import Sums
 from sosmith.instrument.calibration.acceptance import Range
 from sosmith.instrument.calibration.covered_region import CoveredRegion
+from sosmith.instrument.calibration.mixed_effects.doubts import doubts_of
 from sosmith.instrument.calibration.mixed_effects.model import (
     NONE,
     RATIOS,
@@ -57,6 +60,10 @@ MAX_ROUNDS = 10
 
 PROJECTED = (33, 9)
 """Voltages and temperatures at which the day's curve is fitted by a polynomial."""
+
+BESIDE = 10.0
+"""Where all measurements are of one temperature, the polynomial holds so many kelvins about it as well: there the type
+says how the curve goes on."""
 
 SMALLEST = 1.0
 """Clearance in mm below which the projection weights errors equally; above it, relative to the clearance."""
@@ -91,6 +98,8 @@ class BayesianFit:
         Between which voltages the sensor measures.
     region : CoveredRegion
         Region of the measurements, without those at a rail inside the range: nothing is calibrated there.
+    clearance : ndarray, shape (n,)
+        Clearance in mm of each row of the model, at which the errors of the days are taken.
     """
 
     fit: Fit
@@ -101,6 +110,17 @@ class BayesianFit:
     at_rail: int
     rails: Rails
     region: CoveredRegion
+    clearance: Values
+
+    @cached_property
+    def doubts(self) -> tuple[str, ...]:
+        """Sentences about what explains the measurements far better than the type's errors of a day do."""
+        return doubts_of(self.model, self.posterior.curves, self.clearance, self.given)
+
+    @property
+    def given(self) -> Values:
+        """Weights of 0 or 1 of the rows of the model."""
+        return np.array(self.fit.weights)[self.order]
 
     @property
     def surprise(self) -> str:
@@ -121,7 +141,7 @@ class BayesianFit:
     @property
     def kept(self) -> Index:
         """Rows of the model that are no outliers."""
-        return np.flatnonzero(np.array(self.fit.weights)[self.order])
+        return np.flatnonzero(self.given)
 
 
 def bayesian_fit(
@@ -158,10 +178,11 @@ def bayesian_fit(
     Raises
     ------
     SpecificationError
-        If measurements are too few, or do not vary, as for `fit`; if all are at a rail; if more than `MOST_REJECTED` of
-        them are outliers; if the polynomial falls with the voltage somewhere in the region that the measurements cover.
+        If measurements are too few, or clearance or voltage do not vary, as for `fit`; if all are at a rail; if more
+        than `MOST_REJECTED` of them are outliers; if the polynomial falls with the voltage somewhere in the region that
+        the measurements cover. All may be of one temperature: how a sensor depends on it is known from its type.
     """
-    check_variation(measurements)
+    check_variation(measurements, COLUMNS[:2])
     rows, order = rows_of(measurements, sensor_type, date)
     V, T, d = (values[order] for values in (measurements.voltage, measurements.temperature, measurements.clearance))
     rails = rails_of(measurements, ranges[1])
@@ -173,11 +194,15 @@ def bayesian_fit(
             f"not all {len(d):,} at an end of it"
         )
     progress(0, 3)
-    model, at, weights = _rejecting(sensor_type, rows, free, free, NONE)
+    # Without the errors of the days, those of known variance are off by these: neither used nor judged before them.
+    scattering = np.where(rows.known > 0, 0.0, free)
+    first = scattering if np.any(scattering) else free
+    model, at, weights = _rejecting(sensor_type, rows, first, first, NONE)
+    weights = np.where(rows.known > 0, free, weights)
     curve = sensor_type.polynomial(tuple(at.mean_of(model.course(at).mean[-1]).tolist()))
     clearance = curve(V, T)
     curves = SystematicCurves(float(clearance.min()), float(clearance.max()), sensor_type.correlation)
-    rows = Rows(rows.a, curves.columns(clearance), rows.r, rows.day, rows.days)
+    rows = replace(rows, h=curves.columns(clearance))
     progress(1, 3)
     model, _, weights = _rejecting(sensor_type, rows, weights, free, RATIOS)
     progress(2, 3)
@@ -194,7 +219,7 @@ def bayesian_fit(
     given = np.empty(len(d))
     given[order] = weights
     fit = _as_fit(measurements, polynomial, usable.covered, given)
-    return BayesianFit(fit, posterior, model, plain, order, at_rail, rails, region)
+    return BayesianFit(fit, posterior, model, plain, order, at_rail, rails, region, clearance)
 
 
 def _without_rails(measurements: Measurements, rails: Rails, voltages: Range) -> Measurements:
@@ -215,7 +240,9 @@ def _rejecting(
         model = Model.of(sensor_type, rows, weights)
         at = model.weighed(SCATTERS, ratios)
         off = np.abs(model.residuals(at.likeliest))
-        allowed = REJECTED * max(NORMAL_CONSISTENCY * float(np.median(off[free > 0])), MIN_SCATTER)
+        scattering = (free > 0) & (rows.known == 0)
+        scatter = NORMAL_CONSISTENCY * float(np.median(off[scattering])) if scattering.any() else 0.0
+        allowed = REJECTED * np.maximum(max(scatter, MIN_SCATTER), np.sqrt(rows.known))
         kept = np.where(off > allowed, 0.0, free)
         if np.array_equal(kept, weights):
             return model, at, weights
@@ -246,7 +273,7 @@ def _projected(posterior: Posterior, measurements: Measurements, ranges: tuple[R
     """Return the polynomial nearest to the day's curve over the voltages of the port and the measured temperatures."""
     voltages, temperatures = (
         np.linspace(low, high, count)
-        for (low, high), count in zip((ranges[1], measurements.covered[1]), PROJECTED, strict=True)
+        for (low, high), count in zip((ranges[1], temperatures_about(measurements)), PROJECTED, strict=True)
     )
     V, T = (grid.ravel() for grid in np.meshgrid(voltages, temperatures))
     curve = posterior.curve(V, T)
@@ -254,6 +281,12 @@ def _projected(posterior: Posterior, measurements: Measurements, ranges: tuple[R
     solution = Sums(curve, V, T, weights).solve(TERMS)
     assert solution is not None, "a grid determines the terms"
     return solution.polynomial
+
+
+def temperatures_about(measurements: Measurements) -> Range:
+    """Return the measured temperatures, or those `BESIDE` the only one."""
+    low, high = measurements.covered[1]
+    return (low, high) if low < high else (low - BESIDE, high + BESIDE)
 
 
 def stays_within(polynomial: Polynomial, ranges: tuple[Range, Range, Range]) -> bool:

@@ -7,11 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from sosmith.gen.calibration.fit import COLUMNS, DATE_COLUMN
+from sosmith.gen.calibration.fit import COLUMNS, DATE_COLUMN, UNCERTAINTY_COLUMNS
 from sosmith.instrument.calibration.advice import Advice
 from sosmith.instrument.calibration.coefficient_covariance import CoefficientUncertainty, of_bayes, of_least_squares
 from sosmith.instrument.calibration.measurement_store import Source, StoredMeasurement, Version, as_measurements
 from sosmith.instrument.calibration.self_updating import Addition, Calibration
+from sosmith.instrument.calibration.store.reference import Morning
+from sosmith.instrument.calibration.store.shift import Shift
 from sosmith.instrument.calibration.uncertainty import SHARE
 from sosmith.model.arrays import Values
 
@@ -60,7 +62,8 @@ def calibration_json(made: Calibration) -> dict[str, Any]:
 def uncertainty_plane(made: Calibration) -> tuple[Values, Values, Values]:
     """Return voltages, temperatures, and half-widths in mm of 95 % intervals, shape (temperatures, voltages)."""
     voltages, temperatures = (
-        np.linspace(low, high, count) for (low, high), count in zip(made.fit.covered, PLANE, strict=True)
+        np.linspace(low, high, count if low < high else 1)
+        for (low, high), count in zip(made.fit.covered, PLANE, strict=True)
     )
     V, T = np.meshgrid(voltages, temperatures)
     return voltages, temperatures, made.quality.uncertainty.half_width(V.ravel(), T.ravel()).reshape(V.shape)
@@ -152,14 +155,47 @@ def source_json(source: Source) -> dict[str, Any]:
 
 def addition_json(addition: Addition) -> dict[str, Any]:
     """Return which lines of a file were kept and which were refused, and the calibration made from them."""
-    made = addition.calibration
+    made, shift = addition.calibration, addition.shift
     return {
         "file": str(addition.file.path),
         "kept": len(addition.file.readings) if addition.kept else 0,
         "refused": [{"line": refusal.line, "reason": refusal.reason} for refusal in addition.file.refusals],
         "shortfall": addition.shortfall,
+        "shift": None if shift is None else _shift(shift),
+        "alarms": None if addition.health is None else len(addition.health.alarms),
+        "warnings": list(addition.warnings),
         "calibration": None if made is None else calibration_json(made),
     }
+
+
+def _shift(shift: Shift) -> dict[str, Any]:
+    return {
+        "from_version": shift.version,
+        "measurements": shift.count,
+        "reads_more_by_mm": _nanometres(shift.mean),
+        "half_width_mm": _nanometres(shift.half_width) if math.isfinite(shift.half_width) else None,
+    }
+
+
+def morning_json(morning: Morning) -> dict[str, Any]:
+    """Return the targets of a day with what was read, before and now, and the addition that they make."""
+    return (
+        {
+            "targets": [
+                {
+                    **dict(zip(COLUMNS, target.reading.values, strict=True)),
+                    **dict(zip(UNCERTAINTY_COLUMNS, (u or None for u in target.reading.uncertainty), strict=True)),
+                    "before_mm": _nanometres(target.before[0]),
+                    "before_half_width_mm": _nanometres(target.before[1]),
+                    "now_mm": _nanometres(target.after[0]),
+                    "now_half_width_mm": _nanometres(target.after[1]),
+                }
+                for target in morning.targets
+            ]
+        }
+        | addition_json(morning.addition)
+        | {"warnings": [*morning.warnings, *morning.addition.warnings]}
+    )
 
 
 def advice_json(sensor: str, date: str, within: float, found: Advice) -> dict[str, Any]:
@@ -227,8 +263,14 @@ def _uncertainty_table(found: CoefficientUncertainty) -> str:
 
 def measurements_csv(stored: list[StoredMeasurement]) -> str:
     """CSV as ``calibration.data`` of a specification reads it; numbers read back as the same doubles."""
-    rows = [",".join([*map(repr, one.reading.values), one.reading.date]) for one in stored]
-    return "\n".join([",".join((*COLUMNS, DATE_COLUMN)), *rows, ""])
+    readings = [one.reading for one in stored]
+    stated = any(any(reading.uncertainty) for reading in readings)
+    rows = [
+        [*map(repr, reading.values), reading.date, *([repr(u) if u else "" for u in reading.uncertainty] * stated)]
+        for reading in readings
+    ]
+    header = (*COLUMNS, DATE_COLUMN, *UNCERTAINTY_COLUMNS[: 3 * stated])
+    return "\n".join([",".join(cells) for cells in (header, *rows)]) + "\n"
 
 
 def _coefficients(version: Version) -> list[list[float]]:

@@ -12,7 +12,8 @@ from sosmith.instrument.calibration.calibration_report import CALLED_OUT, uncert
 from sosmith.instrument.calibration.fit_quality import CELLS
 from sosmith.instrument.calibration.health.monitoring import Health, date_of
 from sosmith.instrument.calibration.measurement_store import Source, Version
-from sosmith.instrument.calibration.self_updating import Calibration
+from sosmith.instrument.calibration.self_updating import Addition, Calibration
+from sosmith.instrument.calibration.store.reference import Morning
 from sosmith.instrument.calibration.uncertainty import Uncertainty
 
 
@@ -31,6 +32,50 @@ def fit_facts(
         Fact("residual, largest", largest, "mm"),
         Fact("95 % interval of a reading", f"±{low:.3g} to ±{high:.3g} mm where there are measurements"),
     ]
+
+
+def addition_table(addition: Addition) -> Table:
+    """Return what a file says of the sensor: how far it reads from the version before, and its health."""
+    facts = []
+    if addition.shift is not None:
+        facts.append(Fact("reads differently by", f"{addition.shift.mean:+.3g} mm", sentence=addition.shift.sentence))
+    if addition.health is not None:
+        days, alarms = len(addition.health.innovations.days), len(addition.health.alarms)
+        verdict = count(alarms, "alarm") if alarms else "no alarm"
+        said = "the first day, held against nothing" if days == 1 else f"over {count(days, 'day')} of measurements"
+        facts.append(Fact("health", verdict, sentence=said))
+    return Table(str(addition.file.path), facts)
+
+
+def morning_tables(morning: Morning) -> list[Table]:
+    """Return what was read at each target, before and now, the curve of the day, and the intervals of readings."""
+    made = morning.addition.calibration
+    assert made is not None, "there is a calibration for the day"
+    rows = []
+    for target in morning.targets:
+        clearance, voltage, temperature = target.reading.values
+        (before, width), (after, narrower) = target.before, target.after
+        rows.append(
+            (
+                f"{clearance:g}",
+                f"{target.reading.uncertainty[0]:g}",
+                f"{voltage:g}",
+                f"{temperature:g}",
+                f"{before - clearance:+.3f}",
+                f"{width:.3g}",
+                f"{after - clearance:+.3f}",
+                f"{narrower:.3g}",
+            )
+        )
+    head = ("mm", "known to", "V", "°C", "off before", "±", "off now", "±")
+    curve = [
+        Fact(f"V^{i} T^{j}", f"{float(value):.6g}")
+        for i, row in enumerate(made.version.polynomial.coefficients)
+        for j, value in enumerate(row)
+    ]
+    title = f"Sensor {made.sensor}, {made.version.date}: {count(len(rows), 'target')}, lengths in mm"
+    method = f"Curve of the day, version {made.version.number}, mm"
+    return [Table(title, rows, head), Table(method, curve), _intervals(made)]
 
 
 def calibration_tables(made: Calibration) -> list[Table]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from sosmith.gen.calibration.fit import Fit, Measurements, residuals, terms_of
 from sosmith.gen.calibration.least_squares import Sums
-from sosmith.instrument.calibration.bayesian_fit import BayesianFit
+from sosmith.instrument.calibration.bayesian_fit import BESIDE, BayesianFit
 from sosmith.instrument.calibration.lack_of_fit import lack_of_fit
 from sosmith.model.arrays import Values
 
@@ -102,6 +102,8 @@ def of_bayes(measurements: Measurements, made: BayesianFit) -> CoefficientUncert
     lengths = tuple(map(len, polynomial.coefficients))
     V, T = made.region.points()
     V, T = V[::EVERY], T[::EVERY]
+    if T.min() == T.max():  # the coefficients of the temperature are as uncertain as the type leaves them
+        T = T + np.resize((-BESIDE, 0.0, BESIDE), len(T))
     x = columns(lengths, V, T)
     scale = np.sqrt(np.mean(x**2, axis=1))
     projection = np.linalg.pinv((x / scale[:, None]).T) / scale[:, None]

@@ -119,5 +119,7 @@ def _filled_cells(measurements: Measurements) -> float:
 
 def _cell(values: Values) -> list[int]:
     low, high = values.min(), values.max()
+    if low == high:
+        return [0] * len(values)
     index: list[int] = np.minimum((values - low) / (high - low) * CELLS, CELLS - 1).astype(int).tolist()
     return index

@@ -21,8 +21,8 @@ import numpy as np
 
 from sosmith.gen.calibration.fit import Measurements
 from sosmith.instrument.calibration.acceptance import METHODS, Method, Range
-from sosmith.instrument.calibration.measurement_files import MeasurementFile, Reading
 from sosmith.instrument.calibration.sensor_type import DEFAULT_TYPE, SENSOR_TYPES, SensorType
+from sosmith.instrument.calibration.store.measurement_files import MeasurementFile, Reading
 from sosmith.instrument.calibration.store.schema import APPLICATION_ID, SCHEMA, SCHEMA_VERSION, bring_up_to_date
 from sosmith.model.errors import SpecificationError, ToolError
 from sosmith.model.polynomial import Polynomial
@@ -56,7 +56,7 @@ _UNREACHABLE = {
 
 _OPTIONAL = (float, type(None))
 _WHOLE = (int, type(None))
-_MEASUREMENT = (int, str, int, str, float, float, float, str)
+_MEASUREMENT = (int, str, int, str, float, float, float, str, *[_OPTIONAL] * 3)
 _TEXT = (str, type(None))
 _VERSION = (int, str, int, int, str, float, int, str, float, float, _OPTIONAL, _OPTIONAL, str, _TEXT, _OPTIONAL, int)
 _SOURCE = (int, str, str, int, str, str, _WHOLE, _TEXT, _TEXT, _TEXT)
@@ -256,9 +256,13 @@ class MeasurementStore:
             "INSERT INTO source VALUES (NULL, ?, ?, ?)", (sensor_id, name, file.sha256)
         ).lastrowid
         self._sql.executemany(
-            "INSERT INTO measurement VALUES (NULL, ?, ?, ?, ?, ?, ?, ?, ?, NULL, NULL, NULL)",
+            "INSERT INTO measurement VALUES (NULL, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
             [
-                (sensor_id, source, reading.line, reading.date, *reading.values, reading.sha256(sensor))
+                (
+                    *(sensor_id, source, reading.line, reading.date),
+                    *(*reading.values, reading.sha256(sensor)),
+                    *(one or None for one in reading.uncertainty),
+                )
                 for reading in file.readings
             ],
         )
@@ -277,10 +281,11 @@ class MeasurementStore:
             If a measurement differs from its stored hash, or the store is damaged.
         """
         found = []
-        for number, source, line, date, *values, sha256 in self._rows(
+        for number, source, line, date, d, V, T, sha256, *stated in self._rows(
             _MEASUREMENT,
             "SELECT measurement.id, source.name, line, measurement.date, clearance_mm, voltage_V, temperature_C, "
-            "measurement.sha256 FROM measurement JOIN sensor ON sensor.id = measurement.sensor "
+            "measurement.sha256, uncertainty_mm, uncertainty_V, uncertainty_C FROM measurement "
+            "JOIN sensor ON sensor.id = measurement.sensor "
             "JOIN source ON source.id = measurement.source "
             "LEFT JOIN withdrawal ON withdrawal.source = source.id AND withdrawal.id <= coalesce(?, withdrawal.id) "
             "WHERE sensor.name = ? AND measurement.id <= coalesce(?, measurement.id) AND withdrawal.id IS NULL "
@@ -289,7 +294,7 @@ class MeasurementStore:
             sensor,
             last,
         ):
-            reading = Reading(line, date, (values[0], values[1], values[2]))
+            reading = Reading(line, date, (d, V, T), (stated[0] or 0.0, stated[1] or 0.0, stated[2] or 0.0))
             if reading.sha256(sensor) != sha256:
                 raise SpecificationError(
                     f"{self.path}: measurement {number} must match its stored hash, not differ from it"
@@ -519,7 +524,9 @@ def as_measurements(stored: Sequence[StoredMeasurement], source: str) -> Measure
     values = np.array([one.reading.values for one in stored], dtype=np.float64).reshape(-1, 3)
     clearance, voltage, temperature = values.T
     days = tuple(datetime.date.fromisoformat(one.reading.date).toordinal() for one in stored)
-    return Measurements(clearance.copy(), voltage.copy(), temperature.copy(), source, days)
+    stated = np.array([one.reading.uncertainty for one in stored], dtype=np.float64).reshape(-1, 3).T.copy()
+    columns = (clearance.copy(), voltage.copy(), temperature.copy())
+    return Measurements(*columns, source, days, stated if stated.any() else None)
 
 
 def data_sha256(stored: Sequence[StoredMeasurement], sensor: str) -> str:

@@ -94,7 +94,8 @@ def _beyond(measurements: Measurements, at: Values, others: Values) -> float | N
     if np.count_nonzero(at) < FEWEST or np.count_nonzero(others) <= len(TERMS):
         return None
     sums = Sums(measurements.clearance, measurements.voltage, measurements.temperature, others.astype(np.float64))
-    solution = sums.solve(TERMS)
+    T = measurements.temperature[others]
+    solution = sums.solve(TERMS if T.min() < T.max() else tuple(term for term in TERMS if not term[1]))
     if solution is None:
         return None
     off = residuals(measurements, solution.polynomial)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,7 +17,6 @@ from sosmith.gen.calibration.fit import (
     Measurements,
     Progress,
     fit,
-    root_mean_square,
     unacceptable,
     untold,
 )
@@ -26,11 +26,6 @@ from sosmith.instrument.calibration.bayesian_fit import BayesianFit, bayesian_fi
 from sosmith.instrument.calibration.covered_region import CoveredRegion
 from sosmith.instrument.calibration.fit_quality import FitQuality, assess, assess_posterior
 from sosmith.instrument.calibration.health.monitoring import Health, health_of
-from sosmith.instrument.calibration.measurement_files import (
-    MeasurementFile,
-    Refusal,
-    read_measurement_file,
-)
 from sosmith.instrument.calibration.measurement_store import (
     MeasurementStore,
     Source,
@@ -41,18 +36,20 @@ from sosmith.instrument.calibration.measurement_store import (
 )
 from sosmith.instrument.calibration.rails import Rails, rails_of
 from sosmith.instrument.calibration.sensor_type import SensorType
+from sosmith.instrument.calibration.store.measurement_files import (
+    MeasurementFile,
+    Refusal,
+    read_measurement_file,
+)
+from sosmith.instrument.calibration.store.shift import Shift, shift_from
+from sosmith.instrument.calibration.store.surprise import surprise_of
 from sosmith.instrument.calibration.uncertainty import largest_half_width
 from sosmith.model.errors import ShortfallError, SpecificationError
 
-SWAPPED_FITS, SWAPPED_OFF = 2.0, 4.0
-"""Thresholds on the rms residual, relative to that of the newest version, for swapped columns.
+DAYS_A_YEAR = 365.25
 
-A file counts as swapped if the ratio is below the first with clearance and voltage exchanged, and above the second
-without. A sensor that has changed fits neither way.
-"""
-
-SWAPPED_ROWS = 4
-"""Rows needed to detect swapped columns."""
+FAR = 180
+"""Days between the last measurement and the day of a calibration from which on the drift that it assumes is told."""
 
 
 @dataclass(frozen=True)
@@ -77,6 +74,8 @@ class Calibration:
         Valid ranges of the sensor: clearance in mm, voltage in V, temperature in degC.
     drift : dict
         Largest difference in mm from each earlier version, by its number, over the region covered now.
+    date : str
+        The day that was asked for.
     bayesian : BayesianFit or None
         The model behind the fit; None for the paper's method.
     """
@@ -89,6 +88,7 @@ class Calibration:
     quality: FitQuality
     ranges: tuple[Range, Range, Range]
     drift: dict[int, float]
+    date: str
     bayesian: BayesianFit | None = None
 
     @property
@@ -99,9 +99,26 @@ class Calibration:
         if self.bayesian is not None:
             found += [text for text in (self.bayesian.surprise,) if text]
             found += [f"{text}; they are left out" for text in self.bayesian.rails.found]
+            found += [text for text in (self._far, *self.bayesian.doubts) if text]
         else:
             found += [f"{text}; --method bayes leaves them out" for text in self._rails.found]
         return tuple(found)
+
+    @property
+    def _far(self) -> str:
+        """A sentence if the day of the calibration is before the last measurement, or long after it."""
+        last, date = max(one.reading.date for one in self.stored), self.date
+        days = (datetime.date.fromisoformat(date) - datetime.date.fromisoformat(last)).days
+        if days < 0:
+            return f"{date} is before the last measurement: the calibration is for {last}"
+        known = self.version.sensor_type
+        if days < FAR or known is None:
+            return ""
+        offset, gain = (drift * math.sqrt(days) for drift in (known.offset_drift, known.gain_drift))
+        return (
+            f"{date} is {days / DAYS_A_YEAR:.1f} years after the last measurement, of {last}: the intervals assume a "
+            f"drift of {offset:.2g} V and {100 * gain:.2g} % of the gain since then, as standard deviations"
+        )
 
     @property
     def _rails(self) -> Rails:
@@ -128,12 +145,25 @@ class Addition:
         The resulting version; None if nothing was stored or no polynomial is good enough.
     shortfall : str
         Reason why there is no version although rows were stored; empty otherwise.
+    shift : Shift or None
+        How far the sensor now reads from the version before; None without one, or if nothing was stored.
+    health : Health or None
+        The sensor's health with the rows; None if nothing was stored.
     """
 
     file: MeasurementFile
     kept: bool
     calibration: Calibration | None
     shortfall: str
+    shift: Shift | None = None
+    health: Health | None = None
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """A sentence for each alarm that the days of the file have raised."""
+        first = min((reading.date for reading in self.file.readings), default="")
+        alarms = () if self.health is None else self.health.alarms
+        return tuple(alarm.sentence for alarm in alarms if alarm.raised >= first)
 
 
 def add(
@@ -144,6 +174,9 @@ def add(
     *,
     ranges: tuple[Range | None, Range | None, Range | None] = (None, None, None),
     keep_good: bool = False,
+    surprising: bool = False,
+    content: bytes | None = None,
+    uncertainty: float = 0.0,
     method: Method = "paper",
     sensor_type: SensorType | None = None,
     required_r: float = REQUIRED_R,
@@ -167,6 +200,10 @@ def add(
         New valid ranges of clearance in mm, voltage in V and temperature in degC; None keeps the present one.
     keep_good : bool
         Whether to store the valid rows of a file that also has rejected ones.
+    surprising : bool
+        Whether to store a file that looks like a slip; see `surprise_of`.
+    content, uncertainty
+        As for `read_measurement_file`.
     method : str
         "paper" for the paper's rule, `fit`; "bayes" for `bayesian_fit`, for the day of the version.
     sensor_type : SensorType or None
@@ -180,30 +217,41 @@ def add(
     Raises
     ------
     SpecificationError
-        As for `read_measurement_file`; if the file was added before. Nothing is written then.
+        As for `read_measurement_file`; if the file was added before; if it looks like a slip and `surprising` is false.
+        Nothing is written then.
     """
     _check_sensor(sensor)
     with store.transaction():
         before = store.ranges(sensor)
         usual = before or DEFAULT_RANGES
         now = _ranges_from_now_on(ranges, usual)
-        file = read_measurement_file(path, date, now)
+        file = read_measurement_file(path, date, now, content=content, uncertainty=uncertainty)
         for source in store.sources(sensor):
             if source.sha256 == file.sha256 and source.withdrawal is None:
                 raise SpecificationError(f"{path} must hold new measurements, not those already added as {source.name}")
         file = _sift(store, sensor, file)
         if not _keeps(file, keep_good=keep_good):
             return Addition(file, False, None, "")
+        kind = sensor_type or store.sensor_type(sensor)
+        versions = store.versions(sensor)
+        known, added = as_measurements(store.measurements(sensor), sensor), _measurements_of(file)
+        if not surprising:
+            counted = versions[-1] if versions and len(known) else None
+            slip = surprise_of(added, known, counted, kind if counted or method == "bayes" else None)
+            if slip:
+                raise SpecificationError(f"{path}: {slip}; --surprising stores them as they are")
         if now != before:
             store.set_ranges(sensor, now)
         if sensor_type is not None:
             store.set_sensor_type(sensor, sensor_type)
         store.insert(sensor, file)
+        shift = shift_from(versions[-1], known, added) if versions and len(known) else None
+        health = health_for(store, sensor)
         try:
-            settings = _Settings(method, required_r, robust, accept, store.sensor_type(sensor))
-            return Addition(file, True, _fit(store, sensor, date, settings, progress), "")
+            settings = _Settings(method, required_r, robust, accept, kind)
+            return Addition(file, True, _fit(store, sensor, date, settings, progress), "", shift, health)
         except SpecificationError as error:
-            return Addition(file, True, None, str(error))
+            return Addition(file, True, None, str(error), shift, health)
 
 
 def refused_first_file(
@@ -252,7 +300,7 @@ def refit(
     The parameters are those of `add`.
     """
     with store.transaction():
-        _known(store, sensor)
+        known_sensor(store, sensor)
         if sensor_type is not None:
             store.set_sensor_type(sensor, sensor_type)
         try:
@@ -309,7 +357,7 @@ def withdraw(
         if not text.strip() or not text.isprintable():
             raise SpecificationError(f"the {what} must be printable text, not {text!r}")
     with store.transaction():
-        _known(store, sensor)
+        known_sensor(store, sensor)
         source = _counted_source(store, sensor, name)
         store.withdraw(source.number, date, author, reason)
         source = next(one for one in store.sources(sensor) if one.number == source.number)
@@ -324,7 +372,7 @@ def withdraw(
 
 def sources_of(store: MeasurementStore, sensor: str) -> list[Source]:
     """Return the files of a sensor; raises SpecificationError if there is no such sensor."""
-    _known(store, sensor)
+    known_sensor(store, sensor)
     return store.sources(sensor)
 
 
@@ -359,7 +407,7 @@ def find_version(store: MeasurementStore, sensor: str, number: int | None = None
     SpecificationError
         If the sensor or version does not exist.
     """
-    _known(store, sensor)
+    known_sensor(store, sensor)
     versions = store.versions(sensor)
     if not versions:
         raise SpecificationError(f"{store.path}: sensor {sensor} must have a fitted version, not only measurements")
@@ -414,7 +462,7 @@ def advice_for(
     SpecificationError
         If the sensor has no measurements, or `date` is not after the last of them; as for `bayesian_fit` and `advise`.
     """
-    _known(store, sensor)
+    known_sensor(store, sensor)
     ranges = store.ranges(sensor)
     assert ranges is not None, "a sensor has ranges"
     measurements = as_measurements(store.measurements(sensor), f"{store.path}, sensor {sensor}")
@@ -438,7 +486,7 @@ def health_for(store: MeasurementStore, sensor: str, since: str | None = None) -
     SpecificationError
         If the sensor has no measurements; as for `health_of`.
     """
-    _known(store, sensor)
+    known_sensor(store, sensor)
     ranges = store.ranges(sensor)
     assert ranges is not None, "a sensor has ranges"
     measurements = as_measurements(store.measurements(sensor), f"{store.path}, sensor {sensor}")
@@ -446,7 +494,8 @@ def health_for(store: MeasurementStore, sensor: str, since: str | None = None) -
     return health_of(measurements, store.sensor_type(sensor), rails_of(measurements, ranges[1]).ends, first)
 
 
-def _known(store: MeasurementStore, sensor: str) -> None:
+def known_sensor(store: MeasurementStore, sensor: str) -> None:
+    """Raise SpecificationError if the store has no such sensor."""
     sensors = store.sensors()
     if not sensors:
         raise SpecificationError(f"{store.path} must hold measurements; sosmith calibrate add adds them")
@@ -471,11 +520,16 @@ def _keeps(file: MeasurementFile, *, keep_good: bool) -> bool:
     return bool(file.readings) and (keep_good or not file.refusals)
 
 
+def _measurements_of(file: MeasurementFile) -> Measurements:
+    clearance, voltage, temperature = np.array([reading.values for reading in file.readings]).T
+    days = tuple(datetime.date.fromisoformat(reading.date).toordinal() for reading in file.readings)
+    stated = np.array([reading.uncertainty for reading in file.readings]).T
+    return Measurements(clearance, voltage, temperature, str(file.path), days, stated if stated.any() else None)
+
+
 def _sift(store: MeasurementStore, sensor: str, file: MeasurementFile) -> MeasurementFile:
-    """Reject rows that are already in the store, and every row if two columns are swapped."""
+    """Reject rows that are already in the store."""
     known = {one.reading.key: one for one in store.measurements(sensor)}
-    versions = store.versions(sensor)
-    swapped = _swapped(file, versions[-1]) if versions else ""
     refusals = list(file.refusals)
     readings = []
     for reading in file.readings:
@@ -483,27 +537,10 @@ def _sift(store: MeasurementStore, sensor: str, file: MeasurementFile) -> Measur
             one = known[reading.key]
             where = f"measurement {one.number} ({one.source}, line {one.reading.line}, {one.reading.date})"
             refusals.append(Refusal(reading.line, f"row must be a new measurement, not a duplicate of {where}"))
-        elif swapped:
-            refusals.append(Refusal(reading.line, swapped))
         else:
             readings.append(reading)
     refusals.sort(key=lambda refusal: refusal.line)
     return replace(file, readings=tuple(readings), refusals=tuple(refusals))
-
-
-def _swapped(file: MeasurementFile, version: Version) -> str:
-    """Return a sentence if the file fits `version` only with clearance and voltage exchanged, else an empty string."""
-    if len(file.readings) < SWAPPED_ROWS:
-        return ""
-    clearance, voltage, temperature = np.array([reading.values for reading in file.readings]).T
-    as_it_is = root_mean_square(clearance - version.polynomial(voltage, temperature))
-    exchanged = root_mean_square(voltage - version.polynomial(clearance, temperature))
-    if exchanged >= SWAPPED_FITS * version.rms or as_it_is <= SWAPPED_OFF * version.rms:
-        return ""
-    return (
-        "clearance_mm and voltage_V must be in their own columns, not swapped: the rms residual against "
-        f"version {version.number} is {as_it_is:.3g} mm, with the columns swapped {exchanged:.3g} mm"
-    )
 
 
 @dataclass(frozen=True)
@@ -529,8 +566,11 @@ def _fit(store: MeasurementStore, sensor: str, date: str, settings: _Settings, p
     made = _calibration(store, sensor, stored, date, settings, None, progress)
     if versions:
         newest = versions[-1]
+        last = max(one.reading.date for one in stored)
+        # A Bayesian calibration is for a day, on which its intervals depend.
+        same_day = made.bayesian is None or max(date, last) == max(newest.date, last)
         same = {name: getattr(newest, name) for name in ("number", "date", "drift")}
-        if replace(made.version, **same) == newest:
+        if same_day and replace(made.version, **same) == newest:
             return replace(made, version=newest, new=False, drift={k: made.drift[k] for k in range(1, newest.number)})
     store.insert_version(sensor, made.version)
     return replace(made, new=True)
@@ -585,4 +625,4 @@ def _calibration(
         accept=accept,
         last_withdrawal=store.last_withdrawal(sensor) if again is None else again.last_withdrawal,
     )
-    return Calibration(sensor, version, False, stored, fitted, quality, ranges, drift, made)
+    return Calibration(sensor, version, False, stored, fitted, quality, ranges, drift, date, made)

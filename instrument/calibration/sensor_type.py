@@ -131,6 +131,18 @@ class SensorType:
             ]
         )
 
+    def known_variance(self, voltage: Values, temperature: Values, uncertainty: Values) -> Values:
+        """Return the variance in mm**2 that stated uncertainties leave of a measured clearance; shape (n,).
+
+        `uncertainty`, of shape (3, n), has those of clearance, voltage and temperature in mm, V and degC, 0 where none
+        is stated. The slopes are those of the type curve.
+        """
+        _, c_v, c_t, c_vt, c_vv = self.curve
+        of_voltage = c_v + c_vt * temperature + 2 * c_vv * voltage
+        of_temperature = c_t + c_vt * voltage
+        u_d, u_v, u_t = uncertainty
+        return np.asarray(u_d**2 + (of_voltage * u_v) ** 2 + (of_temperature * u_t) ** 2)
+
     def json(self) -> str:
         """Return the definition as JSON, as the store keeps it."""
         return json.dumps(asdict(self))

@@ -179,7 +179,7 @@ def _predicted(made: BayesianFit) -> CrossValidation | None:
     left_out = np.equal.outer(np.arange(int(fold.max()) + 1), fold).astype(np.float64)
     course = model.course(at, left_out)
     means, covariances = smoothed(course, rows.gaps, model.sensor_type.drifts)
-    noise = at.scatter**2 * (1.0 + at.ratio**2)
+    noise = np.where(rows.known[:, None] > 0, rows.known[:, None], at.scatter**2) + (at.scatter * at.ratio) ** 2
     off, allowed = [], []
     for k in range(days):
         here = made.kept[rows.day[made.kept] == k]
@@ -187,7 +187,7 @@ def _predicted(made: BayesianFit) -> CrossValidation | None:
         mean = product(transposed(a), means[k][:, fold[k]])
         spread = product(covariances[k][:, :, None, fold[k]], a[:, None, :, None])[:, 0]
         centre = at.mean_of(mean)
-        variance = dot(a[..., None], spread) + noise
+        variance = dot(a[..., None], spread) + noise[here]
         off.append(rows.r[here] - centre)
         allowed.append(mixture_half_width(mean - centre[:, None], variance, at.of_intervals, SHARE))
     every = np.concatenate(off)

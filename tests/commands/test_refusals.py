@@ -261,7 +261,8 @@ BAD_MEASUREMENTS: dict[str, tuple[str | bytes, str]] = {
     ),
     "unknown column": (
         HEADER.replace("voltage_V", "voltage_mV"),
-        "data.csv, line 1: column must be one of clearance_mm, voltage_V, temperature_C, not 'voltage_mV'",
+        "data.csv, line 1: column must be one of clearance_mm, voltage_V, temperature_C, date, "
+        "uncertainty_mm, uncertainty_V, uncertainty_C, not 'voltage_mV'",
     ),
     "missing column": (
         "clearance_mm,voltage_V\n1,2\n",

@@ -26,7 +26,7 @@ from sosmith.gen.specification.coefficients.filter_file import read_filter_file
 from sosmith.host.identity_check import check_files
 from sosmith.host.loading import read_set
 from sosmith.instrument.calibration import measurement_store
-from sosmith.instrument.calibration.measurement_files import read_measurement_file
+from sosmith.instrument.calibration.store.measurement_files import read_measurement_file
 from sosmith.instrument.scenarios.file import load_scenario
 from sosmith.instrument.wear.record_file import read_wear_record
 from sosmith.model import foreign_files

@@ -2,9 +2,10 @@
 
 What the paper's section 2.2 asks for: polynomials by rising number of terms, then by rising highest order, then by
 rising order of the temperature; each by least squares; the first whose adjusted coefficient of correlation reaches
-0.975. The measurements are the doubles nearest to the numbers in the file, and each coefficient is the double nearest
-to that of the normal equations' only solution. So the polynomial is determined to the last bit, and must be the
-certificate's.
+0.975. Where the file states uncertainties, squares are weighted: by the smallest squared uncertainty over that of the
+row, as a double; uncertainties of voltage and temperature count by the slopes of the linear fit without weights. The
+measurements are the doubles nearest to the numbers in the file, and each coefficient is the double nearest to that of
+the normal equations' only solution. So the polynomial is determined to the last bit, and must be the certificate's.
 """
 
 from __future__ import annotations
@@ -24,6 +25,10 @@ from sosmith.verify.certificate_file import PortEntry
 from sosmith.verify.graph import RejectedError, require
 
 _COLUMNS = ("clearance_mm", "voltage_V", "temperature_C")
+_UNCERTAINTIES = ("uncertainty_mm", "uncertainty_V", "uncertainty_C")
+_WIDEST = 10**18
+"""Largest ratio of two squared uncertainties."""
+
 _DATE = "date"
 _DAY = re.compile(r"\d{4}-(0[1-9]|1[0-2])-(0[1-9]|[12]\d|3[01])", re.ASCII)
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
@@ -115,8 +120,8 @@ def fitted(content: bytes) -> Refit:
     RejectedError
         If the file cannot be read, or determines no polynomial.
     """
-    rows = _measurements(content)
-    sums = _Sums(rows)
+    rows, stated = _measurements(content)
+    sums = _Sums(rows, _weights(rows, stated))
     total = sums.total
     require(total > 0, "the clearance of the measurements must vary")
     for terms in _candidates():
@@ -141,42 +146,73 @@ def _candidates() -> list[tuple[_Term, ...]]:
     return [terms[order] for order in sorted(orders, key=lambda order: (len(terms[order]), max(order), order[1]))]
 
 
-def _measurements(content: bytes) -> _Rows:
+def _weights(rows: _Rows, stated: _Rows) -> list[Fraction]:
+    """Return the weight of each row; 1 where nothing is stated."""
+    if not any(any(row) for row in stated):
+        return [Fraction(1)] * len(rows)
+    slopes = Fraction(0), Fraction(0)
+    if any(v or t for _, v, t in stated):
+        plain = _Sums(rows, [Fraction(1)] * len(rows))
+        linear = plain.solve(((0, 0), (0, 1), (1, 0)))
+        require(linear is not None, "the measurements must determine a linear polynomial")
+        assert linear is not None, "as was just required"
+        (_, of_temperature), (of_voltage,) = plain.expanded(linear[0])
+        slopes = of_voltage, of_temperature
+    squares = [d**2 + (slopes[0] * v) ** 2 + (slopes[1] * t) ** 2 for d, v, t in stated]
+    least = min(squares)
+    require(least > 0, "uncertainties must be stated in every row or in none")
+    require(max(squares) <= _WIDEST * least, "uncertainties must be within a factor of 1e9 of each other")
+    return [Fraction(float(least / square)) for square in squares]
+
+
+def _measurements(content: bytes) -> tuple[_Rows, _Rows]:
+    """Return clearance, voltage and temperature of each row, and their uncertainties, 0 where none is stated."""
     try:
         reader = csv.reader(io.StringIO(content.decode("utf-8-sig"), newline=""), strict=True)
         lines = [[cell.strip() for cell in cells] for cells in reader if len(cells) > 1 or "".join(cells).strip()]
     except (UnicodeDecodeError, csv.Error):
         raise RejectedError("the measurements must be a CSV file in UTF-8") from None
-    dated = bool(lines) and _DATE in lines[0]
-    columns = (*_COLUMNS, _DATE) if dated else _COLUMNS
+    more = [name for name in (_DATE, *_UNCERTAINTIES) if lines and name in lines[0]]
+    dated, columns = _DATE in more, (*_COLUMNS, *more)
     require(bool(lines) and sorted(lines[0]) == sorted(columns), f"the measurements must be {', '.join(_COLUMNS)}")
     require(len(lines) <= _MOST_ROWS, f"there must be at most {_MOST_ROWS} measurements, not {len(lines) - 1}")
     require(len(lines) > 4, f"there must be at least 4 measurements, not {len(lines) - 1}")
     order = [lines[0].index(name) for name in columns]
     rows: _Rows = []
+    stated: _Rows = []
     days: list[list[str]] = []
     for line in lines[1:]:
         cells = [line[index] for index in order] if len(line) == len(order) else []
         require(
             bool(cells)
             and all(_NUMBER.fullmatch(cell) for cell in cells[: len(_COLUMNS)])
-            and all(_DAY.fullmatch(cell) for cell in cells[len(_COLUMNS) :]),
+            and all(_DAY.fullmatch(cell) for cell in cells[len(_COLUMNS) : len(_COLUMNS) + dated])
+            and all(not cell or _NUMBER.fullmatch(cell) for cell in cells[len(_COLUMNS) + dated :]),
             f"a measurement must be {len(_COLUMNS)} numbers{' and a date' * dated}, not {','.join(line)[:60]!r}",
         )
         values = [float(cell) for cell in cells[: len(_COLUMNS)]]
         require(all(map(math.isfinite, values)), "a measurement must be finite")
         clearance, voltage, temperature = map(Fraction, values)
         rows.append((clearance, voltage, temperature))
-        days.append(cells[len(_COLUMNS) :])
+        days.append(cells[len(_COLUMNS) : len(_COLUMNS) + dated])
+        given = {
+            name: float(cell) for name, cell in zip(columns, cells, strict=True) if name in _UNCERTAINTIES and cell
+        }
+        require(all(0 < value < math.inf for value in given.values()), "an uncertainty must be more than 0, and finite")
+        of_clearance, of_voltage, of_temperature = (Fraction(given.get(name, 0.0)) for name in _UNCERTAINTIES)
+        stated.append((of_clearance, of_voltage, of_temperature))
     own = {(*row, *day) for row, day in zip(rows, days, strict=True)}
     require(len(own) == len(rows), "each measurement must be there once")
-    return rows
+    return rows, stated
 
 
 class _Sums:
-    """Exact sums over the measurements, as integers; voltage and temperature count from the middle of their range."""
+    """Exact sums over the measurements, as integers; voltage and temperature count from the middle of their range.
 
-    def __init__(self, rows: _Rows) -> None:
+    Weights are doubles from 0 to 1; all sums are times their common denominator.
+    """
+
+    def __init__(self, rows: _Rows, weights: Sequence[Fraction]) -> None:
         columns = list(zip(*rows, strict=True))
         self._centres = [Fraction(0), *((min(column) + max(column)) / 2 for column in columns[1:])]
         self._units: list[int] = []
@@ -190,7 +226,8 @@ class _Sums:
                 max(map(abs, self._columns[-1])).bit_length() <= _MOST_BITS,
                 "the measurements must be of a size that was measured",
             )
-        self._powers: dict[_Term, list[int]] = {(0, 0): [1] * len(rows)}
+        finest = max(weight.denominator for weight in weights)
+        self._powers: dict[_Term, list[int]] = {(0, 0): [int(weight * finest) for weight in weights]}
         self._moments: dict[tuple[int, _Term], int] = {}
 
     def _product(self, term: _Term) -> list[int]:

@@ -164,7 +164,7 @@ class Course:
     @cached_property
     def days(self) -> list[Day]:
         """The information of each day over the grid."""
-        found: Information = self.sums.information(self.ratios**2)
+        found: Information = self.sums.information(self.ratios**2, np.ones(len(self.ratios)))
         squared = (self.scatters**2)[:, None]
         roots = np.log(found.root.mantissa) + found.root.exponent * math.log(2.0)
         return [

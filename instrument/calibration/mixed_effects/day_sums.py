@@ -38,6 +38,9 @@ class DaySums:
         Systematic curves with deviations, with residuals, and with systematic curves.
     count : ndarray, shape (days,)
         Number of measurements.
+    known : DaySums or None
+        Sums over the measurements whose variance is known, each divided by it; these are in no other sum. None if there
+        are none.
     """
 
     aa: Values
@@ -47,6 +50,7 @@ class DaySums:
     hr: Values
     hh: Values
     count: Values
+    known: DaySums | None = None
 
     @classmethod
     def of(cls, a: Values, h: Values, r: Values, weights: Values, day: npt.NDArray[np.int64], days: int) -> DaySums:
@@ -69,31 +73,44 @@ class DaySums:
             count=sums[last, last],
         )
 
-    def information(self, rho: Values) -> Information:
-        """Eliminate the systematic error for each ratio in `rho`, shape (ratios,), 0 or more."""
+    def _all(self, name: str, squared: Values) -> Values:
+        """Return a sum over all measurements, times the squared scatter for each in `squared`, the last axis."""
+        own: Values = getattr(self, name)[..., None]
+        return own if self.known is None else own + getattr(self.known, name)[..., None] * squared
+
+    def information(self, rho: Values, squared: Values) -> Information:
+        """Eliminate the systematic error for each ratio in `rho`, shape (ratios,), 0 or more.
+
+        `squared`, of the same shape, are the squared scatters in mm**2 to go with them; without measurements of known
+        variance they do not matter.
+        """
         m = len(self.hh)
-        lower = cholesky(identity(m, (len(self.rr), len(rho))) + self.hh[..., None] * rho)
-        of_a, of_r = solved(lower, self.ha[..., None]), solved(lower, self.hr[:, None, :, None])
+        lower = cholesky(identity(m, (len(self.rr), len(rho))) + self._all("hh", squared) * rho)
+        of_a, of_r = solved(lower, self._all("ha", squared)), solved(lower, self._all("hr", squared)[:, None])
         diagonal = np.stack([lower[k, k] for k in range(m)])
         mantissa, exponent = np.ones(diagonal.shape[1:]), np.zeros(diagonal.shape[1:])
         for pivot in diagonal:
             mantissa, more = np.frexp(mantissa * pivot)
             exponent = exponent + more
         return Information(
-            j=self.aa[..., None] - rho * product(transposed(of_a), of_a),
-            h=self.ar[..., None] - rho * applied(transposed(of_a), of_r[:, 0]),
-            q=self.rr[..., None] - rho * dot(of_r[:, 0], of_r[:, 0]),
+            j=self._all("aa", squared) - rho * product(transposed(of_a), of_a),
+            h=self._all("ar", squared) - rho * applied(transposed(of_a), of_r[:, 0]),
+            q=self._all("rr", squared) - rho * dot(of_r[:, 0], of_r[:, 0]),
             root=Scaled(mantissa, exponent),
         )
 
-    def fisher(self, rho: Values) -> Values:
+    def fisher(self, rho: Values, squared: Values) -> Values:
         """Return how much the measurements can tell of both standard deviations, for each ratio; shape (ratios,).
+
+        `squared` as in `information`. Measurements of known variance tell of the systematic error only.
 
         It is the determinant of Fisher's information about their logarithms, the deviations being known, divided by 4.
         With the eigenvalues w of ``rho H H' / C``, from 0 for what is all scatter to 1 for what is all systematic, the
         information is ``2 sum w**2`` of the systematic error, ``2 sum (1 - w)**2`` of the scatter, and
         ``2 sum w (1 - w)`` of both, summed over the measurements. 0 without a systematic error.
         """
+        if self.known is not None:
+            return self._fisher_with_known(rho, squared)
         lower = cholesky(identity(len(self.hh), (len(self.rr), len(rho))) + self.hh[..., None] * rho)
         shares = solved(lower, transposed(solved(lower, self.hh[..., None] * rho)))
         of_day, squared = np.zeros(shares.shape[2:]), np.zeros(shares.shape[2:])
@@ -105,24 +122,54 @@ class DaySums:
             first, second, count = first + of_day[day], second + squared[day], count + float(self.count[day])
         return np.asarray(second * (count - 2.0 * first + second) - (first - second) ** 2)
 
+    def _fisher_with_known(self, rho: Values, squared: Values) -> Values:
+        """Return the same where some variances are known: with G the inverse of ``I + rho H' W H``, W being weights.
+
+        The eigenvalues of the systematic error's share are those of ``rho H' W H G``; of those measurements that
+        scatter, ``rho H' H G``. ``rho tr(G' H' H G)`` couples both.
+        """
+        m = len(self.hh)
+        stack = (len(self.rr), len(rho))
+        every = self._all("hh", squared) * rho
+        lower = cholesky(identity(m, stack) + every)
+        inverse = solved_transposed(lower, solved(lower, identity(m, stack)))
+        systematic = product(every, inverse)
+        own = product(self.hh[..., None] * rho, inverse)
+        coupled = product(transposed(inverse), own)
+        trace = [np.zeros(stack) for _ in range(4)]
+        for k in range(m):
+            trace[0] = trace[0] + own[k, k]
+            trace[1] = trace[1] + dot(own[k], own[:, k])
+            trace[2] = trace[2] + dot(systematic[k], systematic[:, k])
+            trace[3] = trace[3] + coupled[k, k]
+        first, second, of_day, both = (np.zeros(len(rho)) for _ in range(4))
+        count = 0.0
+        for day in range(len(self.rr)):
+            first, second = first + trace[0][day], second + trace[1][day]
+            of_day, both = of_day + trace[2][day], both + trace[3][day]
+            count += float(self.count[day])
+        return np.asarray(of_day * (count - 2.0 * first + second) - both**2)
+
     def only(self, day: int) -> DaySums:
         """Return the sums of one day, with an axis of length 1 for the day."""
         at = slice(day, day + 1)
-        return DaySums(*(getattr(self, field.name)[..., at] for field in fields(self)))
+        own = {field.name: getattr(self, field.name)[..., at] for field in fields(self) if field.name != "known"}
+        return DaySums(**own, known=None if self.known is None else self.known.only(day))
 
-    def day_curves(self, rho: Values) -> tuple[Values, Values, Values]:
+    def day_curves(self, rho: Values, squared: Values) -> tuple[Values, Values, Values]:
         """Return what the weights w of each day's systematic curves are, given the deviations z.
 
         For each ratio: ``w = offset - slope z`` on average, and L with the covariance ``scatter**2 rho L' L``.
         Shapes (m, days, ratios), (m, 5, days, ratios) and (m, m, days, ratios).
         """
         m, stack = len(self.hh), (len(self.rr), len(rho))
-        lower = cholesky(identity(m, stack) + self.hh[..., None] * rho)
+        lower = cholesky(identity(m, stack) + self._all("hh", squared) * rho)
 
         def divided(b: Values) -> Values:
             return rho * solved_transposed(lower, solved(lower, b))
 
-        return divided(self.hr[:, None, :, None])[:, 0], divided(self.ha[..., None]), solved(lower, identity(m, stack))
+        of_r, of_a = divided(self._all("hr", squared)[:, None])[:, 0], divided(self._all("ha", squared))
+        return of_r, of_a, solved(lower, identity(m, stack))
 
 
 @dataclass(frozen=True, eq=False)

@@ -71,6 +71,8 @@ class Rows:
         Index of the day in `days`.
     days : tuple of int
         Ordinals of the days with measurements, rising.
+    known : ndarray, shape (n,)
+        Variance of a measurement in mm**2 where it is known, else 0: it scatters like the others.
     """
 
     a: Values
@@ -78,6 +80,7 @@ class Rows:
     r: Values
     day: Index
     days: tuple[int, ...]
+    known: Values
 
     @property
     def gaps(self) -> list[int]:
@@ -101,6 +104,9 @@ def rows_of(measurements: Measurements, sensor_type: SensorType, date: int = 0) 
         r=d - sensor_type.polynomial()(V, T),
         day=day,
         days=tuple(own_days.tolist()),
+        known=np.zeros(len(d))
+        if measurements.uncertainty is None
+        else sensor_type.known_variance(V, T, measurements.uncertainty[:, order]),
     )
     return rows, order
 
@@ -152,7 +158,12 @@ class Model:
     @classmethod
     def of(cls, sensor_type: SensorType, rows: Rows, weights: Values) -> Model:
         """Sum over the measurements."""
-        return cls(sensor_type, rows, DaySums.of(rows.a, rows.h, rows.r, weights, rows.day, len(rows.days)))
+        is_known, days = rows.known > 0, len(rows.days)
+        own = DaySums.of(rows.a, rows.h, rows.r, np.where(is_known, 0.0, weights), rows.day, days)
+        if is_known.any():
+            weights = np.where(is_known, weights, 0.0) / np.where(is_known, rows.known, 1.0)
+            own = replace(own, known=DaySums.of(rows.a, rows.h, rows.r, weights, rows.day, days))
+        return cls(sensor_type, rows, own)
 
     def scatters(self) -> Scatters:
         """Return the pairs of scatters that the measurements leave possible: a coarse grid, then a fine one there."""
@@ -160,36 +171,63 @@ class Model:
         likely = coarse.weight > 0
         return self.weighed(_refined(coarse.scatter[likely], SCATTERS), _refined(coarse.ratio[likely], RATIOS))
 
+    @property
+    def drifts(self) -> tuple[float, ...]:
+        """Variance added in a day to each deviation; what there is beside those of the type stays as it is."""
+        known = self.sensor_type.drifts
+        return (*known, *(0.0 for _ in range(len(self.rows.a) - len(known))))
+
     def weighed(self, scatters: Values, ratios: Values) -> Scatters:
         """Return the pairs on a grid that are not `NEGLIGIBLE`."""
-        information = self.sums.information(ratios**2)
+        logarithms = self._logarithms(scatters, ratios)
+        weight = of_intervals = _probabilities(logarithms)
+        squared, rho = self._pairs(scatters, ratios)
+        told = self.sums.fisher(rho, squared).tolist()
+        if all(one > 0 for one in told):  # else there is no systematic error to be told
+            jeffreys = [Decimal(one).ln() / 2 for one in told] * (len(logarithms) // len(told))
+            of_intervals = _probabilities([a + b for a, b in zip(logarithms, jeffreys, strict=True)])
+        kept = np.flatnonzero(weight + of_intervals)
+        return Scatters(scatters[kept // len(ratios)], ratios[kept % len(ratios)], weight[kept], of_intervals[kept])
+
+    def evidence(self, scatters: Values, ratios: Values) -> float:
+        """Return the logarithm of the probability of the measurements over a grid, up to a constant of the grid."""
+        return float(special.logsumexp([float(one) for one in self._logarithms(scatters, ratios)]))
+
+    def _logarithms(self, scatters: Values, ratios: Values) -> list[Decimal]:
+        """Return the logarithm of the posterior at each point of a grid, up to a constant; ratios vary fastest."""
+        of_pairs, rho = self._pairs(scatters, ratios)
+        information = self.sums.information(rho, of_pairs)
         stack = (len(scatters), len(ratios))
         squared = (scatters**2)[:, None]
         days = []
-        of_days = Scaled(np.ones(len(ratios)), np.zeros(len(ratios)))
+        of_days = Scaled(np.ones(len(rho)), np.zeros(len(rho)))
         for k in range(len(self.rows.days)):
-            j, h, q = (values[..., k, None, :] / squared for values in (information.j, information.h, information.q))
+            at_day = (values[..., k, :] for values in (information.j, information.h, information.q))
+            j, h, q = (values.reshape(*values.shape[:-1], -1, len(ratios)) / squared for values in at_day)
             days.append((j, h, q))
             of_days = Scaled(of_days.mantissa, of_days.exponent + information.root.exponent[k])
             of_days = of_days.times(information.root.mantissa[k])
-        found = course(days, self.rows.gaps, self.sensor_type.drifts, stack)
+        found = course(days, self.rows.gaps, self.drifts, stack)
         count = int(self.sums.count.sum())
-        logarithms = [
-            -Decimal(quadratic) / 2 - root - of_day - count * Decimal(scatter).ln() + self._expected(scatter * ratio)
-            for (scatter, (ratio, of_day)), quadratic, root in zip(
-                itertools.product(scatters.tolist(), zip(ratios.tolist(), of_days.logarithm(), strict=True)),
+        of_day = of_days.logarithm() * (len(scatters) * len(ratios) // len(rho))
+        return [
+            -Decimal(quadratic) / 2 - root - day - count * Decimal(scatter).ln() + self._expected(scatter * ratio)
+            for (scatter, ratio), day, quadratic, root in zip(
+                itertools.product(scatters.tolist(), ratios.tolist()),
+                of_day,
                 found.quadratic.ravel().tolist(),
                 found.root.logarithm(),
                 strict=True,
             )
         ]
-        weight = of_intervals = _probabilities(logarithms)
-        told = self.sums.fisher(ratios**2).tolist()
-        if all(one > 0 for one in told):  # else there is no systematic error to be told
-            jeffreys = [Decimal(one).ln() / 2 for one in told]
-            of_intervals = _probabilities([a + b for a, b in zip(logarithms, jeffreys * len(scatters), strict=True)])
-        kept = np.flatnonzero(weight + of_intervals)
-        return Scatters(scatters[kept // len(ratios)], ratios[kept % len(ratios)], weight[kept], of_intervals[kept])
+
+    def _pairs(self, scatters: Values, ratios: Values) -> tuple[Values, Values]:
+        """Return the squared scatters and ratios of a grid for which the days' sums differ; ratios vary fastest.
+
+        Without measurements of known variance, the ratio alone decides: one scatter stands for all.
+        """
+        which = scatters if self.sums.known is not None else np.ones(1)
+        return np.repeat(which**2, len(ratios)), np.tile(ratios**2, len(which))
 
     def _expected(self, systematic: float) -> Decimal:
         """Return the logarithm of the prior of the systematic error, up to a constant; the smallest stands for none."""
@@ -216,14 +254,14 @@ class Model:
 
     def information(self, at: Scatters) -> Information:
         """Return the information of the days for pairs of scatters, the last axis."""
-        made = self.sums.information(at.ratio**2)
+        made = self.sums.information(at.ratio**2, at.scatter**2)
         return replace(made, j=made.j / at.scatter**2, h=made.h / at.scatter**2, q=made.q / at.scatter**2)
 
     def residuals(self, at: Scatters) -> Values:
         """Return the residuals from the curve of each day, with its systematic error, for one pair of scatters."""
         means, _ = smoothed(self.course(at), self.rows.gaps, self.sensor_type.drifts)
         z = np.concatenate(means, axis=1)
-        offset, slope, _ = self.sums.day_curves(at.ratio**2)
+        offset, slope, _ = self.sums.day_curves(at.ratio**2, at.scatter**2)
         weights = offset[..., 0] - applied(slope[..., 0], z)
         day = self.rows.day
         return self.rows.r - dot(self.rows.a, z[:, day]) - dot(self.rows.h, weights[:, day])
@@ -234,7 +272,7 @@ class Model:
         gap = date - self.rows.days[-1]
         offset = slope = factor = None
         if not gap:
-            curves_of_day = self.sums.only(len(self.rows.days) - 1).day_curves(at.ratio**2)
+            curves_of_day = self.sums.only(len(self.rows.days) - 1).day_curves(at.ratio**2, at.scatter**2)
             offset, slope, factor = (values[..., 0, :] for values in curves_of_day)
         return Posterior(
             sensor_type=self.sensor_type,

@@ -96,7 +96,7 @@ def check_vectors(path: str | PathLike[str]) -> None:
 
 def check_date(text: str) -> None:
     """Refuse what is no date of the form ``YYYY-MM-DD``, with a SpecificationError."""
-    from sosmith.instrument.calibration.measurement_files import parse_date
+    from sosmith.instrument.calibration.store.measurement_files import parse_date
 
     parse_date(text)
 

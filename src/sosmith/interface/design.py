@@ -659,7 +659,7 @@ class Design:
         """
         # The simulation modules are slow to import; a design that only computes does not need them.
         from sosmith.gen.output.vectors import check_format, result_rate
-        from sosmith.instrument.calibration.measurement_files import parse_date
+        from sosmith.instrument.calibration.store.measurement_files import parse_date
         from sosmith.instrument.uncertainty.instrument_budget import budget_in_json
         from sosmith.interface.report import Report
         from sosmith.sim.simulation import simulate

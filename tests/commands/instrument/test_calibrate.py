@@ -71,6 +71,96 @@ def test_add_as_json() -> None:
     assert len(made["largest_residuals"]) == 5
 
 
+def test_add_tells_the_shift_and_a_step_of_the_voltage() -> None:
+    first = good("add", "a.csv", *DAY)
+    assert "health   no alarm; the first day, held against nothing" in first.stdout
+    assert "reads differently by" not in first.stdout
+    write_csv(Path("b.csv"), [(d, round(V - 1, 4), T) for d, V, T in readings(60, seed=2) if V > 1.1])
+    second = good("add", "b.csv", "--date", "2024-03-08")
+    shown = re.sub(r"\s+", " ", second.stdout)
+    assert re.search(
+        r"reads differently by -0\.\d+ mm; the sensor reads 0\.\d+ mm less than by version 1 of 2024-03-01, ±0\.\d+ mm",
+        shown,
+    )
+    assert re.search(
+        r"^sosmith: warning: 2024-03-08: the offset stepped up; .* among the explanations\)$", second.stderr, re.M
+    )
+    as_json = json.loads(good("add", "a.csv", "--sensor", "right", *DAY, "--json").stdout)
+    assert (as_json["shift"], as_json["alarms"], as_json["warnings"]) == (None, 0, [])
+    as_json = json.loads(good("add", "b.csv", "--sensor", "right", "--date", "2024-03-08", "--json").stdout)
+    assert -1.2 < as_json["shift"]["reads_more_by_mm"] < -0.6
+    assert as_json["shift"]["from_version"] == 1
+    assert as_json["alarms"] >= 1
+    assert "the offset stepped up" in as_json["warnings"][0]
+
+
+def test_inches_are_refused_unless_they_are_said_to_be_right() -> None:
+    write_csv(Path("a.csv"), [(d / 25.4, V, T) for d, V, T in readings(60)])
+    result = run("add", "a.csv", *DAY)
+    assert isinstance(result.exception, SpecificationError)
+    assert re.fullmatch(
+        r"a\.csv: clearance_mm must be in millimetres, not in inches: the rms residual against the type equation_5a is "
+        r"\d\.\d+ mm as it is, and 0\.\d+ mm with that undone; --surprising stores them as they are",
+        str(result.exception),
+    )
+    assert not Path("calibration.db").exists()
+    assert "stored 60 measurements" in run("add", "a.csv", "--surprising", *DAY).stderr
+
+
+def test_a_day_far_from_the_measurements_is_warned_of() -> None:
+    good("add", "a.csv", *DAY)
+    assert "warning" not in good("fit", "--date", "2024-08-20").stderr
+    fitted = good("fit", "--date", "2030-03-01")
+    assert "version 3 of 2030-03-01: new" in fitted.stdout  # the intervals are others, if not the polynomial
+    far = good("fit", "--date", "2030-03-01").stderr
+    assert (
+        "sosmith: warning: 2030-03-01 is 6.0 years after the last measurement, of 2024-03-01: the intervals assume a "
+        "drift of 0.47 V and 4.7 % of the gain since then, as standard deviations\n"
+    ) in far
+    before = good("fit", "--date", "2024-02-01").stderr
+    assert "sosmith: warning: 2024-02-01 is before the last measurement: the calibration is for 2024-03-01\n" in before
+
+
+def test_one_temperature_is_enough_for_a_sensor_of_a_known_type() -> None:
+    write_csv(
+        Path("a.csv"),
+        [(round(float(EQUATION_5A(np.array(V), np.array(20.0))), 3), V, 20.0) for _, V, _ in readings(30)],
+    )
+    shown = good("add", "a.csv", *DAY).stdout
+    assert re.search(r"coverage of the range +0\.0 % lies between measurements", shown)
+    assert len(re.findall(r"^  20   ", shown, re.M)) == 1
+    for command in ("export", "plot", "health"):
+        good(command)
+    assert "1 of 1" in good("history", "--verify").stderr
+
+
+def test_reference_targets_by_hand_and_from_a_file() -> None:
+    good("add", "a.csv", *DAY)
+    by_hand = ("--reading", "2.2", "2", "25", "--reading", "4.6", "5", "25", "--reading", "8.1", "8", "25")
+    shown = good("reference", *by_hand, "--date", "2024-03-02").stdout
+    assert "Sensor sensor, 2024-03-02: 3 targets, lengths in mm" in shown
+    assert re.search(r"^  2\.2 +0\.02 +2 +25 +[+-]0\.\d{3} +0\.\d+ +[+-]0\.0\d\d +0\.\d+$", shown, re.M)
+    for title in ("Curve of the day, version 2, mm", "95 % interval of a reading, ± mm"):
+        assert title in shown
+    Path("gauges.csv").write_text(
+        "clearance_mm,voltage_V,temperature_C,uncertainty_mm\n2.2,2.01,25,0.01\n4.6,5.01,25,\n8.1,8.01,25,0.03\n"
+    )
+    made = json.loads(
+        good("reference", "gauges.csv", "--uncertainty", "0.05mm", "--date", "2024-03-03", "--json").stdout
+    )
+    assert [one["uncertainty_mm"] for one in made["targets"]] == [0.01, 0.05, 0.03]
+    assert all(one["now_half_width_mm"] < one["before_half_width_mm"] for one in made["targets"])
+    assert made["calibration"]["version"] == 3
+    good("export", "--format", "csv", "-o", "out.csv")
+    assert Path("out.csv").read_text().splitlines()[-3:] == [
+        "2.2,2.01,25.0,2024-03-03,0.01,,",
+        "4.6,5.01,25.0,2024-03-03,0.05,,",
+        "8.1,8.01,25.0,2024-03-03,0.03,,",
+    ]
+    for arguments in (("reference", *DAY), ("reference", "gauges.csv", *by_hand, *DAY)):
+        refused("targets must be given by a file or by --reading, one of both", *arguments)
+
+
 def test_bad_rows_are_listed_and_only_kept_out_on_request() -> None:
     with Path("a.csv").open("a") as file:
         file.write("1,2 V,20\n" + "1,2,300\n" * 25)
@@ -401,7 +491,7 @@ def test_an_unknown_sensor_is_told_which_there_are() -> None:
 
 def test_help_shows_every_command_and_its_options() -> None:
     assert list(calibrate.commands) == [
-        *("add", "fit", "files", "withdraw", "history", "export", "plot", "advise", "health")
+        *("add", "reference", "fit", "files", "withdraw", "history", "export", "plot", "advise", "health")
     ]
     for command in calibrate.commands:
         shown = good(command, "--help").stdout

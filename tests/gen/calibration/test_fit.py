@@ -189,7 +189,8 @@ def test_read_measurements(tmp_path: Path) -> None:
         ),
         (
             "clearance,voltage_V,temperature_C\n1,2,3\n",
-            ", line 1: column must be one of clearance_mm, voltage_V, temperature_C, date, not 'clearance'",
+            ", line 1: column must be one of clearance_mm, voltage_V, temperature_C, date, "
+            "uncertainty_mm, uncertainty_V, uncertainty_C, not 'clearance'",
         ),
     ],
 )

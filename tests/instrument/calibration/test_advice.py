@@ -37,6 +37,7 @@ def test_the_promise_is_the_posterior_after_measuring_so(made: BayesianFit) -> N
         r=np.concatenate((old.r, np.zeros(len(points)))),
         day=np.concatenate((old.day, np.full(len(points), len(old.days)))),
         days=(*old.days, old.days[-1] + 3),
+        known=np.zeros(len(old.r) + len(points)),
     )
     weights = np.concatenate((np.array(made.fit.weights)[made.order], np.ones(len(points))))
     after = Model.of(TYPE, rows, weights).posterior(

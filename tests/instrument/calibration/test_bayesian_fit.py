@@ -1,5 +1,6 @@
 """The Bayesian calibration: what it finds, what it leaves out, what it refuses."""
 
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -8,7 +9,11 @@ from tests.instrument.calibration.bayesian import FIRST, RANGES, TRUE, TYPE, fit
 
 from sosmith.gen.calibration.fit import Measurements
 from sosmith.instrument.calibration.bayesian_fit import bayesian_fit, lowest_slope, stays_within
+from sosmith.instrument.calibration.coefficient_covariance import columns, of_bayes
 from sosmith.instrument.calibration.covered_region import CoveredRegion
+from sosmith.instrument.calibration.fit_quality import assess_posterior
+from sosmith.instrument.calibration.rails import rails_of
+from sosmith.instrument.calibration.uncertainty import of_posterior
 from sosmith.model.errors import SpecificationError
 from sosmith.model.polynomial import EQUATION_5A, Polynomial
 
@@ -126,3 +131,32 @@ def test_the_lowest_slope_is_at_a_corner() -> None:
 def test_days_must_be_as_many_as_measurements() -> None:
     with pytest.raises(ValueError, match=r"^days must be of length 3, not 2$"):
         Measurements(np.ones(3), np.ones(3), np.ones(3), "m.csv", (1, 2))
+
+
+def test_measurements_of_one_temperature_are_fitted_by_the_prior() -> None:
+    """What the temperature does is known from the type only: intervals are wide away from it."""
+    made = measured(2, 30, scatter=0.02)
+    cold = replace(made, temperature=np.full(60, 20.0), clearance=TRUE(made.voltage, np.full(60, 20.0)))
+    found = fitted(cold)
+    V = np.array([2.0, 5.0, 8.0])
+    at, beyond = (np.full(3, T) for T in (20.0, 90.0))
+    assert found.fit.polynomial(V, at) == pytest.approx(TRUE(V, at), abs=0.02)
+    worth = of_posterior(cold, found)
+    assert np.all(worth.half_width(V, beyond) > 5 * worth.half_width(V, at))
+    assert np.all(np.abs(found.fit.polynomial(V, beyond) - TRUE(V, beyond)) < worth.half_width(V, beyond))
+    assert assess_posterior(cold, found).filled_cells > 0.05
+    exported = of_bayes(cold, found)
+    V, T = np.full(1, 5.0), np.full(1, 25.0)
+    x = columns(exported.lengths, V, T)
+    assert float(x[:, 0] @ exported.covariance @ x[:, 0]) ** 0.5 > 0.01
+    with pytest.raises(SpecificationError, match=r"^m\.csv: voltage_V must vary, not be 5\.0 in every row$"):
+        fitted(replace(made, voltage=np.full(60, 5.0)))
+
+
+def test_a_rail_is_found_at_one_temperature() -> None:
+    made = measured(2, 30, scatter=0.02)
+    T = np.full(60, 20.0)
+    V = np.minimum(made.voltage, 6.0)
+    scatter = 0.02 * (-1.0) ** np.arange(60)
+    railed = replace(made, temperature=T, voltage=V, clearance=TRUE(made.voltage, T) + scatter)
+    assert rails_of(railed, RANGES[1]).ends == (0.0, 6.0)

@@ -19,12 +19,16 @@ TYPE = SENSOR_TYPES["equation_5a"]
 DAYS = (100, 101, 104, 120)
 PER_DAY = (6, 1, 9, 4)
 SCATTER, RATIO = 0.3, 0.6
+KNOWN = 0.2
 
 
 class Case:
-    """A few days of random measurements, and what a dense Gaussian model says about them."""
+    """A few days of random measurements, and what a dense Gaussian model says about them.
 
-    def __init__(self) -> None:
+    With `references`, the variance of every third one is known.
+    """
+
+    def __init__(self, *, references: bool) -> None:
         generator = np.random.default_rng(3)
         self.day = np.repeat(np.arange(len(DAYS)), PER_DAY)
         count = len(self.day)
@@ -37,6 +41,7 @@ class Case:
             r=clearance + generator.normal(0, SCATTER, count) - TYPE.polynomial()(self.V, self.T),
             day=self.day,
             days=DAYS,
+            known=KNOWN**2 * references * (np.arange(count) % 3 == 0),
         )
         self.model = Model.of(TYPE, self.rows, np.ones(count))
         self.one = Scatters(np.array([SCATTER]), np.array([RATIO]), np.ones(1), np.ones(1))
@@ -52,12 +57,16 @@ class Case:
         days = np.array(DAYS)[self.day]
         same = np.equal.outer(self.day, self.day)
         drifting = np.einsum("in,inm,im->nm", a, self.walk(days, days), a)
-        return np.asarray(drifting + (scatter * ratio) ** 2 * (h.T @ h) * same + scatter**2 * np.eye(len(days)))
+        return np.asarray(drifting + (scatter * ratio) ** 2 * (h.T @ h) * same + self.noise(scatter))
+
+    def noise(self, scatter: float) -> Values:
+        """Dense covariance of what is each measurement's own."""
+        return np.diag(np.where(self.rows.known > 0, self.rows.known, scatter**2))
 
 
-@pytest.fixture(scope="module")
-def case() -> Case:
-    return Case()
+@pytest.fixture(scope="module", params=[False, True], ids=["scatter", "references"])
+def case(request: pytest.FixtureRequest) -> Case:
+    return Case(references=request.param)
 
 
 @pytest.mark.parametrize("date", [DAYS[-1], DAYS[-1] + 10])
@@ -101,15 +110,15 @@ def test_intervals_are_weighted_with_jeffreys_prior(case: Case) -> None:
     for scatter, ratio in zip(found.scatter, found.ratio, strict=True):
         same = np.equal.outer(case.day, case.day)
         by_logarithm = (
-            2 * scatter**2 * np.eye(len(case.day)),
+            2 * scatter**2 * np.diag(case.rows.known == 0),
             2 * (scatter * ratio) ** 2 * (case.rows.h.T @ case.rows.h) * same,
         )
-        inverse = np.linalg.inv(sum(by_logarithm) / 2)
+        inverse = np.linalg.inv(by_logarithm[1] / 2 + case.noise(scatter))
         fisher = [[np.trace(inverse @ a @ inverse @ b) / 2 for a in by_logarithm] for b in by_logarithm]
         roots.append(math.sqrt(np.linalg.det(fisher)))
     expected = found.weight * roots
     assert len(expected) > 4
-    assert np.ptp(roots) > 0.5 * max(roots)
+    assert np.ptp(roots) > (0.5 if not case.rows.known.any() else 0.3) * max(roots)
     assert found.of_intervals == pytest.approx(expected / expected.sum(), rel=1e-9)
 
 
@@ -132,7 +141,7 @@ def test_intervals_hold_their_share_for_a_sensor_worse_than_its_type() -> None:
         deviations = np.cumsum(steps, axis=0)
         weights = DAY_ERROR * generator.normal(size=(days, curves.count))
         r = np.sum(a.T * deviations[day], axis=1) + np.sum(h.T * weights[day], axis=1)
-        rows = Rows(a, h, r + generator.normal(0.0, 0.45, len(r)), day, tuple(range(days)))
+        rows = Rows(a, h, r + generator.normal(0.0, 0.45, len(r)), day, tuple(range(days)), np.zeros(len(r)))
         model = Model.of(TYPE, rows, np.ones(len(r)))
         posterior = model.posterior(model.scatters(), curves, days)
         centre = posterior.curve(V_now, T_now)
@@ -143,7 +152,7 @@ def test_intervals_hold_their_share_for_a_sensor_worse_than_its_type() -> None:
 
 
 def test_residuals_are_those_of_the_smoothed_days(case: Case) -> None:
-    signal = case.covariance(SCATTER, RATIO) - SCATTER**2 * np.eye(len(case.day))
+    signal = case.covariance(SCATTER, RATIO) - case.noise(SCATTER)
     expected = case.rows.r - signal @ np.linalg.solve(case.covariance(SCATTER, RATIO), case.rows.r)
     assert case.model.residuals(case.one) == pytest.approx(expected, rel=1e-8, abs=1e-12)
 
@@ -162,7 +171,8 @@ def test_the_fine_grid_finds_the_scatter() -> None:
     count, scatter = 4000, 0.137
     V, T = generator.uniform(0.5, 9.5, count), generator.uniform(20.0, 98.0, count)
     day = np.repeat(np.arange(40), count // 40)
-    rows = Rows(TYPE.columns(V, T), np.zeros((1, count)), generator.normal(0, scatter, count), day, tuple(range(40)))
+    r, known = generator.normal(0, scatter, count), np.zeros(count)
+    rows = Rows(TYPE.columns(V, T), np.zeros((1, count)), r, day, tuple(range(40)), known)
     found = Model.of(TYPE, rows, np.ones(count)).scatters()
     assert found.mean_of(found.scatter) == pytest.approx(scatter, rel=0.03)
 

@@ -9,7 +9,7 @@ import pytest
 from tests.instrument.scenarios.scenario_texts import CALIBRATION, PLAIN
 
 from sosmith.gen.calibration.fit import fit, read_measurements
-from sosmith.instrument.calibration.measurement_files import read_measurement_file
+from sosmith.instrument.calibration.store.measurement_files import read_measurement_file
 from sosmith.instrument.scenarios.depot_measurements import DepotMeasurement, measurements_csv, measurements_of
 from sosmith.instrument.scenarios.file import load_scenario
 from sosmith.instrument.sensors.inductive_sensor import sensor_voltage

@@ -10,6 +10,7 @@ import pytest
 from tests.gen.designs import EXAMPLES
 
 from sosmith.gen.calibration.fit import fit, read_measurements
+from sosmith.model.errors import SpecificationError
 from sosmith.model.polynomial import EQUATION_5A
 from sosmith.verify.certificate_file import PortEntry
 from sosmith.verify.graph import RejectedError
@@ -93,6 +94,65 @@ def test_the_same_reading_of_another_day_counts_again(tmp_path: Path) -> None:
     path.write_text(path.read_text().replace("2024-03-02", "2.3.2024"))
     with pytest.raises(RejectedError, match=r"^a measurement must be 3 numbers and a date, not '2\.3\.2024,.*'$"):
         fitted(path.read_bytes())
+
+
+def with_uncertainties(path: Path, columns: str, seed: int) -> Path:
+    """State uncertainties in every row; the first column is of the clearance."""
+    rng = np.random.default_rng(seed)
+    header, *rows = path.read_text().splitlines()
+    count = columns.count(",") + 1
+    cells = [",".join(map(str, np.round(10 ** rng.uniform(-3, -0.5, count), 5).tolist())) for _ in rows]
+    path.write_text("\n".join([f"{header},{columns}", *map("{},{}".format, rows, cells), ""]))
+    return path
+
+
+@pytest.mark.parametrize(
+    "columns", ["uncertainty_mm", "uncertainty_mm,uncertainty_V,uncertainty_C", "uncertainty_C,uncertainty_V"]
+)
+@pytest.mark.parametrize(("seed", "order"), [(1, 1), (2, 2)])
+def test_the_weighted_fit_is_the_one_of_the_house_to_the_last_bit(
+    seed: int, order: int, columns: str, tmp_path: Path
+) -> None:
+    path = written(tmp_path, seed, order, 60, 0.05)
+    plain = fit(read_measurements(path))
+    house = fit(read_measurements(with_uncertainties(path, columns, seed)))
+    assert house.polynomial != plain.polynomial
+    assert max(house.weights) == 1
+    assert check_fit(path.read_bytes(), house.polynomial.coefficients).polynomial == house.polynomial.coefficients
+    with pytest.raises(RejectedError, match=r"^coefficient \[0\]\[0\] of the calibration must be .*$"):
+        check_fit(path.read_bytes(), plain.polynomial.coefficients)
+
+
+@pytest.mark.parametrize(
+    ("cells", "sentence", "house"),
+    [
+        (
+            ("0.02", ""),
+            "uncertainties must be stated in every row or in none",
+            "uncertainties must be stated in every row or in none for the paper's rule, not in 39 of 40",
+        ),
+        (
+            ("0.02", "1e-9"),
+            "uncertainties must be within a factor of 1e9 of each other",
+            "uncertainties must be within a factor of 1e9 of each other, not 2e\\+10",
+        ),
+        (
+            ("0.02", "0"),
+            "an uncertainty must be more than 0, and finite",
+            "uncertainty_mm must be more than 0, or empty where it is not known, not '0'",
+        ),
+    ],
+)
+def test_uncertainties_that_weigh_nothing(cells: tuple[str, str], sentence: str, house: str, tmp_path: Path) -> None:
+    path = written(tmp_path, 6, 1, 40)
+    header, *rows = path.read_text().splitlines()
+    stated = [f"{row},{cells[k == 7]}" for k, row in enumerate(rows)]
+    stated[0] = f"{rows[0]},{20 if '1e-9' in cells else cells[0]}"
+    path.write_text("\n".join([f"{header},uncertainty_mm", *stated, ""]))
+    with pytest.raises(RejectedError, match=f"^{sentence}$"):
+        fitted(path.read_bytes())
+    with pytest.raises(SpecificationError, match=f": {house}$|, line 9: {house}$"):
+        fit(read_measurements(path))
 
 
 @pytest.mark.parametrize(

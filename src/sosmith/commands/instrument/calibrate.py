@@ -17,7 +17,7 @@ from sosmith.output_paths import output_option, plot_option
 from sosmith.terminal import JSON_OPTION, note, print_json, show_progress
 
 if TYPE_CHECKING:
-    from sosmith.interface.instrument.calibration_store import Added, FitOptions, Fitted
+    from sosmith.interface.instrument.calibration_store import Added, FitOptions, Fitted, Referenced
 
 _Range = tuple[float, float]
 
@@ -34,6 +34,7 @@ reaches the required value. To get started:
 
 \b
     sosmith calibrate add bench.csv --sensor left      add measurements, show the fit
+    sosmith calibrate reference gauges.csv --sensor left    the morning's targets: the curve of the day
     sosmith calibrate history --sensor left            list all versions and their drift
     sosmith calibrate files --sensor left              list the files, and which were withdrawn
     sosmith calibrate export --sensor left             print [calibration] for a specification
@@ -160,6 +161,11 @@ _VERSION = click.option("--version", "number", type=int, help="Version number.  
 @_SENSOR
 @_DATE
 @click.option("--keep-good", is_flag=True, help="Keep the valid rows of a file that also has invalid ones.")
+@click.option(
+    "--surprising",
+    is_flag=True,
+    help="Store a file that looks like a slip: other units, swapped columns, another sensor.",
+)
 @_range("clearance", "mm", DEFAULT_RANGES[0])
 @_range("voltage", "V", DEFAULT_RANGES[1])
 @_range("temperature", "degC", DEFAULT_RANGES[2])
@@ -175,6 +181,7 @@ def add_command(
     sensor: str,
     date: str,
     keep_good: bool,
+    surprising: bool,
     clearance_range: _Range | None,
     voltage_range: _Range | None,
     temperature_range: _Range | None,
@@ -189,8 +196,10 @@ def add_command(
 
     An invalid row is refused with its line number and the reason: text in place of a number, a value out of range, or a
     measurement that is already in the store. Unless --keep-good is given, one invalid row refuses the whole file, and
-    the exit status is 2. The measurements and the version fitted to them are on disk when this command ends. Exits
-    with 1 if the measurements are stored but no polynomial is good enough.
+    the exit status is 2; so does a file that looks like a slip, such as inches, unless --surprising is given. The
+    measurements and the version fitted to them are on disk when this command ends. It tells how far the sensor now
+    reads from the version before, and alarms of its health. Exits with 1 if the measurements are stored but no
+    polynomial is good enough.
 
     \b
         sosmith calibrate add bench.csv --sensor left
@@ -207,11 +216,15 @@ def add_command(
             options,
             ranges=(clearance_range, voltage_range, temperature_range),
             keep_good=keep_good,
+            surprising=surprising,
             progress=step,
         )
     if as_json:
         print_json(added.as_dict())
     _note_addition(file, store, added)
+    _warn(added)
+    if not as_json:
+        print_tables(added.tables())
     fitted = added.fitted
     _warn(fitted)
     if not as_json:
@@ -231,6 +244,71 @@ def _note_addition(file: Path, store: Path, added: Added) -> None:
         raise SpecificationError(f"{file}: every row must be valid{way}, not {len(refusals):,} of {rows:,} refused")
     left_out = f", {_counted(len(refusals), 'row')} skipped" if refusals else ""
     note(f"stored {_counted(added.good, 'measurement')} from {file} in {store}{left_out}")
+
+
+@calibrate.command("reference")
+@click.argument("targets", type=click.Path(path_type=Path), required=False)
+@click.option(
+    "--reading",
+    "readings",
+    type=(float, float, float),
+    multiple=True,
+    metavar="MM V DEGC",
+    help="A reading by hand, in place of TARGETS: clearance of the target in mm, voltage in V, temperature in degC; "
+    "may be given several times.",
+)
+@click.option(
+    "--uncertainty",
+    default="0.02mm",
+    show_default=True,
+    callback=_millimetres,
+    help="Standard uncertainty of a target's clearance, where TARGETS has no column uncertainty_mm.",
+)
+@click.option("--surprising", is_flag=True, help="Store readings that look like a slip.")
+@_STORE
+@_SENSOR
+@_DATE
+@JSON_OPTION
+def reference_command(
+    targets: Path | None,
+    readings: tuple[tuple[float, float, float], ...],
+    uncertainty: float,
+    surprising: bool,
+    store: Path,
+    sensor: str,
+    date: str,
+    as_json: bool,
+) -> None:
+    """Read reference targets in the morning: the curve of the day, and what a reading is worth today.
+
+    TARGETS is a CSV or XLSX file as for `sosmith calibrate add`, with what the sensor reads at targets of known
+    clearance, such as gauge blocks. They count by their own uncertainty, not by the scatter of other measurements.
+    Three to five of them, spread over the clearances that matter, remove most of the error of the day. Prints how far
+    the sensor is off at each target by the calibration before and now, and the intervals of readings on this day.
+
+    \b
+        sosmith calibrate reference gauges.csv --sensor left
+        sosmith calibrate reference --sensor left --reading 2 1.52 21 --reading 5 5.31 21 --reading 8 7.95 21
+    """
+    from sosmith.interface.instrument.calibration_store import CalibrationStore
+
+    if (targets is None) == (not readings):
+        raise SpecificationError("targets must be given by a file or by --reading, one of both")
+    with show_progress() as step:
+        found = CalibrationStore(store).reference(
+            sensor,
+            readings if targets is None else targets,
+            date,
+            uncertainty=uncertainty,
+            surprising=surprising,
+            progress=step,
+        )
+    if as_json:
+        print_json(found.as_dict())
+    _warn(found)
+    _warn(found.added.fitted)
+    if not as_json:
+        print_tables(found.tables())
 
 
 @calibrate.command("fit")
@@ -257,7 +335,8 @@ def fit_command(
     """Refit to all measurements of a sensor.
 
     Use it to change the method or its options, or for another day, without new measurements. Creates a new version if
-    the polynomial or the options have changed. Exits with 1 if no polynomial is good enough.
+    the polynomial, the options or, with --method bayes, the day have changed. Exits with 1 if no polynomial is good
+    enough.
 
     \b
         sosmith calibrate fit --sensor left --accept 0.2mm
@@ -512,7 +591,7 @@ def health_command(store: Path, sensor: str, since: str | None, plot: Path | Non
         )
 
 
-def _warn(fitted: Fitted) -> None:
+def _warn(fitted: Added | Fitted | Referenced) -> None:
     for warning in fitted.warnings:
         note(f"warning: {warning}")
 

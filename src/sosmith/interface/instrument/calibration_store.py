@@ -19,20 +19,22 @@ from sosmith.instrument.calibration.calibration_report import (
     advice_json,
     calibration_json,
     measurements_csv,
+    morning_json,
     source_json,
     specification_table,
     version_json,
 )
 from sosmith.instrument.calibration.calibration_tables import (
+    addition_table,
     advice_tables,
     calibration_tables,
     health_table,
     history_table,
+    morning_tables,
     sources_table,
 )
 from sosmith.instrument.calibration.health.health_report import health_json
 from sosmith.instrument.calibration.health.monitoring import Health
-from sosmith.instrument.calibration.measurement_files import Refusal, parse_date
 from sosmith.instrument.calibration.measurement_store import Source, Version, open_store
 from sosmith.instrument.calibration.self_updating import (
     Addition,
@@ -49,6 +51,8 @@ from sosmith.instrument.calibration.self_updating import (
     withdraw,
 )
 from sosmith.instrument.calibration.sensor_type_file import sensor_type_named
+from sosmith.instrument.calibration.store.measurement_files import Refusal, parse_date
+from sosmith.instrument.calibration.store.reference import Morning, by_hand, reference
 from sosmith.interface.certificate import Progress
 from sosmith.model.errors import ShortfallError, SpecificationError
 
@@ -113,7 +117,7 @@ class Fitted(View):
 
 
 @dataclass(frozen=True, eq=False)
-class Added:
+class Added(View):
     """What became of a file of measurements."""
 
     addition: Addition
@@ -140,9 +144,48 @@ class Added:
             raise ShortfallError(self.addition.shortfall)
         return Fitted(self.addition.calibration)
 
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """A sentence for each alarm that the days of the file have raised; see `CalibrationStore.health`."""
+        return self.addition.warnings
+
+    def tables(self) -> list[Table]:
+        """Return how far the sensor reads from the version before, and whether it is healthy."""
+        return [addition_table(self.addition)]
+
     def as_dict(self) -> dict[str, Any]:
         """Return all of it in JSON types."""
         return addition_json(self.addition)
+
+
+@dataclass(frozen=True, eq=False)
+class Referenced(View):
+    """What reference targets say of a day."""
+
+    morning: Morning
+
+    @property
+    def added(self) -> Added:
+        """What became of the readings."""
+        return Added(self.morning.addition)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """A sentence for each target that does not count, and for each alarm of the sensor's health."""
+        return (*self.morning.warnings, *self.added.warnings)
+
+    def tables(self) -> list[Table]:
+        """Return the targets, the curve of the day, and the intervals of readings on it.
+
+        Raises ShortfallError if no polynomial is good enough.
+        """
+        if self.morning.addition.calibration is None:
+            raise ShortfallError(self.morning.addition.shortfall)
+        return morning_tables(self.morning)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return all of it in JSON types."""
+        return morning_json(self.morning)
 
 
 @dataclass(frozen=True, eq=False)
@@ -294,6 +337,7 @@ class CalibrationStore:
         *,
         ranges: tuple[Range | None, Range | None, Range | None] = (None, None, None),
         keep_good: bool = False,
+        surprising: bool = False,
         progress: Progress = lambda step, done, total: None,
     ) -> Added:
         """Add the measurements of a CSV or XLSX file, and fit again.
@@ -312,6 +356,8 @@ class CalibrationStore:
             Valid clearances in mm, voltages in V and temperatures in degC from now on; None leaves them as they are.
         keep_good : bool
             Whether to store the valid rows of a file that has invalid ones.
+        surprising : bool
+            Whether to store a file that looks like a slip: other units, swapped columns, another sensor.
         progress : callable
             Called with the name of each step, and how far it is.
         """
@@ -323,7 +369,17 @@ class CalibrationStore:
                 return Added(refused)
         with open_store(self.path, create=True) as store:
             told = _told(progress, "fitting")
-            addition = add(store, sensor, source, date, ranges=ranges, keep_good=keep_good, progress=told, **settings)
+            addition = add(
+                store,
+                sensor,
+                source,
+                date,
+                ranges=ranges,
+                keep_good=keep_good,
+                surprising=surprising,
+                progress=told,
+                **settings,
+            )
         return Added(addition)
 
     def fit(
@@ -338,6 +394,45 @@ class CalibrationStore:
         with open_store(self.path) as store:
             progress(step, 0, 0)
             return Fitted(refit(store, sensor, date, progress=_told(progress, step), **settings))
+
+    def reference(
+        self,
+        sensor: str,
+        targets: str | PathLike[str] | Sequence[tuple[float, float, float]],
+        date: str,
+        *,
+        uncertainty: float = 0.02,
+        surprising: bool = False,
+        progress: Progress = lambda step, done, total: None,
+    ) -> Referenced:
+        """Add readings of reference targets, and calibrate for their day.
+
+        Parameters
+        ----------
+        sensor : str
+            Its name; it must have measurements already.
+        targets : path, or sequence of tuple of float
+            CSV or XLSX file; or readings, each the target's clearance in mm, voltage in V and temperature in degC.
+        date : str
+            The day.
+        uncertainty : float
+            Standard uncertainty in mm of a target's clearance, where the file states none.
+        surprising : bool
+            As for `add`.
+        progress : callable
+            Called with the name of each step, and how far it is.
+        """
+        content = None
+        if isinstance(targets, str | PathLike):
+            path = Path(fspath(targets))
+        else:
+            path, content = by_hand(date, targets)
+        with open_store(self.path) as store:
+            told = _told(progress, "fitting")
+            morning = reference(
+                store, sensor, path, date, uncertainty, content=content, surprising=surprising, progress=told
+            )
+        return Referenced(morning)
 
     def files(self, sensor: str) -> Files:
         """Return the files of a sensor in the order in which they were added."""

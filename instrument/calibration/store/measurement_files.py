@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from sosmith.gen.calibration.fit import COLUMNS, DATE_COLUMN
+from sosmith.gen.calibration.fit import COLUMNS, DATE_COLUMN, UNCERTAINTY_COLUMNS
 from sosmith.instrument.calibration.acceptance import DEFAULT_RANGES, Range
 from sosmith.model.errors import SpecificationError
 from sosmith.model.foreign_files import opened
@@ -45,11 +45,14 @@ class Reading:
         Date of the measurement, such as 2024-03-01.
     values : tuple of float
         Clearance in mm, voltage in V, temperature in degC.
+    uncertainty : tuple of float
+        Their standard uncertainties in the same units where they are stated, else 0.
     """
 
     line: int
     date: str
     values: tuple[float, float, float]
+    uncertainty: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @property
     def key(self) -> tuple[str, tuple[float, ...]]:
@@ -57,8 +60,9 @@ class Reading:
         return self.date, self.values
 
     def sha256(self, sensor: str) -> str:
-        """Return the SHA-256 of sensor name, date and exact values, in hexadecimal."""
-        text = "\n".join([sensor, self.date, *(value.hex() for value in self.values)])
+        """Return the SHA-256 of sensor name, date, exact values, and of uncertainties if any is stated."""
+        numbers = self.values + (self.uncertainty if any(self.uncertainty) else ())
+        text = "\n".join([sensor, self.date, *(value.hex() for value in numbers)])
         return hashlib.sha256(text.encode()).hexdigest()
 
 
@@ -93,9 +97,16 @@ class MeasurementFile:
 
 
 def read_measurement_file(
-    path: Path, date: str, ranges: tuple[Range, Range, Range] = DEFAULT_RANGES
+    path: Path,
+    date: str,
+    ranges: tuple[Range, Range, Range] = DEFAULT_RANGES,
+    *,
+    content: bytes | None = None,
+    uncertainty: float = 0.0,
 ) -> MeasurementFile:
-    """Read the columns clearance_mm, voltage_V, temperature_C and, if present, date, from a CSV or XLSX file.
+    """Read the columns clearance_mm, voltage_V and temperature_C from a CSV or XLSX file.
+
+    If present, also those for the date and for uncertainties, whose cells may be empty.
 
     Of a workbook, the first visible worksheet is read, with the stored values of formulas.
 
@@ -107,6 +118,10 @@ def read_measurement_file(
         Date of measurements that have none in the file.
     ranges : tuple of Range
         Lowest and highest valid clearance in mm, voltage in V and temperature in degC.
+    content : bytes or None
+        What stands in the file; None to read it.
+    uncertainty : float
+        Standard uncertainty in mm of clearances that state none; 0 if it is not known.
 
     Raises
     ------
@@ -116,8 +131,9 @@ def read_measurement_file(
         instead.
     """
     try:
-        with opened(path) as file:
-            content = file.read(MAX_BYTES + 1)
+        if content is None:
+            with opened(path) as file:
+                content = file.read(MAX_BYTES + 1)
     except (OSError, ValueError) as error:  # ValueError: a path with a NUL
         reason = (getattr(error, "strerror", None) or str(error)).lower()
         raise SpecificationError(f"{path} must be a readable CSV or XLSX file ({reason})") from None
@@ -130,7 +146,7 @@ def read_measurement_file(
     line, header = next(rows, (1, ()))
     names = tuple(cell.strip() if isinstance(cell, str) else cell for cell in _trimmed(header, 0))
     _check_header(f"{path}, line {line}", names)
-    reader = _Rows(names, date, ranges)
+    reader = _Rows(names, date, ranges, uncertainty)
     for line, cells in rows:
         reader.take(line, cells)
     if not reader.readings and not reader.refusals:
@@ -188,7 +204,7 @@ def _csv_rows(path: Path, content: bytes) -> Iterator[tuple[int, Sequence[Any]]]
 
 
 def _check_header(where: str, names: Sequence[Any]) -> None:
-    known = (*COLUMNS, DATE_COLUMN)
+    known = (*COLUMNS, DATE_COLUMN, *UNCERTAINTY_COLUMNS)
     if not names:
         raise SpecificationError(f"{where}: header must be {','.join(COLUMNS)}, not empty")
     if isinstance(names[0], str):
@@ -213,6 +229,7 @@ class _Rows:
     names: Sequence[Any]
     date: str
     ranges: tuple[Range, Range, Range]
+    uncertainty: float
     readings: list[Reading] = field(default_factory=list)
     refusals: list[Refusal] = field(default_factory=list)
     first_lines: dict[tuple[str, tuple[float, ...]], int] = field(default_factory=dict)
@@ -241,7 +258,9 @@ class _Rows:
             raise SpecificationError("; ".join(wrong))
         clearance, voltage, temperature = numbers
         date = _date(row[DATE_COLUMN]) if DATE_COLUMN in row else self.date
-        return Reading(line, date, (clearance, voltage, temperature))
+        stated = [_stated(name, row.get(name)) for name in UNCERTAINTY_COLUMNS]
+        of_clearance = stated[0] or self.uncertainty
+        return Reading(line, date, (clearance, voltage, temperature), (of_clearance, stated[1], stated[2]))
 
 
 def _number(name: str, cell: Any) -> float:
@@ -250,6 +269,16 @@ def _number(name: str, cell: Any) -> float:
     if isinstance(cell, bool | str) or not isinstance(cell, int | float) or not abs(cell) <= sys.float_info.max:
         raise SpecificationError(f"{name} must be a finite number, not {_shown(cell)}")
     return float(cell) + 0.0  # turns -0 into 0, so that both are the same measurement
+
+
+def _stated(name: str, cell: Any) -> float:
+    """Return a stated uncertainty; 0 for an empty cell."""
+    if cell is None or (isinstance(cell, str) and not cell.strip()):
+        return 0.0
+    number = _number(name, cell)
+    if not number > 0:
+        raise SpecificationError(f"{name} must be more than 0, or empty where it is not known, not {number:g}")
+    return number
 
 
 def _shown(cell: Any) -> str:

@@ -12,7 +12,7 @@ from typing import Any
 import openpyxl
 import pytest
 
-from sosmith.instrument.calibration.measurement_files import (
+from sosmith.instrument.calibration.store.measurement_files import (
     MAX_BYTES,
     MeasurementFile,
     parse_date,
@@ -176,17 +176,20 @@ def refused(path: Path, message: str) -> None:
 HEADERS = {
     "nameless": (
         ("clearance_mm", None, "voltage_V", "temperature_C"),
-        ", line 1: column must be one of clearance_mm, voltage_V, temperature_C, date, with the unit in its name, "
+        ", line 1: column must be one of clearance_mm, voltage_V, temperature_C, date, uncertainty_mm, uncertainty_V, "
+        "uncertainty_C, with the unit in its name, "
         "not ''",
     ),
     "no unit": (
         ("clearance", "voltage_V", "temperature_C"),
-        ", line 1: column must be one of clearance_mm, voltage_V, temperature_C, date, with the unit in its name, "
+        ", line 1: column must be one of clearance_mm, voltage_V, temperature_C, date, uncertainty_mm, uncertainty_V, "
+        "uncertainty_C, with the unit in its name, "
         "not 'clearance'",
     ),
     "other unit": (
         ("clearance_mm", "voltage_mV", "temperature_C"),
-        ", line 1: column must be one of clearance_mm, voltage_V, temperature_C, date, with the unit in its name, "
+        ", line 1: column must be one of clearance_mm, voltage_V, temperature_C, date, uncertainty_mm, uncertainty_V, "
+        "uncertainty_C, with the unit in its name, "
         "not 'voltage_mV'",
     ),
     "semicolons": (
