@@ -72,7 +72,7 @@ class ProgramVerdict:
     values: int
     states: int
     judged: tuple[tuple[int, int], ...]
-    program: ProgramText = field(repr=False)
+    program: ProgramText = field(repr=False, compare=False)
     memory: Memory = field(repr=False, compare=False)
 
 
