@@ -62,6 +62,8 @@ class ProgramVerdict:
         Number of instructions, of values that they store, and of states.
     judged : tuple of (int, int)
         Smallest and largest code of each input without the flag outside_calibration.
+    program : ProgramText
+        The program as it was read.
     memory : Memory
         Which words hold which values.
     """
@@ -70,6 +72,7 @@ class ProgramVerdict:
     values: int
     states: int
     judged: tuple[tuple[int, int], ...]
+    program: ProgramText = field(repr=False, compare=False)
     memory: Memory = field(repr=False, compare=False)
 
 
@@ -117,7 +120,7 @@ def check_program(
             found == tuple(wanted),
             f"{who} must judge {port.name} by the codes {wanted[0]}..{wanted[1]}, not {found[0]}..{found[1]}",
         )
-    return ProgramVerdict(len(program.instructions), run.values, len(run.states), judged, run.memory())
+    return ProgramVerdict(len(program.instructions), run.values, len(run.states), judged, program, run.memory())
 
 
 def _proven(program: ProgramText, graph: Graph, certificate: Certificate) -> _Run:

@@ -18,7 +18,6 @@ from sosmith.verify.decimation import at_lower_rate, behind_decimator, calibrati
 from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.parallel.check import HardwareVerdict, check_hardware
 from sosmith.verify.program.check import ProgramVerdict, check_program
-from sosmith.verify.program.text import ProgramText, read_program
 from sosmith.verify.reader.rtlil.check import check_rtlil
 from sosmith.verify.reader.source import read_source
 from sosmith.verify.specified.calibration_fit import Refit, check_fit
@@ -176,18 +175,13 @@ def _files_proven(
     manifest = read_manifest(contents[json], certificate, item)
     proofs, decimator = _hardware_proven(certificate, item, text, progress)
     manifest.hold_clocks(proofs.hardware or proofs.unit if certificate.decimation is None else None)
-    manifest.hold_program(None if proofs.program is None else _program_of(certificate, text), proofs.program)
+    manifest.hold_program(proofs.program)
     progress("C model", 0, 0)
     source, header = (unicode_text(name, contents[name]) for name in (c, h))
     model = check_c_model(source, header, certificate, item)
     progress("RTLIL", 0, 0)
     rtlil = check_rtlil(ascii_text(il, contents[il]), modules)
     return replace(proofs, unheld=tuple(manifest.open), model=model, rtlil=rtlil), decimator
-
-
-def _program_of(certificate: Certificate, text: str) -> ProgramText:
-    behind = certificate.name if certificate.decimation is None else f"{certificate.name}_behind"
-    return read_program(behind_decimator(text, certificate), behind)
 
 
 def _hardware_proven(

@@ -16,7 +16,6 @@ from sosmith.verify.certificate_file import Certificate, ItemEntry, PortEntry, S
 from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.parallel.check import HardwareVerdict
 from sosmith.verify.program.check import ProgramVerdict
-from sosmith.verify.program.text import ProgramText
 from sosmith.verify.specified.words import table_of, words_of
 from sosmith.verify.unit.check import UnitVerdict
 from sosmith.verify.verdict.derived import (
@@ -68,14 +67,15 @@ class Manifest:
         for key, value in zip(_CLOCKS, clocks, strict=True):
             _compare(key, self.tree[key], value)
 
-    def hold_program(self, program: ProgramText | None, found: ProgramVerdict | None) -> None:
+    def hold_program(self, found: ProgramVerdict | None) -> None:
         """Hold the schedule against the program of the hardware and what its words hold; None if it was not read."""
         schedule = self.tree["schedule"]
         if schedule is None:
             return
-        if program is None or found is None:
+        if found is None:
             self.open.append("schedule")
             return
+        program = found.program
         wanted = {
             "digit_bits": program.digit_bits,
             "accumulator_bits": program.accumulator_bits,

@@ -18,7 +18,6 @@ from sosmith.verify.certificate_file import Certificate
 from sosmith.verify.graph import RejectedError
 from sosmith.verify.parallel.check import HardwareVerdict
 from sosmith.verify.program.check import ProgramVerdict, check_program
-from sosmith.verify.program.text import ProgramText, read_program
 from sosmith.verify.progress import Progress
 from sosmith.verify.unit.check import UnitVerdict
 from sosmith.verify.unit.going_on import Pace
@@ -216,17 +215,17 @@ def test_clocks_are_those_of_a_proven_unit(key: str, core: Callable[[str], Core]
 
 
 @pytest.fixture(scope="module")
-def program(core: Callable[[str], Core]) -> tuple[ProgramText, ProgramVerdict]:
+def program(core: Callable[[str], Core]) -> ProgramVerdict:
     folded = core("folded")
-    return read_program(folded.source, "plain"), check_program(folded.source, folded.certificate)
+    return check_program(folded.source, folded.certificate)
 
 
-def test_the_schedule_is_held(core: Callable[[str], Core], program: tuple[ProgramText, ProgramVerdict]) -> None:
+def test_the_schedule_is_held(core: Callable[[str], Core], program: ProgramVerdict) -> None:
     folded = core("folded")
     read = folded.read(folded.manifest)
-    read.hold_program(*program)
+    read.hold_program(program)
     assert read.open == []
-    read.hold_program(None, None)
+    read.hold_program(None)
     assert read.open == ["schedule"]
 
 
@@ -260,8 +259,8 @@ _MISSING = "schedule.places of the manifest must have"
     ],
 )
 def test_another_schedule_is_refused(
-    path: str, value: Any, sentence: str, core: Callable[[str], Core], program: tuple[ProgramText, ProgramVerdict]
+    path: str, value: Any, sentence: str, core: Callable[[str], Core], program: ProgramVerdict
 ) -> None:
     folded = core("folded")
     with pytest.raises(RejectedError, match=f"^{sentence}$"):
-        folded.read(folded.changed(f"schedule.{path}", value)).hold_program(*program)
+        folded.read(folded.changed(f"schedule.{path}", value)).hold_program(program)
