@@ -209,7 +209,7 @@ def _attack_certificates(core: Core, count: int, outcome: Outcome) -> None:
         if other is None:  # blanks between the parts of JSON are none of it
             stronger = [] if json.loads(wrong) == json.loads(text) else ["the layout"]
         else:
-            stronger = differing(tree, json.loads(json.dumps(other)))
+            stronger = differing(_plain(tree), _plain(json.loads(json.dumps(other))))
         outcome.findings += [f"{name}: accepted with {place}" for place in stronger]
 
 
@@ -233,6 +233,16 @@ def _file_verdict(core: Core, text: str) -> str:
 
 _FREE = (("about", "options"), ("about", "versions"), ("about", "certificate"), ("about", "sha256"), ("about", "files"))
 """Places in a certificate that claim nothing that the digests and the proof do not hold."""
+
+
+def _plain(tree: Any) -> Any:
+    """Return a certificate as the verifier takes it: without what is stated by default, and with sums in one order."""
+    made = Entries.model_validate(tree).model_dump(mode="json", exclude_defaults=True)
+    for stage in made["stages"]:
+        for node in stage["nodes"]:
+            if node["op"] in {"add", "multiply"}:
+                node["operands"] = sorted(node["operands"])
+    return made
 
 
 def differing(before: Any, after: Any) -> list[str]:
