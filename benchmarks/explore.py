@@ -33,7 +33,7 @@ from typing import Any
 
 from sosmith.gen.realizations.registry import REALIZATIONS
 from sosmith.gen.specification.specification import load
-from sosmith.instrument.scenarios.traces import DefaultTraces
+from sosmith.instrument.scenarios.traces import ChosenTraces
 from sosmith.sim.exploration.grid import Subject
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -161,7 +161,7 @@ def measure(designs: int, *, busy_machine: bool) -> Figures:
         alone, _, _ = run(arguments)
         (record,) = (Path(made) / "2").glob("*.jsonl")
         lines = record.read_bytes().splitlines()
-    subject = Subject(spec=load(SPECIFICATION), core=None, samples=SAMPLES, seed=1, board=None, traces=DefaultTraces())
+    subject = Subject(spec=load(SPECIFICATION), core=None, samples=SAMPLES, seed=1, board=None, traces=ChosenTraces())
     task = subject.task({key: values[0] for key, values in grid.items()})
     return Figures(
         runs=tuple(runs),

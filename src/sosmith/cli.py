@@ -95,7 +95,7 @@ _COMMANDS = {
         "Run the board of SPEC behind a pseudo-terminal, whose path is the first line on stdout.",
     ),
     "stream": _Command(
-        "stream", "stream_command", "Send the samples of TRACE.csv to the board at PORT, and write its results."
+        "stream", "stream_command", "Send the samples of TRACE to the board at PORT, and write its results."
     ),
     "monitor": _Command(
         "monitor",

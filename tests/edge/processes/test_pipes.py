@@ -26,7 +26,7 @@ SECONDS = 60
 
 PIPE = "a pipe, where a regular file is needed"
 
-NEEDED = {"board": "icebreaker", "clearances": "2mm", "sample_rate": "1000"}
+NEEDED = {"board": "icebreaker", "clearances": "2mm", "sample_rate": "1000", "reason": "worn", "author": "A"}
 """What commands need besides files."""
 
 

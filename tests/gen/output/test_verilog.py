@@ -110,7 +110,7 @@ def test_the_reader_finds_the_words(text: str) -> None:
         (
             "for (i = 2; i < 22;",
             "for (i = 2; i < 99999999;",
-            "a loop must be over at most 16777216 words, not 99999997",
+            "a loop must be over at most 1048576 words, not 99999997",
         ),
     ],
 )

@@ -74,7 +74,7 @@ def test_hardware_equals_the_integer_model(architecture: str, simulator: str, tm
     assert "What folds, anywhere and into the pass band" in page
     assert "46.875 Hz to 50 Hz" in page
     assert "49.74122 Hz to 50 Hz" in page
-    assert page.count("Of the filter alone, behind the decimator.") == 2
+    assert page.count("Of the filter alone, behind the decimator.") == 3
     assert "That adds 300\xa0ms." in page
 
 
