@@ -134,7 +134,8 @@ def _findings(ended: subprocess.CompletedProcess[str], folder: Path, place: str)
     lines = ended.stderr.splitlines()
     if ended.returncode not in STATUSES:
         yield f"status {ended.returncode}: {ended.stderr[-300:]}"
-    if "Traceback" in ended.stderr:
+    ours = ended.stderr.partition(" failed; the end of ")[0]  # what follows is quoted from the log of a tool
+    if "Traceback" in ours:
         yield f"a traceback: {ended.stderr[-600:]}"
     if ended.returncode in {2, 3} and not any(line.startswith("sosmith: error: ") for line in lines):
         yield f"no sentence: {ended.stderr[-300:]}"
