@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import hashlib
 import json
 import tempfile
@@ -237,9 +238,12 @@ _FREE = (("about", "options"), ("about", "versions"), ("about", "certificate"), 
 
 def _plain(tree: Any) -> Any:
     """Return a certificate as the verifier takes it: without what is stated by default, and with sums in one order."""
-    made = Entries.model_validate(tree).model_dump(mode="json", exclude_defaults=True)
+    made = copy.deepcopy(tree)
     for stage in made["stages"]:
         for node in stage["nodes"]:
+            for name in ("parameter", "parameter_frac"):
+                if node.get(name) == 0:
+                    del node[name]
             if node["op"] in {"add", "multiply"}:
                 node["operands"] = sorted(node["operands"])
     return made
