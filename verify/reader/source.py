@@ -18,6 +18,7 @@ from sosmith.verify.reader.syntax import (
     Load,
     Module,
     Number,
+    Operator,
     Statement,
     Word,
 )
@@ -148,6 +149,50 @@ def _check_clocks(modules: Mapping[str, Module], top: str) -> None:
         for clock in clocks[name]:
             require(module.ports.get(clock) == "input", f"the clock {clock} of {name} must be an input of it")
     require(len(clocks[top]) <= 1, f"{top} must have one clock, not {', '.join(sorted(clocks[top]))}")
+    for name, module in modules.items():
+        seen = sorted(clocks[name] & _looked_at(module, clocks))
+        require(
+            not seen,
+            f"the clock {', '.join(seen)} of {name} must be nothing but a clock, not a value: what it is at its edge "
+            "differs from tool to tool",
+        )
+
+
+def _looked_at(module: Module, clocks: Mapping[str, set[str]]) -> set[str]:
+    """Return the nets that are in assignments and statements, or go to ports that are no clocks."""
+    found = set[str]()
+
+    def look(one: Expression | Statement) -> None:
+        match one:
+            case Bits():
+                found.add(one.name)
+            case Word():
+                look(one.address)
+            case Joined():
+                for part in one.parts:
+                    look(part)
+            case Operator():
+                for part in one.operands:
+                    look(part)
+            case Load():
+                look(one.value)
+                if isinstance(one.target, Word):
+                    look(one.target.address)
+            case Choice():
+                look(one.condition)
+                for statement in (*one.yes, *one.no):
+                    look(statement)
+
+    for _, value in module.assigns:
+        look(value)
+    for _, statements in module.clocked:
+        for statement in statements:
+            look(statement)
+    for inside, _, ports in module.instances:
+        for port, given in ports.items():
+            if port not in clocks[inside]:
+                look(given)
+    return found
 
 
 def _from_below(modules: Mapping[str, Module], top: str) -> list[str]:

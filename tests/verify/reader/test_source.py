@@ -87,6 +87,11 @@ def forged(edit: str) -> tuple[str, str]:
             text.replace(".clk(aclk)", ".clk(s_axis_tdata[0])", 1),
             r"the clock clk of \w+ must be a net, not computed or cut from one",
         ),
+        "a clock as a value": (
+            text.replace("  wire aclk;\n", "  wire aclk;\n  wire late;\n  assign late = aclk;\n", 1),
+            r"the clock aclk of audio_lowpass must be nothing but a clock, not a value: what it is at its edge differs "
+            r"from tool to tool",
+        ),
         "an index of a scalar": (
             text.replace(".clk(aclk)", ".clk(aclk[0])", 1),
             r"aclk must be used as a whole, as it has no range",
@@ -135,6 +140,7 @@ EDITS = [
     "a parameter",
     "a module that is not there",
     "another clock",
+    "a clock as a value",
     "a bit of a clock",
     "an index of a scalar",
     "a range in one declaration",
