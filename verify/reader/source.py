@@ -6,6 +6,7 @@ What tools could disagree on is refused here: which module is the top, what an i
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from functools import lru_cache
 from typing import NamedTuple
 
 from sosmith.verify.graph import RejectedError, require
@@ -55,6 +56,13 @@ def read_source(text: str, top: str | None = None, *, unknowns: bool = True) -> 
     RejectedError
         If the text has anything that is not in the subset, or its modules are not put together in one way.
     """
+    found = _parsed(text, top, unknowns)
+    return Source(found.text, {name: module.copy() for name, module in found.modules.items()})
+
+
+@lru_cache(maxsize=2)
+def _parsed(text: str, top: str | None, unknowns: bool) -> Source:
+    """Read a text, which every proof asks for again; what is kept is handed out as copies alone."""
     require(len(text) <= _MAX_CHARACTERS, f"the SystemVerilog must have at most {_MAX_CHARACTERS} characters")
     tokens = Tokens(text)
     modules: dict[str, Module] = {}
@@ -81,7 +89,7 @@ def read_source(text: str, top: str | None = None, *, unknowns: bool = True) -> 
     for name, module in modules.items():
         _check_nets(name, module, modules)
     _check_clocks(modules, top)
-    rest = {name: module for name, module in modules.items() if name != top}
+    rest = {name: module.copy() for name, module in modules.items() if name != top}
     return Source("".join(f"{line}\n" for line in printed), {top: modules[top], **rest})
 
 

@@ -106,3 +106,17 @@ class Module:
     assigns: list[tuple[Expression, Expression]] = field(default_factory=list)
     clocked: list[tuple[str, tuple[Statement, ...]]] = field(default_factory=list)
     instances: list[tuple[str, str, dict[str, Expression]]] = field(default_factory=list)
+
+    def copy(self) -> Module:
+        """Return a module with the same expressions and statements, which do not change, in lists of its own."""
+        return Module(
+            ports=dict(self.ports),
+            widths=dict(self.widths),
+            registers=dict(self.registers),
+            depths=dict(self.depths),
+            unchecked=set(self.unchecked),
+            held={name: dict(words) for name, words in self.held.items()},
+            assigns=list(self.assigns),
+            clocked=list(self.clocked),
+            instances=[(inside, name, dict(ports)) for inside, name, ports in self.instances],
+        )

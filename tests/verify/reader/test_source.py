@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import re
+from copy import deepcopy
+from dataclasses import fields
 
 import pytest
 from tests.verify.reader.example_cores import CORES, NAME, core
 
 from sosmith.verify.graph import RejectedError
 from sosmith.verify.reader.source import read_source
+from sosmith.verify.reader.syntax import Number
 
 
 def plain(text: str) -> str:
@@ -177,3 +180,19 @@ def test_a_program_has_each_word_once_wherever_it_is_written(right: str, wrong: 
     assert count == 1
     with pytest.raises(RejectedError, match=f"^{sentence}$"):
         read_source(text, NAME)
+
+
+def test_what_is_read_again_is_not_what_others_have_changed() -> None:
+    """A text is read once; each reader gets modules of its own."""
+    text = core("folded")
+    first = read_source(text)
+    whole = deepcopy(first)
+    for module in first.modules.values():
+        for inside, _, ports in module.instances:
+            ports[inside] = Number(0, 1)
+        for words in module.held.values():
+            words.clear()
+        for found in fields(module):
+            getattr(module, found.name).clear()
+    first.modules.clear()
+    assert read_source(text) == whole
