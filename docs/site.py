@@ -1,4 +1,4 @@
-"""What the site adds to docs/: README and CHANGELOG as pages of it, links only to what it has, a search from a disk.
+"""What the site adds to docs/: README, CHANGELOG and executed notebooks, links only to what it has, a search on disk.
 
 A hook of MkDocs, named in mkdocs.yml.
 """
@@ -10,6 +10,8 @@ import re
 from pathlib import Path
 from typing import Any
 
+import gallery
+import nbformat
 from mkdocs.structure.files import File, Files
 
 ROOT = Path(__file__).parents[1]
@@ -23,7 +25,20 @@ def on_files(files: Files, config: Any) -> Files:
     """Add the pages that stand beside docs/."""
     for page, source in PAGES.items():
         files.append(File.generated(config, page, abs_src_path=str(ROOT / source)))
+    for path in gallery.notebooks():
+        _add_notebook(path, files, config)
     return files
+
+
+def _add_notebook(path: Path, files: Files, config: Any) -> None:
+    """Put an executed notebook in the place of the one without outputs, its page and its pictures beside it."""
+    folder = f"{path.parent.name}/"
+    notebook = gallery.executed(path)
+    text, pictures = gallery.page(notebook, path.stem)
+    files.remove(files.src_uris[folder + path.name])
+    made = {path.name: nbformat.writes(notebook), f"{path.stem}.md": text, **pictures}
+    for name, content in made.items():
+        files.append(File.generated(config, folder + name, content=content))
 
 
 def on_page_markdown(markdown: str, page: Any, files: Files, **_: Any) -> str:

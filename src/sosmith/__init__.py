@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from sosmith.interface.coefficients import Coefficients
     from sosmith.interface.comparison import Comparison, compare
     from sosmith.interface.design import Coefficient, Design, Section, design
+    from sosmith.interface.drawing import Drawing
     from sosmith.interface.exploration import Exploration, explore
     from sosmith.interface.filter import Filter
     from sosmith.interface.quantity import Quantity
@@ -50,6 +51,7 @@ __all__ = [
     "Coefficients",
     "Comparison",
     "Design",
+    "Drawing",
     "Exploration",
     "Fact",
     "Filter",
@@ -86,6 +88,7 @@ _MODULES = {
     "interface.coefficients": ("Coefficients",),
     "interface.comparison": ("Comparison", "compare"),
     "interface.design": ("Coefficient", "Design", "Section", "design"),
+    "interface.drawing": ("Drawing",),
     "interface.exploration": ("Exploration", "explore"),
     "interface.filter": ("Filter",),
     "gen.facts.table": ("Fact", "Table"),

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property, partial
 from os import PathLike, fspath
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +19,7 @@ from sosmith.gen.fpga.boards import BUILDABLE, MODELLED, PROJECTS, RATE, find_bo
 from sosmith.gen.output.core_facts import CoreFacts, core_facts
 from sosmith.gen.output.manifest import manifest
 from sosmith.gen.quantity import number
+from sosmith.interface.drawing import Drawing
 from sosmith.interface.inputs import codes_of, encoded, real_numbers, traces_of
 from sosmith.interface.quantity import Quantity
 from sosmith.interface.specification import Specification, specification_of
@@ -380,13 +381,24 @@ class Design:
 
         return Board.on(ModelLine(model_of(self.core)))
 
-    def plot(self, path: str | PathLike[str]) -> Path:
+    @overload
+    def plot(self) -> Drawing: ...
+
+    @overload
+    def plot(self, path: str | PathLike[str]) -> Path: ...
+
+    def plot(self, path: str | PathLike[str] | None = None) -> Path | Drawing:
         """Draw gain and group delay, specified and with integer coefficients, and the curves of the calibration.
 
         Parameters
         ----------
-        path : path
-            File to write; its name ends in .svg or .png.
+        path : path, optional
+            File to write; its name ends in .svg or .png. Without one, a notebook shows the picture.
+
+        Returns
+        -------
+        Path or Drawing
+            Of the file; without one, the picture, whose ``svg`` is its text.
 
         Raises
         ------
@@ -397,6 +409,8 @@ class Design:
         from sosmith.gen.report.design_plot import design_plot
         from sosmith.model.text_files import write_contents
 
+        if path is None:
+            return Drawing(design_plot(self.core.quantized, "svg").decode("utf-8"))
         place = Path(fspath(path))
         content = design_plot(self.core.quantized, format_of(place))
         return write_contents(place.parent, {place.name: content})[0]
