@@ -264,13 +264,15 @@ def document(record: Figures) -> dict[str, str]:
     realizations = sorted({figures["realization"] for figures in found})
     left = "".join(f"- {core}.\n" for core in missing(record))
     if left:
-        left = f"\nNot measured yet:\n\n{left}"
+        left = f"\n## Not measured\n\n{left}"
     if earlier := "".join(f"- {core}.\n" for core in outdated(record)):
-        left += f"\nMeasured on an earlier version of the core, and not again yet:\n\n{earlier}"
+        left += f"\n## Measured on an earlier version of the core\n\n{earlier}"
     text = f"""# What the cores cost
 
 Written by `python -m benchmarks.cost` from the figures that it records in `benchmarks/cost.json`. `--check` synthesizes
 changed cores again and fails if a figure of synthesis has grown by more than {100 * (GROWTH - 1):.0f} %.
+
+![logic against sample rate](images/cost.svg)
 
 Measured are the filter core of audio_lowpass, and the whole instrument (calibration and filter) of the two other
 examples, each in all three architectures, for {", ".join(map(str, CHANNELS))} channels;
@@ -293,8 +295,6 @@ How cells are counted:
   TRELLIS_DPR16X4, as four. TRELLIS_COMB: LUT4 as placed, including those that only pass a signal through.
 - Multipliers, flip-flops (FF) and block RAMs (RAM of 4 kbit, DP16KD of 16 kbit) after synthesis.
 - Clocks per sample: an upper limit in the serial architecture, where the number depends on the data.
-{left}
-![logic against sample rate](images/cost.svg)
 
 ## iCE40
 
@@ -368,5 +368,5 @@ ECP5-85F, out of context, with Yosys 0.70, nextpnr-ecp5 and one seed. The compar
 widths, throughput and what can be changed at run time differ. LUT RAM is counted for this project only.
 
 {peer_table(record)}
-"""
+{left}"""
     return {"docs/cost.md": text, "docs/images/cost.svg": plot(record)}

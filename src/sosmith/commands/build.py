@@ -57,7 +57,7 @@ def build_command(
     converters, instead of over the link.
 
     For a board with a Xilinx FPGA it writes the files of a Vivado project: Verilog, constraints (XDC), the script
-    (Tcl), and build.json. No flow is run for it and no bitstream written, so that neither fit nor timing is known.
+    (Tcl), and build.json. No bitstream is made: only Vivado tells whether the design fits and meets its timing.
 
     \b
         sosmith build my.toml --board icebreaker
