@@ -1,13 +1,14 @@
 """The bit-true C model of a datapath: what `generate` writes and what `compute` compiles.
 
-Plain C99, no library. Values wider than 64 bits use the compiler's 128-bit integer (GCC, Clang); every
-other datapath is portable. Right shifts of negative numbers must be arithmetic, as they are in all
-compilers in use.
+Plain C99, no library. Each value has the narrowest type of 32, 64 and 128 bits that holds all that it can be, and is
+computed in the narrowest that holds all on the way there: a microcontroller of 32 bits has products of 64 bits, and
+nothing wider. Values wider than 64 bits use the compiler's 128-bit integer (GCC, Clang); every other datapath is
+portable. Right shifts of negative numbers must be arithmetic, as they are in all compilers in use.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from sosmith.model.dataflow.graph import Graph, Node, Op
 from sosmith.model.dataflow.status import Flag
@@ -17,8 +18,25 @@ if TYPE_CHECKING:
     from sosmith.model.dataflow.datapath import Datapath
     from sosmith.model.port import Port
 
-_NARROW = 64
-_WIDEST = 128
+_TYPES = {32: "int32_t", 64: "int64_t", 128: "__int128"}
+"""The types by their bits; all are signed, whatever the sign of the values."""
+
+
+class Range(Protocol):
+    """Whole numbers from `low` to `high`."""
+
+    @property
+    def low(self) -> int: ...
+
+    @property
+    def high(self) -> int: ...
+
+
+class _Span(NamedTuple):
+    """A range of values that no node has."""
+
+    low: int
+    high: int
 
 
 def c_header(datapath: Datapath) -> str:
@@ -32,8 +50,7 @@ def c_header(datapath: Datapath) -> str:
         ahead_ports=[] if whole.ahead is None else list(map(_told, whole.ahead.inputs)),
         taken=_parameters(whole),
         flags=[(f"{1 << flag:#04x}", flag.meaning) for flag in Flag],
-        state_type=_type_of_states(datapath),
-        states=max(state_count(datapath), 1),
+        states=_states(datapath),
         parameters=_parameters(datapath),
         wear=datapath.wear,
         channels=len(datapath.wear) if _takes_channel(datapath) else 0,
@@ -71,7 +88,7 @@ def c_source(datapath: Datapath) -> str:
         __package__,
         "c_model.c.jinja",
         name=datapath.name,
-        inputs=names,
+        inputs=[(name, _type_of_codes(port)) for name, port in zip(names, datapath.inputs, strict=True)],
         parameters=_parameters(datapath),
         arguments=["channel", *names] if _takes_channel(datapath) else names,
         codes=codes,
@@ -98,7 +115,7 @@ def _ahead(datapath: Datapath) -> dict[str, object]:
         "wires": _wires(datapath),
         "stages": _stages(datapath),
         "parameters": _parameters_of(datapath),
-        "inputs": [f"{port.name}_code" for port in datapath.inputs],
+        "inputs": [(f"{port.name}_code", _type_of_codes(port)) for port in datapath.inputs],
         "status": _status(datapath),
         "result": _result(datapath),
     }
@@ -120,27 +137,34 @@ def _parameters_of(datapath: Datapath) -> str:
     return ", ".join(f"int64_t {port.name}_code" for port in datapath.inputs)
 
 
-def state_count(datapath: Datapath) -> int:
-    """Count the state words of one channel."""
-    return sum(len(stage.graph.delays) for stage in datapath.stages)
+def _delays(datapath: Datapath) -> list[Node]:
+    """Return the delays of all stages, in their order, which is that of the states' numbers."""
+    return [stage.graph.nodes[i] for stage in datapath.stages for i in stage.graph.delays]
+
+
+def _states(datapath: Datapath) -> list[tuple[str, str]]:
+    """Type and name of each state, the widest first, so that no room is lost between them; at least one, as C asks."""
+    bits = [(_bits(node), f"s{k}") for k, node in enumerate(_delays(datapath))]
+    return [(_TYPES[width], name) for width, name in sorted(bits, key=lambda each: -each[0])] or [("int32_t", "none")]
 
 
 def state_bytes(datapath: Datapath) -> int:
     """Size of one channel's state in the compiled model, in bytes."""
-    word = 16 if _type_of_states(datapath) == "__int128" else 8
-    return max(state_count(datapath), 1) * word
+    widths = [_bits(node) // 8 for node in _delays(datapath)] or [4]
+    return -(-sum(widths) // max(widths)) * max(widths)
 
 
-def _type_of_states(datapath: Datapath) -> str:
-    return _type(*(stage.graph.nodes[i] for stage in datapath.stages for i in stage.graph.delays))
+def _bits(*ranges: Range) -> int:
+    """Return the bits of the narrowest type that holds all values of all `ranges`."""
+    width = max((signed_width(each.low, each.high) for each in ranges), default=1)
+    found = next((bits for bits in _TYPES if width <= bits), None)
+    if found is None:
+        raise ValueError(f"values of the C model must be at most {max(_TYPES)} bits wide, not {width}")
+    return found
 
 
-def _type(*nodes: Node) -> str:
-    """Return the type that holds the values of all `nodes`; all types are signed, whatever the sign of the values."""
-    width = max((signed_width(each.low, each.high) for each in nodes), default=1)
-    if width > _WIDEST:
-        raise ValueError(f"values of the C model must be at most {_WIDEST} bits wide, not {width}")
-    return "int64_t" if width <= _NARROW else "__int128"
+def _type(*ranges: Range) -> str:
+    return _TYPES[_bits(*ranges)]
 
 
 def signed_width(low: int, high: int) -> int:
@@ -174,10 +198,14 @@ def _exported(datapath: Datapath, index: int) -> list[int]:
 
 def _wires(datapath: Datapath) -> list[tuple[str, str]]:
     """Type and name of each input and of what stages hand on."""
-    wires = [("int64_t", f"{port.name}_code") for port in datapath.inputs]
+    wires = [(_type_of_codes(port), f"{port.name}_code") for port in datapath.inputs]
     for index, stage in enumerate(datapath.stages):
         wires += [(_type(stage.graph.nodes[i]), _wire(index, i)) for i in _exported(datapath, index)]
     return wires
+
+
+def _type_of_codes(port: Port) -> str:
+    return _type(_Span(port.lowest, port.highest))
 
 
 class _StageText(NamedTuple):
@@ -210,13 +238,13 @@ def _statements(graph: Graph, index: int, wires: list[str], offset: int) -> list
         if node.op is Op.INPUT:
             expression = next(supply)
         elif node.op is Op.DELAY:
-            expression = f"state->s[{next(memory)}]"
+            expression = f"state->s{next(memory)}"
         else:
             expression = _expression(graph, node, f"n{index}_")
         comment = f" /* {node.name}, {node.format} */" if node.name else ""
         statements.append(f"const {_type(node)} {_wire(index, i)} = {expression};{comment}")
     statements += [
-        f"state->s[{offset + k}] = {_wire(index, graph.nodes[i].operands[0])};" for k, i in enumerate(graph.delays)
+        f"state->s{offset + k} = {_wire(index, graph.nodes[i].operands[0])};" for k, i in enumerate(graph.delays)
     ]
     used = {i for node in graph.nodes for i in node.operands} | set(graph.outputs)
     statements += [f"(void){_wire(index, i)};" for i in range(len(graph.nodes)) if i not in used]
@@ -229,7 +257,7 @@ def _status(datapath: Datapath) -> str:
     node = last.nodes[last.outputs[0]]
     conditions: dict[Flag, list[str]] = {flag: [] for flag in Flag}
     for port, (low, high) in zip(datapath.inputs, datapath.calibrated, strict=True):
-        code = f"{port.name}_code"
+        code = f"w.{port.name}_code"
         conditions[Flag.INPUT_AT_RAIL] += [f"{code} == {port.lowest}", f"{code} == {port.highest}"]
         if low > port.lowest:
             conditions[Flag.OUTSIDE_CALIBRATION].append(f"{code} < {low}")
@@ -253,34 +281,60 @@ def _status(datapath: Datapath) -> str:
 def _expression(graph: Graph, node: Node, prefix: str) -> str:
     operands = [graph.nodes[i] for i in node.operands]
     names = [f"{prefix}{i}" for i in node.operands]
-    kind = _type(node, *operands)
     if node.op is Op.CONSTANT:
         return _literal(node.parameter)
     if node.op in {Op.ADD, Op.SUBTRACT}:
-        sign = "+" if node.op is Op.ADD else "-"
-        terms = [_scaled(kind, name, node.frac - operand.frac) for name, operand in zip(names, operands, strict=True)]
-        return f" {sign} ".join(terms)
+        sign = 1 if node.op is Op.ADD else -1
+        terms = [_times(operand, 1 << node.frac - operand.frac) for operand in operands]
+        whole = _Span(*map(sum, zip(terms[0], _times(terms[1], sign), strict=True)))
+        kind = _bits(*terms, whole)
+        left, right = (
+            _scaled(kind, name, operand, node.frac - operand.frac)
+            for name, operand in zip(names, operands, strict=True)
+        )
+        return _narrowed(node, kind, f"{left} {'+' if sign > 0 else '-'} {right}")
     if node.op is Op.SCALE:
-        return f"({kind}){names[0]} * {_literal(node.parameter)}"
+        kind = _bits(operands[0], _times(operands[0], node.parameter), _Span(node.parameter, node.parameter))
+        return _narrowed(node, kind, f"{_cast(kind, names[0], operands[0])} * {_literal(node.parameter)}")
     if node.op is Op.MULTIPLY:
-        return f"({kind}){names[0]} * {names[1]}"
+        kind = _bits(*operands, *(_times(operands[0], end) for end in (operands[1].low, operands[1].high)))
+        return _narrowed(node, kind, f"{_cast(kind, names[0], operands[0])} * {names[1]}")
+    held = _bits(*operands)
     if node.op is Op.FLOOR:
         # By one bit less than the word has at most, as C leaves more undefined; that is the sign already.
-        last = (_WIDEST if _type(*operands) == "__int128" else _NARROW) - 1
-        return f"{names[0]} >> {min(operands[0].frac - node.frac, last)}"
+        return _narrowed(node, held, f"{names[0]} >> {min(operands[0].frac - node.frac, held - 1)}")
     if node.op is Op.TRUNCATE:  # as C99 divides
-        return f"{names[0]} / {_power(operands[0].frac - node.frac)}"
+        return _narrowed(node, held, f"{names[0]} / {_power(operands[0].frac - node.frac)}")
     if node.op is Op.FRACTION:
-        return f"{names[0]} & ({_power(operands[0].frac - node.parameter)} - 1)"
+        return _narrowed(node, held, f"{names[0]} & {_literal((1 << operands[0].frac - node.parameter) - 1)}")
     if node.op is Op.CLAMP:
         low, high = _literal(node.low), _literal(node.high)
-        return f"{names[0]} < {low} ? {low} : {names[0]} > {high} ? {high} : {names[0]}"
-    return names[0]  # SHIFT and BOUND keep the code
+        return _narrowed(node, held, f"{names[0]} < {low} ? {low} : {names[0]} > {high} ? {high} : {names[0]}")
+    return _narrowed(node, held, names[0])  # SHIFT and BOUND keep the code
 
 
-def _scaled(kind: str, name: str, shift: int) -> str:
+def _times(values: Range, factor: int) -> _Span:
+    """Return the range of a product with a number."""
+    ends = values.low * factor, values.high * factor
+    return _Span(min(ends), max(ends))
+
+
+def _cast(kind: int, name: str, values: Range) -> str:
+    """Return an operand in the type that is computed in."""
+    return name if _bits(values) == kind else f"({_TYPES[kind]}){name}"
+
+
+def _narrowed(node: Node, kind: int, expression: str) -> str:
+    """Return an expression of the type `kind` in the type of its node."""
+    wanted = _bits(node)
+    if wanted >= kind:
+        return expression
+    return f"({_TYPES[wanted]})" + (expression if expression.isidentifier() else f"({expression})")
+
+
+def _scaled(kind: int, name: str, values: Range, shift: int) -> str:
     # A multiplication, because shifting a negative number to the left is undefined in C.
-    return f"({kind}){name} * {_power(shift)}" if shift else f"({kind}){name}"
+    return f"{_cast(kind, name, values)} * {_power(shift)}" if shift else _cast(kind, name, values)
 
 
 def _power(exponent: int) -> str:
@@ -288,6 +342,8 @@ def _power(exponent: int) -> str:
 
 
 def _literal(number: int) -> str:
+    if -(1 << 31) < number < 1 << 31:
+        return f"INT32_C({number})"
     if -(1 << 63) < number < 1 << 63:
         return f"INT64_C({number})"
     high, low = divmod(number, 1 << 62)

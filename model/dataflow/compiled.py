@@ -29,7 +29,7 @@ class Block(Protocol):
         codes: npt.NDArray[np.int64],
         *,
         with_status: bool = False,
-        states: npt.NDArray[np.int64] | None = None,
+        states: npt.NDArray[np.uint8] | None = None,
     ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.uint8]]:
         """Compute output codes and status, both of shape (samples, channels); without `with_status`, that is empty.
 
@@ -37,8 +37,8 @@ class Block(Protocol):
         """
         ...
 
-    def reset(self, channels: int) -> npt.NDArray[np.int64]:
-        """Return the states after reset, one row for each channel."""
+    def reset(self, channels: int) -> npt.NDArray[np.uint8]:
+        """Return the states after reset, one row of bytes for each channel."""
         ...
 
 
@@ -73,7 +73,7 @@ def compile_block(datapath: Datapath, *, optimized: bool = True) -> Block:
         ctypes.c_void_p,
         ctypes.c_void_p,
     ]
-    return _Compiled(function, state_bytes(datapath) // 8)
+    return _Compiled(function, state_bytes(datapath))
 
 
 _SIZE = """
@@ -125,21 +125,21 @@ class Pushed:
 
 
 class _Compiled:
-    """The loop of a loaded C model, and the size of its state in words of 64 bits."""
+    """The loop of a loaded C model, and the size of its state in bytes."""
 
-    def __init__(self, function: Callable[..., None], words: int) -> None:
-        self._function, self._words = function, words
+    def __init__(self, function: Callable[..., None], size: int) -> None:
+        self._function, self._size = function, size
 
-    def reset(self, channels: int) -> npt.NDArray[np.int64]:
+    def reset(self, channels: int) -> npt.NDArray[np.uint8]:
         # States of 128 bits need an alignment of 16 bytes, which numpy's allocator has for large arrays.
-        return np.zeros((channels, self._words), dtype=np.int64)
+        return np.zeros((channels, self._size), dtype=np.uint8)
 
     def __call__(
         self,
         codes: npt.NDArray[np.int64],
         *,
         with_status: bool = False,
-        states: npt.NDArray[np.int64] | None = None,
+        states: npt.NDArray[np.uint8] | None = None,
     ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.uint8]]:
         samples, channels, _ = codes.shape
         source = np.ascontiguousarray(codes, dtype=np.int64)

@@ -116,7 +116,7 @@ def test_a_sample_has_the_same_flags_everywhere(
     expected = [(c, int(results[n, c]), int(flags[n, c])) for n, c in places]
 
     step, status = step_of(datapath, tmp_path), ctypes.c_uint8()
-    states = np.zeros((channels, state_bytes(datapath) // 8), dtype=np.int64)
+    states = np.zeros((channels, state_bytes(datapath)), dtype=np.uint8)
     stepped = []
     for n, c in places:
         which = [c] if len(datapath.wear) > 1 else []

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from sosmith.verify.c_model.cursor import Cursor
-from sosmith.verify.c_model.expressions import BITS
+from sosmith.verify.c_model.expressions import HELD
 from sosmith.verify.c_model.frame import BEGIN, BLOCK, DECIMATOR, HEADER, RESET, STEP, SUMS, WEAR, filled, ticks
 from sosmith.verify.c_model.stages import Stages
 from sosmith.verify.certificate_file import Certificate, ItemEntry, Operation, PortEntry
@@ -74,10 +74,10 @@ class _Model:
         require(_PLAIN.fullmatch(self._name) is not None, "the name of a core must be a plain identifier")
         require(self._name not in _HEADERS, f"the name of a core must not be that of a header of C, {self._name}")
         words = [node for stage in self._behind.stages for node in stage.nodes if node.op is Operation.DELAY]
-        word = self._read_header(Cursor(header, f"{self._name}.h"), max(len(words), 1))
+        states = self._read_header(Cursor(header, f"{self._name}.h"), len(words))
         cursor = Cursor(source, f"{self._name}.c")
         cursor.expect(filled(BEGIN, NAME=self._name))
-        stages = Stages("", self._behind.stages, self._behind.inputs, word, len(words))
+        stages = Stages("", self._behind.stages, self._behind.inputs, states)
         stages.read(cursor, self._name)
         require(len(stages.owners) == len(words), "each state of the C model must be that of a delay")
         cursor.expect(filled(RESET, NAME=self._name))
@@ -88,7 +88,7 @@ class _Model:
         status = self._status(stages, full, settles=settles, wear=True)
         cursor.expect(self._step(stages, self._parameters(stages.inputs, self._channel), status))
         cursor.expect(self._block(stages))
-        nodes = self._nodes(stages) + self._read_decimator(cursor, word)
+        nodes = self._nodes(stages) + self._read_decimator(cursor)
         cursor.end()
         return ModelVerdict(nodes, len(words))
 
@@ -100,22 +100,29 @@ class _Model:
         codes = ", ".join(f"int64_t {port.name}_code" for port in inputs)
         return f"size_t channel, {codes}" if channel else codes
 
-    def _read_header(self, cursor: Cursor, words: int) -> str:
-        """Read the header, and return the type of a state's word."""
-        before, _, after = HEADER.partition("WORD ")
+    def _read_header(self, cursor: Cursor, words: int) -> dict[int, str]:
+        """Read the header, and return the types of the states by their numbers."""
+        before, _, after = HEADER.partition("STATES ")
         fields = {
             "GUARD": self._name.upper(),
             "NAME": self._name,
             "PARAMETERS": self._parameters(self._behind.inputs, self._channel),
             "WEAR": f"uint8_t {self._name}_wear_flags(size_t channel, int64_t code);" if self._item.wear else "",
             "DECIMATOR": self._decimator_words(DECIMATOR),
-            "WORDS": words,
         }
         cursor.expect(filled(before, **fields))
-        word = cursor.take("|".join(list(BITS)[1:]))
+        states: dict[str, str] = {}
+        while cursor.next != "}":
+            kind = cursor.take("|".join(HELD))
+            name = cursor.take(r"\w+")
+            require(name not in states, f"{name} of the C model must be a state once")
+            states[name] = kind
+            cursor.expect(";")
+        wanted = {f"s{k}" for k in range(words)} or {"none"}
+        require(set(states) == wanted, f"the states of the C model must be those of {words} delays")
         cursor.expect(filled(after, **fields))
         cursor.end()
-        return word
+        return {k: states[f"s{k}"] for k in range(words)}
 
     def _wear(self) -> str:
         limits = self._item.wear
@@ -135,17 +142,22 @@ class _Model:
             PREFIX=stages.prefix,
             NAME=self._name,
             PARAMETERS=parameters,
-            SET=" ".join(f"w.{port.name}_code = {port.name}_code;" for port in stages.inputs),
+            SET=" ".join(f"w.{member} = ({kind}){member};" for member, kind in self._members(stages)),
             RUN=" ".join(f"{stages.prefix}stage{index}(state, &w);" for index in range(last + 1)),
             STATUS=status,
             RESULT=stages.member((last, stages.stages[last].outputs[0])),
         )
 
+    @staticmethod
+    def _members(stages: Stages) -> list[tuple[str, str]]:
+        """Return the members of the inputs, and their types."""
+        return [(member, stages.fields[member]) for member in (f"{port.name}_code" for port in stages.inputs)]
+
     def _block(self, stages: Stages) -> str:
         count, last = len(stages.inputs), len(stages.stages) - 1
         codes = [f"in[(n * channels + c) * {count} + {index}]" for index in range(count)]
         arguments = ", ".join(f"{port.name}_code" for port in stages.inputs)
-        members = [f"{port.name}_code" for port in stages.inputs]
+        given = zip(self._members(stages), codes, strict=True)
         return filled(
             BLOCK,
             NAME=self._name,
@@ -155,7 +167,7 @@ class _Model:
             BEHIND=last,
             INPUTS=count,
             TICKS=ticks(
-                list(zip(members, codes, strict=True)),
+                " ".join(f"w->{member} = ({kind}){code};" for (member, kind), code in given),
                 last + 1,
                 stages.member((last, stages.stages[last].outputs[0])),
             ),
@@ -167,7 +179,7 @@ class _Model:
         """Return the expression of the flags."""
         conditions: dict[int, list[str]] = {_RAIL: [], _OUTSIDE: [], _SATURATED: []}
         for index, port in enumerate(stages.inputs):
-            code = f"{port.name}_code"
+            code = f"w.{port.name}_code"
             conditions[_RAIL] += [f"{code} == {port.lowest}", f"{code} == {port.highest}"]
             low, high = calibrated[index] if calibrated else (port.lowest, port.highest)
             conditions[_OUTSIDE] += [f"{code} < {low}"] if low > port.lowest else []
@@ -189,14 +201,14 @@ class _Model:
             terms.append(f"({settling} ? 0 : {worn})" if settling else worn)
         return f"(uint8_t)({' | '.join(terms)})"
 
-    def _read_decimator(self, cursor: Cursor, word: str) -> int:
+    def _read_decimator(self, cursor: Cursor) -> int:
         """Read what stands before a decimator, and that; return the number of nodes."""
         entry = self._certificate.decimation
         if entry is None:
             return 0
         nodes = 0
         if entry.calibration is not None:
-            stages = Stages("ahead_", entry.calibration.stages, self._certificate.inputs, word, 0)
+            stages = Stages("ahead_", entry.calibration.stages, self._certificate.inputs, {})
             stages.read(cursor, self._name)
             status = self._status(stages, self._item.calibrated)
             cursor.expect(self._step(stages, self._parameters(stages.inputs), status))
@@ -239,7 +251,9 @@ class _Model:
 
 
 def _literal(number: int) -> str:
-    """Write a number that may be wider than 64 bits."""
+    """Write a number in the narrowest type."""
+    if abs(number) < 1 << 31:
+        return f"INT32_C({number})"
     if abs(number) < 1 << 63:
         return f"INT64_C({number})"
     high, low = divmod(number, 1 << 62)

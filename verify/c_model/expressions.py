@@ -14,8 +14,11 @@ from typing import NamedTuple
 from sosmith.verify.c_model.cursor import Cursor
 from sosmith.verify.graph import RejectedError, check_product
 
-BITS = {"int": 32, "int64_t": 64, "__int128": 128}
-"""Bits of the signed types, which rise in rank."""
+BITS = {"int": 32, "int32_t": 32, "int64_t": 64, "__int128": 128}
+"""Bits of the signed types, which rise in rank. An int is the type of a small number such as that of places."""
+
+HELD = tuple(kind for kind in BITS if kind != "int")
+"""Types of what is held: an int may have 16 bits."""
 
 Form = tuple[tuple[tuple[object, ...], int], ...]
 """A polynomial: pairs of a sorted product of atoms and its factor, sorted. Atoms are texts, or tuples of forms."""
@@ -184,38 +187,46 @@ class Reader:
         return left
 
     def _cast(self) -> Value:
-        if self._cursor.next == "(" and self._cursor.ahead(1) in BITS and self._cursor.ahead(2) == ")":
+        if self._cursor.next == "(" and self._cursor.ahead(1) in HELD and self._cursor.ahead(2) == ")":
             self._cursor.expect("(")
             kind = self._cursor.take()
             self._cursor.expect(")")
             return self._held(self._cast()._replace(type=kind))
-        return self._primary()
+        return self.primary()
 
-    def _primary(self) -> Value:
+    def primary(self) -> Value:
+        """Read a name, a number, or an expression in parentheses.
+
+        Raises
+        ------
+        RejectedError
+            As `expression`.
+        """
         if self._cursor.accepts("("):
             inner = self.expression()
             self._cursor.expect(")")
             return inner
-        if self._cursor.accepts("INT64_C"):
-            self._cursor.expect("(")
-            sign = -1 if self._cursor.accepts("-") else 1
-            value = sign * int(self._cursor.take(r"\d{1,19}"))
-            self._cursor.expect(")")
-            if abs(value) >= 1 << 63:
-                raise self._cursor.refused("a constant of 64 bits")
-            return Value("int64_t", value, value, number(value))
+        for bits in (32, 64):
+            if self._cursor.accepts(f"INT{bits}_C"):
+                return self._literal(bits)
         if self._cursor.next.isdigit():
             value = int(self._cursor.take(r"\d{1,9}"))
             return Value("int", value, value, number(value))
         name = self._cursor.take(r"[A-Za-z_]\w*")
         if self._cursor.accepts("->"):
             name += "->" + self._cursor.take(r"\w+")
-            if self._cursor.accepts("["):
-                name += "[" + self._cursor.take(r"\d+") + "]"
-                self._cursor.expect("]")
         if name not in self._names:
             raise self._cursor.refused(f"something other than {name!a}, which has no value here")
         return self._names[name]
+
+    def _literal(self, bits: int) -> Value:
+        self._cursor.expect("(")
+        sign = -1 if self._cursor.accepts("-") else 1
+        value = sign * int(self._cursor.take(r"\d{1,19}"))
+        self._cursor.expect(")")
+        if abs(value) >= 1 << bits - 1:
+            raise self._cursor.refused(f"a constant of {bits} bits")
+        return Value(f"int{bits}_t", value, value, number(value))
 
     def _constant(self, value: Value, what: str) -> Value:
         if value.low != value.high:

@@ -11,7 +11,6 @@ its differences are the moving sums, which fit 64 bits with a sign.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 
 BEGIN = """
 #include "NAME.h"
@@ -163,7 +162,7 @@ HEADER = """
 extern "C" {
 #endif
 
-typedef struct { WORD s[WORDS]; } NAME_state;
+typedef struct { STATES } NAME_state;
 
 void NAME_reset(NAME_state *state);
 int64_t NAME_step(NAME_state *state, PARAMETERS, uint8_t *status);
@@ -195,12 +194,11 @@ def filled(text: str, **words: object) -> str:
     return re.sub(rf"\b(?:{keys})", lambda found: str(words[found[0]]), text)
 
 
-def ticks(prefix_codes: Sequence[tuple[str, str]], stages: int, result: str) -> str:
-    """Return the body of `tick`; `prefix_codes` are the members of the inputs and the codes they are set to."""
+def ticks(given: str, stages: int, result: str) -> str:
+    """Return the body of `tick`; `given` sets the members of the inputs."""
     parts = []
     for k in reversed(range(stages)):
         condition = f"first <= {k} && {k} <= last" if k else "first == 0"
-        given = "".join(f"w->{member} = {code};" for member, code in prefix_codes) if k == 0 else ""
         taken = f"out[(n - behind) * channels + c] = (int64_t)w->{result};" if k == stages - 1 else ""
-        parts.append(f"if ({condition}) {{ {given} stage{k}(state, w); {taken} }}")
+        parts.append(f"if ({condition}) {{ {given if k == 0 else ''} stage{k}(state, w); {taken} }}")
     return "\n".join(parts)

@@ -7,12 +7,12 @@ before it is overwritten.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from sosmith.verify.c_model.cursor import Cursor
 from sosmith.verify.c_model.expressions import (
-    BITS,
+    HELD,
     Form,
     Reader,
     Value,
@@ -44,10 +44,8 @@ class Stages:
     stages : sequence of StageEntry
     inputs : sequence of PortEntry
         What the first of them takes.
-    word : str
-        Type of a state's word.
-    words : int
-        Number of states.
+    words : mapping of int to str
+        Types of the states, by their numbers.
     fields : dict of str to str
         Types of what is handed on, by the names of the members.
     stored : dict of str to Place
@@ -59,8 +57,7 @@ class Stages:
     prefix: str
     stages: Sequence[StageEntry]
     inputs: Sequence[PortEntry]
-    word: str
-    words: int
+    words: Mapping[int, str]
     fields: dict[str, str] = field(default_factory=dict)
     stored: dict[str, Place] = field(default_factory=dict)
     owners: dict[int, Place] = field(default_factory=dict)
@@ -75,7 +72,7 @@ class Stages:
         """
         cursor.expect("typedef struct {")
         while not cursor.accepts("}"):
-            kind = cursor.take("|".join(BITS))
+            kind = cursor.take("|".join(HELD))
             member = cursor.take(r"\w+")
             require(member not in self.fields, f"{member} must be a member once")
             self.fields[member] = kind
@@ -83,7 +80,11 @@ class Stages:
         cursor.expect(f"{self.prefix}wires;")
         for index, port in enumerate(self.inputs):
             member = f"{port.name}_code"
-            require(self.fields.get(member) == "int64_t", f"{member} must be a member of the type int64_t")
+            require(member in self.fields, f"{member} must be a member")
+            require(
+                fits(self.fields[member], port.lowest, port.highest),
+                f"{member} must hold {port.lowest}..{port.highest}, as {self.fields[member]} does not",
+            )
             self.stored[member] = (-1, index)
         for index in range(len(self.stages)):
             cursor.expect(
@@ -110,7 +111,7 @@ class Stages:
         stage, index = place
         if stage < 0:
             port = self.inputs[index]
-            return Value("int64_t", port.lowest, port.highest, variable(f"input {index}"))
+            return Value("", port.lowest, port.highest, variable(f"input {index}"))
         node = self.stages[stage].nodes[index]
         return Value("", node.low, node.high, variable(f"node {stage} {index}"))
 
@@ -150,7 +151,7 @@ class _Body:
     def _declare(self, index: int, node: NodeEntry) -> None:
         name = f"n{self._index}_{index}"
         self._cursor.expect("const")
-        kind = self._cursor.take("|".join(BITS))
+        kind = self._cursor.take("|".join(HELD))
         self._cursor.expect(f"{name} =")
         place = (self._index, index)
         if node.op is Operation.INPUT:
@@ -158,7 +159,7 @@ class _Body:
         elif node.op is Operation.DELAY:
             self._take_state(place)
         else:
-            found = Reader(self._cursor, self._names).expression()
+            found = self._expression(kind)
             require(
                 found.form == self._wanted(node),
                 f"{name} of the C model must compute {label(self._stage, index)}, and computes something else",
@@ -166,6 +167,15 @@ class _Body:
         self._cursor.expect(";")
         self._check_type(name, kind, node)
         self._names[name] = self._all.value(place)._replace(type=kind)
+
+    def _expression(self, kind: str) -> Value:
+        """Read the expression of a node, and the conversion to its type, which keeps what the node's range allows."""
+        ahead = self._cursor.ahead
+        reader = Reader(self._cursor, self._names)
+        if (self._cursor.next, ahead(1), ahead(2)) == ("(", kind, ")") and (ahead(3) == "(" or ahead(4) == ";"):
+            self._cursor.expect(f"({kind})")
+            return reader.primary()
+        return reader.expression()
 
     def _check_type(self, name: str, kind: str, node: NodeEntry) -> None:
         require(
@@ -183,16 +193,18 @@ class _Body:
         )
 
     def _take_state(self, place: Place) -> None:
-        self._cursor.expect("state->s[")
-        slot = int(self._cursor.take(r"\d{1,6}"))
-        self._cursor.expect("]")
-        require(slot < self._all.words and slot not in self._all.owners, f"state {slot} must be that of one delay")
+        slot = self._state()
+        require(slot in self._all.words and slot not in self._all.owners, f"state {slot} must be that of one delay")
         self._all.owners[slot] = place
 
+    def _state(self) -> int:
+        """Read a state, and return its number."""
+        self._cursor.expect("state->")
+        return int(self._cursor.take(r"s(?:0|[1-9]\d{0,5})").removeprefix("s"))
+
     def _store_state(self) -> None:
-        self._cursor.expect("state->s[")
-        slot = int(self._cursor.take(r"\d{1,6}"))
-        self._cursor.expect("] =")
+        slot = self._state()
+        self._cursor.expect("=")
         name = self._cursor.take(r"\w+")
         self._cursor.expect(";")
         owner = self._all.owners.get(slot, (-1, 0))
@@ -204,7 +216,7 @@ class _Body:
             name == f"n{self._index}_{source}", f"state {slot} must be stored from n{self._index}_{source}, not {name}"
         )
         node = self._stage.nodes[source]
-        require(fits(self._all.word, node.low, node.high), f"state {slot} must hold {node.low}..{node.high}")
+        require(fits(self._all.words[slot], node.low, node.high), f"state {slot} must hold {node.low}..{node.high}")
         self._changed.add(slot)
 
     def _store_member(self) -> None:

@@ -117,7 +117,7 @@ def test_c_model_of_many_samples_may_be_given_in_pieces(tmp_path: Path) -> None:
     block.restype = None
     block.argtypes = [ctypes.c_void_p, ctypes.c_size_t, ctypes.c_size_t, *[ctypes.c_void_p] * 3]
     codes = stimulus(design.datapath.inputs, 7, 400).reshape(200, 2, 2)
-    states = np.zeros((2, state_bytes(design.datapath) // 8), dtype=np.int64)
+    states = np.zeros((2, state_bytes(design.datapath)), dtype=np.uint8)
     result = np.empty((200, 2), dtype=np.int64)
     start = 0
     for length in (0, 1, 2, 3, 5, 8, 13, 21, 34, 113):

@@ -1,5 +1,6 @@
 """The compiled model against the exact interpreter, and what a datapath refuses."""
 
+import ctypes
 import re
 from dataclasses import replace
 from fractions import Fraction
@@ -8,7 +9,8 @@ import numpy as np
 import pytest
 from tests.model.datapaths import INPUT, OUTPUT, butterworth, cascade
 
-from sosmith.model.dataflow.c_model import c_header, c_source
+from sosmith.model.dataflow import compiled
+from sosmith.model.dataflow.c_model import c_header, c_source, state_bytes
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.graph import GraphBuilder, Range
 from sosmith.model.port import Port
@@ -89,6 +91,46 @@ def test_values_without_sign_that_fill_a_machine_word_stay_exact() -> None:
     datapath = of_one_input(g, g.shift(product, -58), 30)
     codes = np.array([[0], [1], [(1 << 29) - 1], [1 << 29], [(1 << 30) - 1]])
     assert datapath.compute(codes).tolist() == datapath.compute_exact(codes) == [0, 0, 31, 31, 63]
+
+
+@pytest.mark.parametrize("bits", [15, 16, 17, 31, 32])
+@pytest.mark.parametrize("signed", [False, True])
+def test_values_at_the_ends_of_a_type_of_32_bits_stay_exact(bits: int, signed: bool) -> None:
+    """Products and sums that just fit 32 bits, and those that just do not, at the ends of what goes in."""
+    low, high = (-(1 << bits - 1), (1 << bits - 1) - 1) if signed else (0, (1 << bits) - 1)
+    g = GraphBuilder()
+    x = g.input("x", 0, low, high)
+    square = g.multiply(x, x)
+    triple = g.add(g.scale(x, 3, 0), g.shift(x, 5))
+    whole = g.subtract(g.subtract(square, triple), g.constant((1 << 31) - 1, 0))
+    stage = HornerStep("only", g.build([g.clamp(g.floor(g.shift(whole, -2 * bits + 6), 0), -128, 127)]))
+    datapath = Datapath(
+        name="edge",
+        inputs=(Port.from_range("x", bits, Fraction(-1 if signed else 0), Fraction(1), signed=signed),),
+        output=Port.from_range("y", 8, Fraction(-1), Fraction(1), signed=True),
+        stages=(stage,),
+    )
+    codes = np.array([[low], [low + 1], [-1 if signed else 0], [1], [high - 1], [high]])
+    assert datapath.compute(codes).tolist() == datapath.compute_exact(codes)
+
+
+def test_a_difference_that_fits_a_type_which_its_terms_do_not_stays_exact() -> None:
+    g = GraphBuilder()
+    difference = g.subtract(g.input("x", 0, 0, (1 << 32) - 1), g.constant(1 << 31, 0))
+    datapath = of_one_input(g, g.shift(difference, -24), 32)
+    assert "(int32_t)(n0_0 - n0_1)" in c_source(datapath)
+    codes = np.array([[0], [1], [(1 << 31) - 1], [1 << 31], [(1 << 32) - 1]])
+    assert datapath.compute(codes).tolist() == datapath.compute_exact(codes) == [-128, -128, -1, 0, 127]
+
+
+@pytest.mark.parametrize("order", [1, 5])
+def test_the_size_of_a_state_is_that_of_the_compiler(order: int) -> None:
+    datapath = cascade(butterworth(order, 0.02))
+    asked = f"\nsize_t state_size(void) {{ return sizeof({datapath.name}_state); }}\n"
+    library = compiled._load(datapath.name, c_header(datapath), c_source(datapath) + asked, "-O0")
+    library.state_size.restype = ctypes.c_size_t
+    assert library.state_size() == state_bytes(datapath)
+    assert set(re.findall(r"^    (\w+) s\d+;", c_header(datapath), re.MULTILINE)) == {"int32_t", "int64_t"}
 
 
 def test_shifts_by_a_whole_machine_word_leave_the_sign() -> None:

@@ -84,25 +84,25 @@ def test_what_is_written_is_proven(name: str, model: Callable[[str], Model]) -> 
         assert "< 0) << 5" in model(name).source
 
 
-BODY = "{\n    const int64_t n0_0"
+BODY = "{\n    const int32_t n0_0"
 EDITS = [
-    ("worn", r"INT64_C\((\d+)\)", r"INT64_C(1\1)", "wrong constant"),
+    ("worn", r"INT32_C\((\d+)\)", r"INT32_C(1\1)", "wrong constant"),
     ("worn", r">> (\d+);", r">> 1\1;", "wrong shift"),
-    ("worn", r" > INT64_C\(\d+\) \? INT64_C\(\d+\) :", " > INT64_C(9) ? INT64_C(9) :", "another clamp"),
-    ("worn", r"(n\d+_\d+) < INT64_C\(0\) \? .*?;", r"\1;", "no clamp"),
+    ("worn", r" > INT32_C\(\d+\) \? INT32_C\(\d+\) :", " > INT32_C(9) ? INT32_C(9) :", "another clamp"),
+    ("worn", r"(n\d+_\d+) < INT32_C\(0\) \? .*?;", r"\1;", "no clamp"),
     ("worn", r" \+ ", " - ", "another operation"),
-    ("worn", r"\(int64_t\)(n\d+_\d+) \* (INT64_C\(\d+\));", r"\2 / \1;", "a division by a variable"),
-    ("worn", r"(const int64_t n0_1 = )w->temperature_code", r"\1w->voltage_code", "another input"),
-    ("worn", r"const int64_t n0_0 = w->voltage_code;", "const int64_t n0_0 = w->temperature_code;", "swapped input"),
+    ("worn", r"(n\d+_\d+) \* (INT32_C\(\d+\));", r"\2 / \1;", "a division by a variable"),
+    ("worn", r"(const int32_t n0_1 = )w->temperature_code", r"\1w->voltage_code", "another input"),
+    ("worn", r"const int32_t n0_0 = w->voltage_code;", "const int32_t n0_0 = w->temperature_code;", "swapped input"),
     ("worn", r"w->n0_0 = n0_0;", "w->n0_0 = n0_1;", "another node handed on"),
-    ("worn", r"state->s\[0\] = n(\d)_\d+;", r"state->s[0] = n\1_1;", "another state"),
-    ("worn", r"    state->s\[0\] = n\d+_\d+;\n", "", "a state that stays"),
-    ("worn", r"(    state->s\[0\] = n\d+_\d+;\n)", r"\1\1", "a state stored twice"),
-    ("worn", r"state->s\[1\]", "state->s[0]", "a state of two"),
-    ("worn", r"state->s\[0\]", "state->s[99]", "a state beyond the end"),
-    ("worn", re.escape(BODY), "{\n    w->n0_0 = 0;\n    const int64_t n0_0", "an extra statement"),
-    ("worn", re.escape(BODY), "{\n    for (;;) {}\n    const int64_t n0_0", "no end"),
-    ("worn", r"    w\.voltage_code = voltage_code;\n", "", "an input not set"),
+    ("worn", r"state->s0 = n(\d)_\d+;", r"state->s0 = n\1_1;", "another state"),
+    ("worn", r"    state->s0 = n\d+_\d+;\n", "", "a state that stays"),
+    ("worn", r"(    state->s0 = n\d+_\d+;\n)", r"\1\1", "a state stored twice"),
+    ("worn", r"state->s1\b", "state->s0", "a state of two"),
+    ("worn", r"state->s0\b", "state->s99", "a state beyond the end"),
+    ("worn", re.escape(BODY), "{\n    w->n0_0 = 0;\n    const int32_t n0_0", "an extra statement"),
+    ("worn", re.escape(BODY), "{\n    for (;;) {}\n    const int32_t n0_0", "no end"),
+    ("worn", r"    w\.voltage_code = \(int32_t\)voltage_code;\n", "", "an input not set"),
     ("worn", r"    stage1\(state, &w\);\n", "", "a stage left out"),
     ("worn", r"(    stage1\(state, &w\);\n)(    stage2\(state, &w\);\n)", r"\2\1", "stages in another order"),
     ("worn", r"voltage_code == 0 \|\| ", "", "a rail forgotten"),
@@ -118,10 +118,11 @@ EDITS = [
     ("worn", r"memset\(state, 0", "memset(state, 1", "another reset"),
     ("worn", r"64 \+ 16384 / channels", "0", "no progress"),
     ("worn", r"typedef struct \{\n", "typedef struct __attribute__((packed)) {\n", "attributes"),
-    ("worn", r"int64_t n0_0;\n", "int64_t n0_0;\n    int64_t n0_0;\n", "a member twice"),
-    ("worn", r"int64_t n0_0;\n", "int64_t n0_0;\n    int64_t other;\n", "a member of nobody"),
-    ("worn", r"const int64_t n0_3 ", "const int32_t n0_3 ", "a narrow type"),
-    ("worn", r"const int64_t n0_3 ", "int64_t n0_3 ", "a variable that could change"),
+    ("worn", r"int32_t n0_0;\n", "int32_t n0_0;\n    int32_t n0_0;\n", "a member twice"),
+    ("worn", r"int32_t n0_0;\n", "int32_t n0_0;\n    int32_t other;\n", "a member of nobody"),
+    ("wide", r"const int64_t (n\d+_\d+) ", r"const int32_t \1 ", "a narrow type"),
+    ("wide", r"= (n\d+_\d+) >> (\d+);", r"= (int32_t)(\1 >> \2) * INT32_C(1);", "a conversion on the way"),
+    ("worn", r"const int32_t n0_3 ", "int32_t n0_3 ", "a variable that could change"),
     ("worn", r"(void worn_reset)", r"static int unused(void) { return 1; }\n\1", ""),
     ("worn", r"\Z", "static int unused(void) { return 1; }\n", "a function that nobody calls"),
     ("worn", r"\Z", "#undef INT64_C\n", "a macro behind"),
@@ -141,10 +142,10 @@ EDITS = [
     ("worn", r"(    w->n0_0 = n0_0;)", r"\r\1", "a carriage return"),
     ("worn", r"(    w->n0_0 = n0_0;)", r"\f\1", "a form feed"),
     ("worn", r"\[(\d+)\]", r"<:\1:>", "digraphs"),
-    ("worn", r"INT64_C\((\d+)\)", r"INT64_C(0\1)", "an octal number"),
-    ("worn", r"INT64_C\((\d+)\)", r"\1.0", "a floating-point number"),
+    ("worn", r"INT32_C\((\d+)\)", r"INT32_C(0\1)", "an octal number"),
+    ("worn", r"INT32_C\((\d+)\)", r"\1.0", "a floating-point number"),
     ("worn", r"w->n0_0 = n0_0;", "w->n0_0 = n0_0, w->n0_0;", "a comma"),
-    ("worn", r"\(void\)state;", "(void)(state->s[0] = 1);", "a statement that does something"),
+    ("worn", r"\(void\)state;", "(void)(state->s0 = 1);", "a statement that does something"),
     ("worn", r"static const size_t behind", "static size_t behind", "a delay that could change"),
     ("channels", r"limits\[channel\]", "limits[0]", "limits of another channel"),
     ("channels", r"wear_flags\(channel, \(int64_t\)", "wear_flags(0, (int64_t)", "flags of another channel"),
@@ -175,8 +176,10 @@ def test_what_computes_something_else_is_refused(
 @pytest.mark.parametrize(
     ("old", "new"),
     [
-        (r"int64_t s\[(\d+)\]", r"int64_t s[1\1]"),
-        (r"int64_t s\[", "int s["),
+        (r"int(?:32|64)_t (s\d+);", r"int \1;"),
+        (r"(    int32_t s\d+;\n)", r"\1\1"),
+        (r"(    int32_t s\d+;\n)", r"\1    int32_t s99;\n"),
+        (r"    int32_t s\d+;\n", ""),
         (r"_H\n\n", "_H\n#define int64_t int\n"),
         (r"#ifndef ", "#ifdef "),
         (r"int64_t voltage_code, int64_t temperature_code", "int64_t temperature_code, int64_t voltage_code"),
@@ -194,6 +197,14 @@ def test_another_header_is_refused(old: str, new: str, model: Callable[[str], Mo
         model("worn").check(header=changed)
 
 
+def test_a_state_that_does_not_hold_its_values_is_refused(model: Callable[[str], Model]) -> None:
+    header = model("wide").header
+    changed = re.sub(r"__int128 (s\d+);", r"int64_t \1;", header, count=1)
+    assert changed != header
+    with pytest.raises(RejectedError, match=r"^state \d+ must hold -?\d+\.\.\d+$"):
+        model("wide").check(header=changed)
+
+
 def test_the_sentence_says_where(model: Callable[[str], Model]) -> None:
     worn = model("worn")
     line = next(number for number, text in enumerate(worn.source.split("\n"), 1) if "memset(state, 0" in text)
@@ -202,7 +213,7 @@ def test_the_sentence_says_where(model: Callable[[str], Model]) -> None:
         worn.check(changed)
     sentence = r"^n0_2 of the C model must compute node 2 \(constant c\d+\) of row_power1, and computes something else$"
     with pytest.raises(RejectedError, match=sentence):
-        worn.check(re.sub(r"const int64_t n0_2 = INT64_C\(-?", r"const int64_t n0_2 = INT64_C(9", worn.source))
+        worn.check(re.sub(r"const int32_t n0_2 = INT32_C\(-?", r"const int32_t n0_2 = INT32_C(9", worn.source))
 
 
 def test_comments_and_layout_are_free(model: Callable[[str], Model]) -> None:
@@ -211,7 +222,7 @@ def test_comments_and_layout_are_free(model: Callable[[str], Model]) -> None:
 
 
 def test_products_commute(model: Callable[[str], Model]) -> None:
-    text = re.sub(r"\(int64_t\)(n\d+_\d+) \* (n\d+_\d+);", r"(int64_t)\2 * \1;", model("worn").source)
+    text = re.sub(r"= (n\d+_\d+) \* (n\d+_\d+);", r"= \2 * \1;", model("worn").source)
     assert text != model("worn").source
     assert model("worn").check(text) == model("worn").check()
 
@@ -234,7 +245,7 @@ def test_random_changes_of_tokens_are_refused(name: str, model: Callable[[str], 
     ]
     for _ in range(25):
         place, other = rng.choice(words), rng.choice(words)[0]
-        if other == place[0] or {"__int128", "int64_t"} == {other, place[0]}:
+        if other == place[0] or {other, place[0]} <= {"__int128", "int64_t", "int32_t"}:
             continue
         new = rng.choice([other, ""])
         changed = f"{text[: place.start()]} {new} {text[place.end() :]}"

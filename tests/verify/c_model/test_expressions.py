@@ -14,6 +14,7 @@ from sosmith.verify.graph import RejectedError
 NAMES = {
     "a": Value("int64_t", -100, 100, variable("a")),
     "b": Value("int64_t", 0, 255, variable("b")),
+    "s": Value("int32_t", -(2**31), 2**31 - 1, variable("s")),
     "i": Value("int", -30000, 30000, variable("i")),
     "l": Value("int64_t", -(2**62), 2**62, variable("l")),
     "x": Value("__int128", -(2**100), 2**100, variable("x")),
@@ -70,6 +71,10 @@ def worth(atom: object, values: dict[str, int]) -> int:
         ("((__int128)INT64_C(3) * (INT64_C(1) << 62) + INT64_C(7))", "(3 << 62) + 7"),
         ("(__int128)l * INT64_C(4)", "l * 4"),
         ("i * 7 - 5", "i * 7 - 5"),
+        ("(int64_t)s * INT32_C(-7)", "s * -7"),
+        ("s + a", "s + a"),
+        ("s >> 31", "s >> 31"),
+        ("(int32_t)(l >> 40)", "l >> 40"),
     ],
 )
 def test_the_form_is_what_c_computes(text: str, python: str) -> None:
@@ -85,7 +90,11 @@ def test_the_form_is_what_c_computes(text: str, python: str) -> None:
     ("text", "sentence"),
     [
         ("i * 99999", r".*: -2999970000\.\.2999970000 is not in int"),
-        ("(int)l", r".*: -4611686018427387904\.\.4611686018427387904 is not in int"),
+        ("(int)l", ".* must go on with something other than 'int', .*"),
+        ("(int32_t)l", r".*: -4611686018427387904\.\.4611686018427387904 is not in int32_t"),
+        ("s * INT32_C(2)", r".*: -4294967296\.\.4294967294 is not in int32_t"),
+        ("s - i", ".* is not in int32_t"),
+        ("INT32_C(2147483648)", ".* must go on with a constant of 32 bits, .*"),
         ("l * INT64_C(4)", ".* is not in int64_t"),
         ("l + l", ".* is not in int64_t"),
         ("(int64_t)x", ".* is not in int64_t"),
