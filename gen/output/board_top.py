@@ -12,7 +12,7 @@ from sosmith.gen.output.verilog import core_verilog, to_rtlil, to_verilog
 from sosmith.hdl.boards.board_top import BoardTop
 from sosmith.hdl.bus.command_engine import MAX_CHANNELS, MAX_READINGS, MAX_SAMPLE_BYTES
 from sosmith.hdl.bus.uart import MIN_CLOCKS
-from sosmith.model.converters.spi_schedule import Schedule
+from sosmith.model.converters.schedule import Schedule
 from sosmith.model.errors import SpecificationError
 
 
@@ -79,14 +79,18 @@ def schedule_of(design: CoreDesign, clock: Fraction) -> Schedule:
     Raises
     ------
     SpecificationError
-        If the core has other inputs than the converters, more of them than a message of the link holds, or the
-        converters are too slow.
+        If the core has other inputs or another output than the converters, more inputs than a message of the link
+        holds, or the converters are too slow.
     """
     spec, ports = design.spec, design.datapath.inputs
     if ports != tuple(each.reading.port for each in spec.converters):
         found = " and ".join(port.name for port in ports)
         wanted = " and ".join(each.reading.port.name for each in spec.converters)
         raise SpecificationError(f"the core must have the inputs {wanted} of the converters, not {found}")
+    if spec.dac is not None and spec.dac.port != design.datapath.output:
+        raise SpecificationError(
+            f"the core must have the output {spec.dac.port.name} of the converter, not {design.datapath.output.name}"
+        )
     if spec.channels * len(ports) > MAX_READINGS:
         raise SpecificationError(
             f"inputs of all channels must be at most {MAX_READINGS} with converters, not {spec.channels * len(ports):,}"
@@ -94,6 +98,7 @@ def schedule_of(design: CoreDesign, clock: Fraction) -> Schedule:
     return Schedule.of(
         tuple(each.reading for each in spec.converters),
         tuple(each.timing for each in spec.converters),
+        writing=spec.dac,
         channels=spec.channels,
         clock=clock,
         sample_rate=spec.sample_rate,

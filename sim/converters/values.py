@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sosmith.model.arrays import Codes
-from sosmith.model.converters.spi_schedule import Schedule
+from sosmith.model.converters.schedule import Schedule
 
 _COMMANDS = {2: (3, 0), 4: (4, 1)}
 """By the inputs of an ADC: bits behind the start bit of a command, and clocks more to sample."""

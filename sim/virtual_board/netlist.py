@@ -25,7 +25,7 @@ from sosmith.gen.fpga.boards import Board
 from sosmith.gen.fpga.synthesis import synthesize
 from sosmith.gen.output.board_top import board_verilog, schedule_of, top_name
 from sosmith.model.arrays import Codes
-from sosmith.model.converters.spi_schedule import Schedule
+from sosmith.model.converters.schedule import Schedule
 from sosmith.model.errors import SpecificationError, ToolError
 from sosmith.model.link.protocol import MAX_BODY, WINDOWS
 from sosmith.model.text_files import write_files

@@ -18,9 +18,9 @@ from cocotb_tools.runner import Icarus
 
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.hdl.converters.front_end import FrontEnd, _Scan
+from sosmith.model.converters.reading import Reading
+from sosmith.model.converters.schedule import Schedule
 from sosmith.model.converters.spi_converter import CONVERTERS, ReadingFault
-from sosmith.model.converters.spi_reading import Reading
-from sosmith.model.converters.spi_schedule import Schedule
 from sosmith.model.dataflow.status import Flag
 from sosmith.model.port import Port
 from sosmith.sim.converters.cocotb_bus import thermocouple_frame
@@ -203,14 +203,14 @@ def test_what_the_model_makes_of_a_frame() -> None:
     assert held == [True, False, True, False]
 
 
-def without_faults(scan: Any, reading: Reading, code: Signal) -> Value:
+def without_faults(scan: Any, reading: Reading, frame: Value, code: Signal) -> Value:
     """Take every reading for a good one."""
     return Const(0, len(ReadingFault))
 
 
-def with_wrong_bits(scan: Any, reading: Reading, code: Signal) -> Value:
+def with_wrong_bits(scan: Any, reading: Reading, frame: Value, code: Signal) -> Value:
     """Take a wrong null bit for a right one."""
-    return FAULTS(scan, reading, code) & ~(1 << ReadingFault.FRAME)
+    return FAULTS(scan, reading, frame, code) & ~(1 << ReadingFault.FRAME)
 
 
 FAULTS = _Scan.faults
