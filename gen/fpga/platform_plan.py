@@ -11,7 +11,7 @@ from amaranth.build.run import BuildPlan
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.fpga.tools import EXTRA
 from sosmith.gen.fpga.wiring import Wiring
-from sosmith.hdl.boards.on_platform import AUDIO, INPUTS, SPI, OnPlatform
+from sosmith.hdl.boards.on_platform import AUDIO, DACS, INPUTS, SPI, OnPlatform
 from sosmith.model.errors import ToolError
 
 SEED = 1
@@ -44,7 +44,7 @@ def board_plan(verilog: str, top: str, name: str, board: Board, wiring: Wiring) 
         If the board has too few pins for the converters.
     """
     assert board.platform is not None
-    spi, audio = wiring.spi_pins(board), wiring.audio_pins(board)
+    pins = {SPI: wiring.spi_pins(board), AUDIO: wiring.audio_pins(board), DACS: wiring.dac_pins(board)}
     module, _, kind = board.platform.partition(":")
     try:
         platform = getattr(import_module(module), kind)()
@@ -55,10 +55,11 @@ def board_plan(verilog: str, top: str, name: str, board: Board, wiring: Wiring) 
     _, _, options = board.device.synthesis.partition(" ")
     wishes = f"--seed {SEED} --freq {float(wiring.clock(board)) / 1e6:g} --timing-allow-fail --report report.json"
     platform.add_file(f"{top}.sv", verilog)
-    for resource, pins in ((SPI, spi), (AUDIO, audio)):
-        if pins:
-            platform.add_resources([_converters(resource, pins, board.device.family)])
-    top_level = OnPlatform(top, spi=tuple(spi), audio=tuple(audio), pll=wiring.pll)
+    for resource, signals in pins.items():
+        if signals:
+            platform.add_resources([_converters(resource, signals, board.device.family)])
+    names = {resource: tuple(signals) for resource, signals in pins.items() if signals}
+    top_level = OnPlatform(top, converters=names, pll=wiring.pll)
     return platform.prepare(top_level, name, emit_src=False, synth_opts=options, nextpnr_opts=wishes)
 
 

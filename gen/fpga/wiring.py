@@ -25,6 +25,8 @@ class Wiring:
         Whether there is an I2S.
     lines_in, lines_out : int
         Its data lines from ADCs and to DACs.
+    dac_selects : int
+        Chip selects of DACs on an SPI of their own.
     pll : Pll or None
         What makes the clock; None for that of the board.
     """
@@ -33,6 +35,7 @@ class Wiring:
     audio: bool = False
     lines_in: int = 0
     lines_out: int = 0
+    dac_selects: int = 0
     pll: Pll | None = None
 
     def clock(self, board: Board) -> Fraction:
@@ -60,6 +63,25 @@ class Wiring:
         dout = (rows[_ROW - 1], *rest[:more_out])[: self.lines_out]
         din = (rows[2 * _ROW - 1], *rest[more_out : more_out + more_in])[: self.lines_in]
         return clocks | {name: pins for name, pins in (("dout", dout), ("din", din)) if pins}
+
+    def dac_pins(self, board: Board) -> dict[str, tuple[str, ...]]:
+        """Return the pins of the DACs' SPI, from the last ones of the header on, without those that others take.
+
+        Raises
+        ------
+        SpecificationError
+            If the board has too few.
+        """
+        if not self.dac_selects:
+            return {}
+        others = (self.audio_pins(board), self.spi_pins(board))
+        taken = {pin for used in others for pins in used.values() for pin in pins}
+        free = [pin for pin in reversed(board.header) if pin not in taken]
+        most = max(len(free) - 2, 0)
+        if self.dac_selects > most:
+            raise SpecificationError(f"DACs must be at most {most} on the {board.title}, not {self.dac_selects}")
+        sck, mosi, *selects = free
+        return {"dac_sck": (sck,), "dac_mosi": (mosi,), "dac_cs_n": tuple(selects[: self.dac_selects])}
 
     def spi_pins(self, board: Board) -> dict[str, tuple[str, ...]]:
         """Return the pins of the SPI, without those that the I2S takes.

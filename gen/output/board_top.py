@@ -129,6 +129,7 @@ def wiring_of(design: CoreDesign, board: Board) -> Wiring:
         audio=bool(audio),
         lines_in=sum(schedule.lines_in),
         lines_out=schedule.lines_out,
+        dac_selects=schedule.dac_selects,
         pll=pll,
     )
 

@@ -12,6 +12,7 @@ from sosmith.model.converters.dac_writing import Writing
 from sosmith.model.converters.i2s_converter import I2S_CONVERTERS, I2sConverter
 from sosmith.model.converters.reading import Reading, UnfitReadingError
 from sosmith.model.converters.spi_converter import CONVERTERS, SUPPLY, Converter, Timing
+from sosmith.model.converters.spi_dac import SPI_DACS, SpiDac
 from sosmith.model.port import Port
 
 if TYPE_CHECKING:
@@ -27,7 +28,10 @@ ADCS: dict[str, Converter | I2sConverter] = {
 }
 """Converters of inputs by their names."""
 
-DACS = {name: device for name, device in I2S_CONVERTERS.items() if device.is_dac}
+DACS: dict[str, I2sConverter | SpiDac] = {
+    **{name: device for name, device in I2S_CONVERTERS.items() if device.is_dac},
+    **SPI_DACS,
+}
 """Converters of the output by their names."""
 
 

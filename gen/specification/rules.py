@@ -17,6 +17,7 @@ from sosmith.gen.specification.uncertainty import check_coefficients
 from sosmith.gen.specification.values import UnfitError, identifier, key_text, listed, literal, one_of, together
 from sosmith.model.converters.i2s_converter import I2sConverter
 from sosmith.model.converters.spi_converter import Converter
+from sosmith.model.converters.spi_dac import SpiDac
 
 MARGIN = Fraction(1, 10**6)
 """Minimum distance of a band edge from 0 and from half the sample rate, as a fraction of the sample rate.
@@ -105,7 +106,9 @@ def _check_converters(document: Document) -> None:
         _check_converter(key_text(name), table, ADCS if name in inputs else DACS)
 
 
-def _check_converter(name: str, table: ConverterTable, devices: Mapping[str, Converter | I2sConverter]) -> None:
+def _check_converter(
+    name: str, table: ConverterTable, devices: Mapping[str, Converter | I2sConverter | SpiDac]
+) -> None:
     where = f"converter.{name}"
     if table.device not in devices:
         kind = "a DAC" if devices is DACS else "an ADC"
@@ -115,7 +118,7 @@ def _check_converter(name: str, table: ConverterTable, devices: Mapping[str, Con
     if by_range and table.range is None:
         expected = f"the values of the input at the readings 0 and {2**device.width}, [low, high]"
         raise UnfitError(expected, "missing", where=f"{where}.range")
-    without = () if by_range else ("supply",) if isinstance(device, I2sConverter) else ("range", "supply")
+    without = () if by_range else ("range", "supply") if isinstance(device, Converter) else ("supply",)
     for key in without:
         if (found := getattr(table, key)) is not None:
             raise UnfitError(f"left out for {table.device}", literal(found), where=f"{where}.{key}")

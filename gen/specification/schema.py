@@ -50,6 +50,7 @@ from sosmith.gen.specification.values import (
 )
 from sosmith.model.converters.i2s_converter import I2S_CONVERTERS
 from sosmith.model.converters.spi_converter import CONVERTERS, SUPPLIES
+from sosmith.model.converters.spi_dac import SPI_DACS
 from sosmith.model.dataflow.protection import PROTECTIONS
 from sosmith.model.suggestion import did_you_mean
 
@@ -199,7 +200,7 @@ class WearTable(Table):
     sensor_range: Annotated[Fraction | None, PlainValidator(number)] = None
 
 
-_DEVICES = (*CONVERTERS, *I2S_CONVERTERS)
+_DEVICES = (*CONVERTERS, *I2S_CONVERTERS, *SPI_DACS)
 
 
 class ConverterTable(Table):

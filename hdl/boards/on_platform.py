@@ -13,6 +13,7 @@
     i2s 0: mclk, lrck, bclk 2 <----- mclk, lrck, bclk     with converters on an I2S: clocks for DACs and for ADCs
            dout n <--------------- dout n
            din n ----------------> din n
+    dacs 0: dac_sck, .. <----------- dac_sck, dac_mosi, dac_cs_n n
 
 With a PLL, ``sync`` is its clock, and the reset is high until it has locked::
 
@@ -25,6 +26,7 @@ all registers start with their initial values.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from amaranth.build import Platform, ResourceError
@@ -40,6 +42,9 @@ SPI = "converters"
 AUDIO = "i2s"
 """Name of the resource with the pins of the converters on an I2S."""
 
+DACS = "dacs"
+"""Name of the resource with the pins of DACs on an SPI."""
+
 CLOCKS = ("mclk", "lrck", "bclk")
 """Pins of converters that are there twice."""
 
@@ -54,17 +59,17 @@ class OnPlatform(Elaboratable):
     ----------
     top : str
         Name of a module with the ports of `sosmith.hdl.boards.board_top.BoardTop`, which the platform has as a file.
-    spi, audio : tuple of str
-        Its pins of converters; the platform has them in the resources `SPI` and `AUDIO`, and twice where a pin of the
-        resource is two.
+    converters : mapping of str to tuple of str
+        Its pins of converters, by the name of the platform's resource that has them: `SPI`, `AUDIO`, `DACS`. A pin is
+        there twice where the resource has two for it.
     pll : Pll or None
         What makes the clock; None for that of the platform.
     """
 
     def __init__(
-        self, top: str, *, spi: tuple[str, ...] = (), audio: tuple[str, ...] = (), pll: Pll | None = None
+        self, top: str, *, converters: Mapping[str, tuple[str, ...]] | None = None, pll: Pll | None = None
     ) -> None:
-        self.top, self.spi, self.audio, self.pll = top, spi, audio, pll
+        self.top, self.converters, self.pll = top, converters or {}, pll
 
     def elaborate(self, platform: Platform) -> Module:
         """Request the resources."""
@@ -76,9 +81,8 @@ class OnPlatform(Elaboratable):
         bus: dict[str, Value] = {}
         if self.pll is not None:
             self.own_clock(m, platform, self.pll)
-        for resource, names in ((SPI, self.spi), (AUDIO, self.audio)):
-            if names:
-                self.converters(m, platform.request(resource, 0, dir="-"), names, bus)
+        for resource, names in self.converters.items():
+            self.connect(m, platform.request(resource, 0, dir="-"), names, bus)
         m.submodules.board = Instance(
             self.top,
             i_clk=ClockSignal(),
@@ -113,7 +117,7 @@ class OnPlatform(Elaboratable):
         m.d.sync += waiting.eq(Cat(~locked, waiting[0]))
         m.d.comb += ResetSignal().eq(waiting[1])
 
-    def converters(self, m: Module, pins: Any, names: tuple[str, ...], bus: dict[str, Value]) -> None:
+    def connect(self, m: Module, pins: Any, names: tuple[str, ...], bus: dict[str, Value]) -> None:
         """Connect pins of converters."""
         for name in sorted(names, key=INPUTS.__contains__):
             if name in INPUTS:

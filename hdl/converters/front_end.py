@@ -24,6 +24,11 @@ With an I2S, its frame makes the tick, and what it brought is read without a fra
     frame   |  n: ADC sends    |  n + 1: core       |  n + 2: DAC gets   |
             |  samples         |  computes          |  results           |
 
+DACs on an SPI have it to themselves, and get the results as soon as that of the last channel is there::
+
+    m_axis_* --> offset + gain * code, within range --> [result0], [result1], .. --> SpiReader --> dac_sck, dac_mosi,
+                                                                                                   dac_cs_n n
+
 A code whose reading is bad is held: the last good one is fed again, and its result has the flag `fault`. A converter
 that takes its time is not asked before, and its last code is fed until then. Latency, from the tick to the last result:
 at most `sosmith.model.converters.schedule.Schedule.clocks`, and that of the core for each channel; from an ADC to a
@@ -46,6 +51,7 @@ from sosmith.model.converters.i2s_converter import MAX_WIDTH, I2sConverter
 from sosmith.model.converters.reading import Reading
 from sosmith.model.converters.schedule import Schedule
 from sosmith.model.converters.spi_converter import THERMOCOUPLE_FAULTS, Converter, ReadingFault
+from sosmith.model.converters.spi_dac import DAC_FRAME_BITS, SpiDac
 from sosmith.model.dataflow.status import STATUS_BITS, Flag
 
 _START = 15
@@ -70,6 +76,8 @@ class FrontEnd(wiring.Component):
         The SPI, if there is one: all converters of input 0, in the order of channels, have the lowest bits of ``cs_n``.
     mclk, bclk, lrck, din, dout
         The I2S, if there is one: all ADCs of input 0 have the lowest bits of ``din``, and a DAC has two channels.
+    dac_sck, dac_mosi, dac_cs_n
+        The SPI of DACs, if there is one, in the order of channels.
     aresetn : Out(1)
         Reset of the core.
     s_axis_*, m_axis_*
@@ -343,20 +351,49 @@ class _Scan:
 
     def write(self, writing: Writing) -> None:
         """Give the DACs each result as it comes; the last channel of an odd number has both sides of its DAC."""
-        m, front, audio, converter = self.m, self.front, self.audio, writing.converter
-        assert audio is not None
+        m, front, converter = self.m, self.front, writing.converter
         result = Signal(Shape(writing.port.bits, writing.port.signed))
         place = Signal.like(self.channel)
         new = Signal()
         m.d.sync += [result.eq(front.m_axis_tdata), place.eq(self.channel), new.eq(self.queue.i_push)]
         exact = writing.gain * result + writing.offset
         word = Mux(exact > converter.highest, converter.highest, Mux(exact < converter.lowest, converter.lowest, exact))
-        words = [Signal(MAX_WIDTH, name=f"result{channel}") for channel in range(self.plan.channels)]
+        width = converter.width
+        words = [Signal(width, name=f"result{channel}") for channel in range(self.plan.channels)]
         for channel, held in enumerate(words):
             with m.If(new & (place == channel)):
                 m.d.sync += held.eq(word)
-        left, right = words[::2], [*words[1::2], *words[-1:]]
-        m.d.comb += [audio.i_left.eq(Cat(left)), audio.i_right.eq(Cat(right[: len(left)]))]
+        if isinstance(converter, SpiDac):
+            self.send(converter, words, new & (place == self.plan.channels - 1))
+        elif self.audio is not None:
+            left, right = words[::2], [*words[1::2], *words[-1:]]
+            m.d.comb += [self.audio.i_left.eq(Cat(left)), self.audio.i_right.eq(Cat(right[: len(left)]))]
+
+    def send(self, converter: SpiDac, words: list[Signal], whole: Value) -> None:
+        """Send the words of all channels to DACs on an SPI, one after another, once the last one is there."""
+        m, front, plan = self.m, self.front, self.plan
+        m.submodules.writer = writer = SpiReader(
+            half=plan.dac_half, deselect=plan.dac_deselect, selects=plan.dac_selects, command_bits=DAC_FRAME_BITS
+        )
+        m.d.comb += [
+            front.dac_sck.eq(writer.sck),
+            front.dac_mosi.eq(writer.mosi),
+            front.dac_cs_n.eq(writer.cs_n),
+            writer.i_bits.eq(DAC_FRAME_BITS),
+        ]
+        with m.FSM(name="send"):
+            with m.State("wait"), m.If(whole):
+                m.next = "start 0"
+            for channel, word in enumerate(words):
+                with m.State(f"start {channel}"):
+                    m.d.comb += [
+                        writer.i_start.eq(1),
+                        writer.i_select.eq(1 << channel),
+                        writer.i_command.eq(Cat(word, Const(converter.command, DAC_FRAME_BITS - converter.width))),
+                    ]
+                    m.next = f"frame {channel}"
+                with m.State(f"frame {channel}"), m.If(writer.o_done):
+                    m.next = f"start {channel + 1}" if channel + 1 < len(words) else "wait"
 
     def next_channel(self, after: str) -> None:
         """Go on to the next channel; behind the last one, to a state."""

@@ -4,6 +4,7 @@
 
     SPI: sck, mosi, miso, cs_n n        with a chip select for each converter
     I2S: mclk, bclk, lrck, din n, dout n    with a data line for each ADC and each DAC
+    SPI of DACs: dac_sck, dac_mosi, dac_cs_n n
 
 No latency: wires only.
 """
@@ -26,4 +27,6 @@ def converter_pins(schedule: Schedule) -> dict[str, In | Out]:
         members["din"] = In(lines_in)
     if schedule.lines_out:
         members["dout"] = Out(schedule.lines_out)
+    if schedule.dac_selects:
+        members |= {"dac_sck": Out(1), "dac_mosi": Out(1), "dac_cs_n": Out(schedule.dac_selects)}
     return members

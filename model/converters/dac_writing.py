@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from sosmith.model.converters.i2s_converter import I2sConverter
 from sosmith.model.converters.reading import UnfitReadingError
+from sosmith.model.converters.spi_dac import SpiDac
 from sosmith.model.port import Port
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ class Writing:
 
     Attributes
     ----------
-    converter : I2sConverter
+    converter : I2sConverter or SpiDac
         The DAC.
     port : Port
         The output.
@@ -42,18 +43,18 @@ class Writing:
     (0, 512, -1536, 8388607)
     """
 
-    converter: I2sConverter
+    converter: I2sConverter | SpiDac
     port: Port
     offset: int
     gain: int
 
     @classmethod
-    def of(cls, converter: I2sConverter, port: Port, span: tuple[Fraction, Fraction]) -> Writing:
+    def of(cls, converter: I2sConverter | SpiDac, port: Port, span: tuple[Fraction, Fraction]) -> Writing:
         """Return how a port is written to a DAC.
 
         Parameters
         ----------
-        converter : I2sConverter
+        converter : I2sConverter or SpiDac
             The DAC.
         port : Port
             The output.

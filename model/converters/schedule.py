@@ -11,9 +11,10 @@ from math import ceil, floor
 
 from sosmith.model.converters.dac_writing import Writing
 from sosmith.model.converters.i2s_converter import I2sConverter
-from sosmith.model.converters.i2s_frame import I2sFrame
+from sosmith.model.converters.i2s_frame import LATENCY, I2sFrame
 from sosmith.model.converters.reading import Reading
 from sosmith.model.converters.spi_converter import Timing
+from sosmith.model.converters.spi_dac import DAC_FRAME_BITS, SpiDac
 from sosmith.model.errors import SpecificationError
 
 MIN_HALF = 2
@@ -48,6 +49,8 @@ class Schedule:
         How results are written to a DAC.
     frame : I2sFrame or None
         The clocks of the I2S; None without one.
+    dac_half, dac_deselect : int
+        As `half` and `deselect`, of the SPI of DACs.
     """
 
     readings: tuple[Reading, ...]
@@ -59,6 +62,8 @@ class Schedule:
     first: int
     writing: Writing | None = None
     frame: I2sFrame | None = None
+    dac_half: int = 1
+    dac_deselect: int = 1
 
     @classmethod
     def of(
@@ -100,24 +105,33 @@ class Schedule:
         users = (*readings, *([writing] if writing is not None else ()))
         audio = [user.converter for user in users if isinstance(user.converter, I2sConverter)]
         frame = I2sFrame.of(audio, clock=clock, sample_rate=sample_rate) if audio else None
+        dac = None if writing is None else writing.converter
         spi = [timing for timing in timings if timing is not None]
         made = cls(
             readings=readings,
             channels=channels,
             period=Fraction(frame.clocks) if frame is not None else clock / sample_rate,
-            half=max(MIN_HALF, *(_half(clock, timing) for timing in spi)) if spi else MIN_HALF,
+            half=max(MIN_HALF, *(max(_half(clock, each), _answer(clock, each)) for each in spi)) if spi else MIN_HALF,
             deselect=max(1, *(ceil(clock * timing.deselect) for timing in spi)) if spi else 1,
             intervals=(1,) * len(readings),
             # The first frame of an I2S has begun before its converters saw an edge of LRCK.
             first=max(int(frame is not None), *(ceil(sample_rate * timing.power_up) - 1 for timing in spi), 0),
             writing=writing,
             frame=frame,
+            dac_half=_half(clock, dac.timing) if isinstance(dac, SpiDac) else 1,
+            dac_deselect=max(1, ceil(clock * dac.timing.deselect)) if isinstance(dac, SpiDac) else 1,
         )
         busy = made.clocks / clock  # no converter has its CS low for longer
         intervals = tuple(
             1 + floor(sample_rate * (timing.conversion + busy)) if timing is not None and timing.conversion else 1
             for timing in timings
         )
+        sent = channels * made.dac_clocks
+        if sent > floor(made.period):
+            raise SpecificationError(
+                f"the sample rate must be at most {float(clock / sent):,.0f} Hz with these DACs at a clock of "
+                f"{float(clock):,.0f} Hz, not {float(sample_rate):,.0f} Hz"
+            )
         taken = made.clocks + channels * (latency + SAMPLE_OVERHEAD)
         if taken > floor(made.period):
             raise SpecificationError(
@@ -139,7 +153,24 @@ class Schedule:
     @property
     def lines_out(self) -> int:
         """How many data lines of the I2S there are to DACs."""
-        return 0 if self.writing is None else self.converters(self.writing)
+        return self.converters(self.writing) if self.writing is not None and _is_i2s(self.writing) else 0
+
+    @property
+    def dac_selects(self) -> int:
+        """How many DACs there are on an SPI of their own, each with a CS of its own."""
+        return self.converters(self.writing) if self.writing is not None and not _is_i2s(self.writing) else 0
+
+    @property
+    def dac_clocks(self) -> int:
+        """Most clocks of the frame of a DAC on an SPI; 0 without one."""
+        if not self.dac_selects:
+            return 0
+        return 2 * self.dac_half * DAC_FRAME_BITS + self.dac_half + self.dac_deselect + FRAME_OVERHEAD
+
+    @property
+    def silent(self) -> int:
+        """How many words a DAC gets before that of the first result: on an I2S, one in each frame."""
+        return self.first - 1 + LATENCY if self.lines_out else 0
 
     def converters(self, user: Reading | Writing) -> int:
         """Return how many converters an input or the output has."""
@@ -157,11 +188,16 @@ class Schedule:
         return self.channels * frames + SCAN_OVERHEAD * len(self.readings)
 
 
-def _is_i2s(reading: Reading) -> bool:
-    return isinstance(reading.converter, I2sConverter)
+def _is_i2s(user: Reading | Writing) -> bool:
+    return isinstance(user.converter, I2sConverter)
 
 
 def _half(clock: Fraction, timing: Timing) -> int:
-    """Return the clocks of half an SCK period that a converter needs."""
+    """Return the clocks of half an SCK period that a converter needs to follow."""
     shortest = max(1 / (2 * timing.clock), timing.high, timing.low, timing.select, timing.setup, timing.hold)
-    return max(ceil(clock * shortest), 1 + ceil(clock * timing.valid / 2))
+    return ceil(clock * shortest)
+
+
+def _answer(clock: Fraction, timing: Timing) -> int:
+    """Return the clocks of half an SCK period that a converter needs to answer in."""
+    return 1 + ceil(clock * timing.valid / 2)

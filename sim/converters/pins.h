@@ -1,10 +1,10 @@
 // Converters at the pins of a simulated board's front-end: they answer as their data sheets say, at once.
 //
 // The file of their values is text: the number of chip selects; for each of them how many bits follow the start bit of
-// a command (0 for a MAX31855, which takes none), how many clocks more it samples for, its inputs, and how many values
-// each input has; then these, count or frame, all inputs of the first conversion first. Behind them the numbers of data
+// a command (0 for a converter that takes none), how many clocks more it samples for, the bits of its answer, its inputs,
+// and how many values each input has; then these, count or frame, all inputs of the first conversion first. Behind them the numbers of data
 // lines from ADCs and to DACs of an I2S, and of frames; then the words of each frame, left and right of each line, of 24
-// bits without a sign. The last value stays.
+// bits without a sign. The last value stays. Last, the number of DACs on an SPI.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,8 @@ class Converter {
 public:
     bool load(FILE* file) {
         size_t inputs = 0, rows = 0;
-        if (std::fscanf(file, "%d %d %zu %zu", &wanted_, &wait_, &inputs, &rows) != 4 || !inputs || !rows) return false;
+        if (std::fscanf(file, "%d %d %d %zu %zu", &wanted_, &wait_, &bits_, &inputs, &rows) != 5) return false;
+        if (!inputs || !rows) return false;
         values_.assign(inputs, {});
         next_.assign(inputs, 0);
         for (size_t n = 0; n < rows * inputs; ++n) {
@@ -33,7 +34,7 @@ public:
         configuration_ = 0;
         left_ = 0;
         driven_ = false;
-        if (wanted_ == 0) answer(value(0), 32);
+        if (wanted_ == 0) answer(value(0), bits_);
         fall();
     }
 
@@ -47,7 +48,7 @@ public:
             if (++taken_ == wanted_) {
                 // SGL/DIFF, then ODD/SIGN and MSBF, or D2, D1 and D0, the first of which is not looked at.
                 const unsigned channel = wanted_ == 3 ? configuration_ >> 1 & 1 : configuration_ & 3;
-                answer(value(channel), 13);  // the null bit, and 12 more
+                answer(value(channel), bits_);  // the null bit, and 12 more
             }
         } else {
             ++waited_;
@@ -78,7 +79,7 @@ private:
         left_ = bits;
     }
 
-    int wanted_ = 0, wait_ = 0, taken_ = 0, waited_ = 0, left_ = 0;
+    int wanted_ = 0, wait_ = 0, bits_ = 0, taken_ = 0, waited_ = 0, left_ = 0;
     bool started_ = false, driven_ = false, level_ = true;
     uint32_t configuration_ = 0, word_ = 0;
     std::vector<std::vector<uint32_t>> values_;
@@ -151,8 +152,48 @@ private:
     FILE* heard_ = nullptr;
 };
 
+// DACs on an SPI: a frame of 16 bits is taken where SCK rises, the highest bit first, and counts when CS rises.
+class Dacs {
+public:
+    // Where the words of DACs go, as text: those of a sample in a line.
+    void record(FILE* heard) { heard_ = heard; }
+
+    // Samples that all of `count` DACs have got.
+    uint64_t samples() const { return samples_; }
+
+    void step(uint64_t cs_n, size_t count, bool sck, bool mosi) {
+        got_.resize(count);
+        for (size_t n = 0; n < count; ++n) {
+            const bool selected = !(cs_n >> n & 1);
+            if (selected && (cs_n_ >> n & 1)) bits_ = 0;
+            if (selected && sck && !sck_) {
+                word_ = word_ << 1 | unsigned(mosi);
+                ++bits_;
+            }
+            if (selected || (cs_n_ >> n & 1)) continue;
+            if (bits_ == 16 && (word_ & 0xF000) == 0x3000) got_[n] = word_ & 0xFFF;
+            if (n + 1 < count) continue;
+            ++samples_;
+            if (!heard_) continue;
+            for (size_t k = 0; k < count; ++k) std::fprintf(heard_, k ? " %u" : "%u", got_[k]);
+            std::fprintf(heard_, "\n");
+        }
+        cs_n_ = cs_n;
+        sck_ = sck;
+    }
+
+private:
+    uint64_t cs_n_ = ~uint64_t(0), samples_ = 0;
+    bool sck_ = false;
+    unsigned word_ = 0, bits_ = 0;
+    std::vector<uint32_t> got_;
+    FILE* heard_ = nullptr;
+};
+
 class Converters {
 public:
+    Dacs dacs;
+    size_t dac_count = 0;
     Audio audio;
 
     bool load(const char* path) {
@@ -162,7 +203,7 @@ public:
         bool good = std::fscanf(file, "%zu", &count) == 1;
         converters_.resize(good ? count : 0);
         for (Converter& converter : converters_) good = good && converter.load(file);
-        good = good && audio.load(file);
+        good = good && audio.load(file) && std::fscanf(file, "%zu", &dac_count) == 1;
         std::fclose(file);
         return good;
     }
@@ -200,6 +241,13 @@ auto exchange(Converters& converters, Board& board, int) -> decltype(void(board.
 }
 template <class Board>
 void exchange(Converters&, Board&, long) {}
+
+template <class Board>
+auto write(Converters& converters, Board& board, int) -> decltype(void(board.dac_sck)) {
+    converters.dacs.step(board.dac_cs_n, converters.dac_count, board.dac_sck, board.dac_mosi);
+}
+template <class Board>
+void write(Converters&, Board&, long) {}
 
 template <class Board>
 auto data_in(Board& board, uint64_t levels, int) -> decltype(void(board.din)) {

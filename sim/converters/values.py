@@ -8,8 +8,8 @@ from sosmith.model.arrays import Codes
 from sosmith.model.converters.i2s_converter import MAX_WIDTH, I2sConverter
 from sosmith.model.converters.schedule import Schedule
 
-_COMMANDS = {2: (3, 0), 4: (4, 1)}
-"""By the inputs of an ADC: bits behind the start bit of a command, and clocks more to sample."""
+_COMMANDS = {2: (3, 0, 13), 4: (4, 1, 13)}
+"""By the inputs of an ADC: bits behind the start bit of a command, clocks more to sample, and bits of the answer."""
 
 MAX_SELECTS = 64
 """Most chip selects of a virtual board."""
@@ -35,10 +35,10 @@ def values_text(schedule: Schedule, codes: Codes) -> str:
             mine = frames[:, select * converter.inputs : (select + 1) * converter.inputs]
             unused = converter.inputs - mine.shape[1]
             mine = np.pad(mine, ((0, 0), (0, unused)))
-            wanted, wait = (0, 0) if converter.step is not None else _COMMANDS[converter.inputs]
-            lines.append(f"{wanted} {wait} {converter.inputs} {len(mine)}")
+            wanted, wait, bits = _COMMANDS[converter.inputs] if converter.command_bits else (0, 0, converter.bits)
+            lines.append(f"{wanted} {wait} {bits} {converter.inputs} {len(mine)}")
             lines += [" ".join(map(str, row)) for row in mine.tolist()]
-    lines += _audio_lines(schedule, codes)
+    lines += [*_audio_lines(schedule, codes), str(schedule.dac_selects)]
     return "\n".join(lines) + "\n"
 
 
@@ -55,7 +55,7 @@ def _audio_lines(schedule: Schedule, codes: Codes) -> list[str]:
 
 
 def words_of(text: str, schedule: Schedule) -> Codes:
-    """Return the words that DACs on the I2S got, from the file that ``pins.h`` writes.
+    """Return the words that DACs got, from the file that ``pins.h`` writes.
 
     Parameters
     ----------
@@ -66,10 +66,12 @@ def words_of(text: str, schedule: Schedule) -> Codes:
 
     Returns
     -------
-    ndarray of int, shape (frames, channels)
+    ndarray of int, shape (frames or samples, channels)
         The words.
     """
     rows = np.array([line.split() for line in text.splitlines()], np.int64)
+    if schedule.dac_selects:
+        return rows
     words = rows.reshape(len(rows), 2 * schedule.lines_out)[:, : schedule.channels]
     return words - (words >> (MAX_WIDTH - 1) << MAX_WIDTH)
 

@@ -8,7 +8,7 @@
 // stop: the board measures by itself, with converters that give what is in the file VALUES. With WAIT, the clock also stops behind every frame from the
 // board, for that many milliseconds or until a byte arrives, so that the host seems to answer at once. Ends when the
 // other side of FD is closed, and prints the number of clocks, of bytes that were sent to the board, and of bytes from it.
-// What DACs on an I2S get is written to the file HEARD; if FRAMES is not 0, it begins at once, and ends with that frame.
+// What DACs get is written to the file HEARD; if FRAMES is not 0, it begins at once, and ends with that frame or sample.
 #include "Vtop.h"
 #include "pins.h"
 #include "verilated.h"
@@ -141,7 +141,8 @@ int main(int argc, char** argv) {
         std::fprintf(stderr, "usage: board FD CLOCKS_PER_BIT CLOCKS_PER_SECOND QUIET WAIT [VALUES [HEARD FRAMES]]\n");
         return 2;
     }
-    converters.audio.record(heard);
+    converters.audio.record(converters.dac_count ? nullptr : heard);
+    converters.dacs.record(heard);
     const uint64_t frames = argc > 8 ? std::strtoull(argv[8], nullptr, 10) : 0;
     const int fd = std::atoi(argv[1]);
     const double per_bit = std::atof(argv[2]);
@@ -162,8 +163,9 @@ int main(int argc, char** argv) {
         pollfd byte{fd, POLLIN, 0};
         poll(&byte, 1, -1);
     }
+    const auto played = [&] { return converters.dac_count ? converters.dacs.samples() : converters.audio.frames(); };
     double started = now();
-    while (!sender.closed() && (frames == 0 || converters.audio.frames() < frames)) {
+    while (!sender.closed() && (frames == 0 || played() < frames)) {
         if (clocks % turn == 0) {
             sender.refill();
             receiver.flush();
@@ -175,6 +177,7 @@ int main(int argc, char** argv) {
         board->eval();
         exchange(converters, *board, 0);
         listen(converters.audio, *board, 0);
+        write(converters, *board, 0);
         const bool answered = receiver.take(board->tx);
         ++clocks;
         if (answered && wait > 0 && !sender.waiting()) {

@@ -25,7 +25,6 @@ from sosmith.gen.fpga.boards import Board
 from sosmith.gen.fpga.synthesis import synthesize
 from sosmith.gen.output.board_top import board_verilog, schedule_of, top_name
 from sosmith.model.arrays import Codes
-from sosmith.model.converters.i2s_frame import LATENCY
 from sosmith.model.converters.schedule import Schedule
 from sosmith.model.errors import SpecificationError, ToolError
 from sosmith.model.link.protocol import MAX_BODY, WINDOWS
@@ -98,7 +97,7 @@ class Netlist:
         heard : Path or None
             Where the words of its DACs are written, with `codes`.
         frames : int
-            Frames of the I2S after which the board ends; it then begins at once. 0 to go on.
+            Words of the DACs after which the board ends; it then begins at once. 0 to go on.
         """
         arguments = (end, float(self.clock / self.baud), float(self.clock) * speed, self.quiet, wait)
         command = [str(self.program), *map(str, arguments)]
@@ -125,8 +124,8 @@ class Netlist:
 
         Returns
         -------
-        ndarray of int, shape (samples + LATENCY, channels)
-            Words of the DACs, from the first frame on.
+        ndarray of int, shape (silent + samples, channels)
+            Words of the DACs, from the first one on; `Schedule.silent` come before the results.
 
         Raises
         ------
@@ -137,7 +136,7 @@ class Netlist:
         heard = self.program.parent / "heard.txt"
         ours, theirs = socket.socketpair()
         with ours, theirs:
-            frames = len(codes) + LATENCY
+            frames = len(codes) + self.schedule.silent
             with self.at(theirs.fileno(), codes=codes, heard=heard, frames=frames) as process:
                 process.communicate()
         if process.returncode:

@@ -152,7 +152,7 @@ def board_command(
             frames, wrong = netlist.play(heard)
     if heard is not None:
         verdict = "all as in the integer model" if wrong == 0 else f"{wrong:,} words differ from the integer model"
-        note(f"{heard}: {frames:,} samples of each channel, {verdict}")
+        click.echo(f"{heard}: {frames:,} samples of each channel, {verdict}")
         if wrong:
             sys.exit(1)
         return

@@ -14,7 +14,6 @@ from sosmith.gen.output.board_top import wiring_of
 from sosmith.instrument.scenarios.traces import default_scenario, traces_for
 from sosmith.interface.certificate import Progress
 from sosmith.interface.design import Design
-from sosmith.model.converters.i2s_frame import LATENCY
 from sosmith.model.errors import SpecificationError, ToolError
 from sosmith.model.port import Port
 from sosmith.model.text_files import write_file
@@ -111,11 +110,11 @@ class NetlistBoard:
         check_rate(heard, spec.sample_rate)
         words = self._netlist.play(self._codes)
         wanted = schedule.writing.words(self._core.datapath.compute(fed_codes(schedule, self._codes)))
-        silent = np.zeros((LATENCY, words.shape[1]), np.int64)
+        silent = np.zeros((schedule.silent, words.shape[1]), np.int64)
         wrong = int(np.count_nonzero(words != np.concatenate([silent, wanted])))
-        width = schedule.writing.converter.width
-        port = Port(name="heard", bits=width, signed=True, lsb=Fraction(1), zero=Fraction(0), unit="")
-        write_file(heard, wav_bytes(words[LATENCY:], port, spec.sample_rate))
+        dac = schedule.writing.converter
+        port = Port(name="heard", bits=dac.width, signed=dac.lowest < 0, lsb=Fraction(1), zero=Fraction(0), unit="")
+        write_file(heard, wav_bytes(words[schedule.silent :], port, spec.sample_rate))
         return len(wanted), wrong
 
     def serve(self, terminal: Terminal, damage: LineDamage | None, speed: float | None = None) -> None:

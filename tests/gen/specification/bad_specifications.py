@@ -86,7 +86,7 @@ ADC = "\n[converter.voltage]\ndevice = 'mcp3204'\nrange = {}"
 THERMOCOUPLE = "\n[converter.temperature]\ndevice = 'max31855'"
 
 
-DEVICES = "mcp3202, mcp3204, max31855, pcm1808, cs5343, pcm5102a, cs4344"
+DEVICES = "mcp3202, mcp3204, max31855, ad7476a, pcm1808, cs5343, pcm5102a, cs4344, mcp4921"
 
 
 DECIMATED = "\n# decimated\n"
@@ -1104,13 +1104,14 @@ BAD = [
         "ADC at the output",
         CLOCK,
         CLOCK + ADC.format("[0, 10]") + THERMOCOUPLE + "\n[converter.output]\ndevice = 'pcm1808'",
-        "converter.output.device must be a DAC, one of pcm5102a, cs4344, not 'pcm1808'",
+        "converter.output.device must be a DAC, one of pcm5102a, cs4344, mcp4921, not 'pcm1808'",
     ),
     (
         "DAC at an input",
         CLOCK,
         CLOCK + ADC.format("[0, 10]").replace("mcp3204", "cs4344") + THERMOCOUPLE,
-        "converter.voltage.device must be an ADC, one of mcp3202, mcp3204, max31855, pcm1808, cs5343, not 'cs4344'",
+        "converter.voltage.device must be an ADC, one of mcp3202, mcp3204, max31855, ad7476a, pcm1808, cs5343, not "
+        "'cs4344'",
     ),
     (
         "audio converter with a supply",

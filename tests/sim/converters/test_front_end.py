@@ -60,7 +60,8 @@ class Case:
 
 
 def case(clock: int, rate: int, channels: int, samples: int, scale: Fraction = Fraction(1), **devices: Port) -> Case:
-    spans = {"mcp3202": (Fraction(0), Fraction(10)), "mcp3204": (Fraction(-1), Fraction(1)), "max31855": None}
+    span = (Fraction(-1), Fraction(1))
+    spans = {"mcp3202": (Fraction(0), Fraction(10)), "mcp3204": span, "ad7476a": span, "max31855": None}
     readings = tuple((name, Reading.of(CONVERTERS[name], port, spans[name])) for name, port in devices.items())
     return Case(clock, rate, channels, readings, samples, scale)
 
@@ -70,6 +71,8 @@ CASES = {
     "instrument": case(100_000, 100, 3, 40, mcp3202=VOLTAGE, max31855=TEMPERATURE),
     # As fast as an MCP3204 allows, at almost the highest sample rate, of which the clock is no multiple.
     "adc": case(12_000_000, 11_400, 4, 8, mcp3204=SIGNED),
+    # 250,000 samples a second.
+    "fast": case(25_000_000, 250_000, 1, 20, ad7476a=SIGNED),
     # As fast as a MAX31855 allows, which converts faster here.
     "thermocouple": case(50_000_000, 10_000, 2, 30, Fraction(1, 500), max31855=TEMPERATURE),
 }

@@ -23,11 +23,13 @@ from sosmith.model.converters.i2s_converter import I2S_CONVERTERS
 from sosmith.model.converters.i2s_frame import LATENCY, I2sFrame
 from sosmith.model.converters.reading import Reading
 from sosmith.model.converters.schedule import Schedule
+from sosmith.model.converters.spi_dac import SPI_DACS
 from sosmith.model.port import Port
 from sosmith.sim.simulators import PLAIN_ASSERTIONS
 
 PORT = Port.from_range("x", 24, Fraction(-1), Fraction(1), signed=True)
 NARROW = Port.from_range("x", 16, Fraction(-1), Fraction(1), signed=True)
+COARSE = Port.from_range("x", 12, Fraction(-1), Fraction(1), signed=True)
 FULL = (Fraction(-1), Fraction(1))
 FRAMES = 6
 
@@ -45,7 +47,8 @@ class Case:
 
     @property
     def schedule(self) -> Schedule:
-        adc, dac = I2S_CONVERTERS[self.adc], I2S_CONVERTERS[self.dac]
+        adc = I2S_CONVERTERS[self.adc]
+        dac = I2S_CONVERTERS.get(self.dac) or SPI_DACS[self.dac]
         return Schedule.of(
             (Reading.of(replace(adc, width=self.port.bits), self.port, FULL),),
             (None,),
@@ -61,6 +64,8 @@ CASES = {
     "stereo": Case("pcm1808", "pcm5102a", 24_576_000, 48_000, 2),
     # Two lines in and out, the last with one channel; 16 of 24 bits; a board's clock, whose rate is 1.7 % above.
     "pmod": Case("cs5343", "cs4344", 25_000_000, 48_828, 3, NARROW),
+    # A DAC for each channel, on an SPI.
+    "mixed": Case("pcm1808", "mcp4921", 36_864_000, 48_000, 2, COARSE),
     # 384 periods of MCLK.
     "fast": Case("pcm1808", "cs4344", 73_728_000, 96_000, 1),
 }
@@ -87,7 +92,7 @@ def run(folder: Path, job: Case, given: list[list[tuple[int, int]]], schedule: S
             {
                 "clock": job.clock,
                 "adcs": [job.adc] * len(given),
-                "dacs": [job.dac] * len(given),
+                "dacs": [job.dac] * (job.channels if job.dac in SPI_DACS else len(given)),
                 "words": given,
                 "frames": FRAMES + LATENCY,
             }
@@ -128,6 +133,8 @@ def check(job: Case, given: list[list[tuple[int, int]]], found: Any) -> None:
     ]
     writing = job.schedule.writing
     assert writing is not None
+    for channel, written in enumerate(found["written"]):
+        assert written[:FRAMES] == [writing.word(row[channel]) for row in codes]
     for line, heard in enumerate(found["heard"]):
         sides = [2 * line, min(2 * line + 1, channels - 1)]
         expected = [[writing.word(row[side]) for side in sides] for row in codes]

@@ -1,14 +1,17 @@
 """A board with audio converters at its pins: what its DACs get equals the integer model's results, bit for bit."""
 
+import socket
 from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.sim.virtual_board.socket_line import SocketLine
 
 import sosmith
 from sosmith.gen.fpga.boards import BOARDS
 from sosmith.gen.output.board_top import wiring_of
+from sosmith.host.board import Board
 from sosmith.model.arrays import Codes
 from sosmith.model.converters.i2s_frame import LATENCY
 from sosmith.sim.converters.values import fed_codes
@@ -46,7 +49,7 @@ def expected(made: sosmith.Design, netlist: Netlist, codes: Codes) -> Codes:
     assert netlist.schedule.writing is not None
     fed = fed_codes(netlist.schedule, codes)
     words = netlist.schedule.writing.words(made.core.datapath.compute(fed))
-    return np.concatenate([np.zeros((LATENCY, codes.shape[1]), np.int64), words])
+    return np.concatenate([np.zeros((netlist.schedule.silent, codes.shape[1]), np.int64), words])
 
 
 @pytest.mark.parametrize(
@@ -58,6 +61,7 @@ def test_stereo_at_48_khz_leaves_two_frames_later(made: sosmith.Design, clock: s
     rate = Fraction(clock) if isinstance(clock, int) else wiring_of(made.core, BOARDS[clock]).clock(BOARDS[clock])
     netlist = build(made.core, tmp_path, clock=rate)
     assert netlist.schedule is not None
+    assert netlist.schedule.silent == LATENCY
     assert float(rate / netlist.schedule.period) == pytest.approx(48_000, rel=3e-4)
     codes = signal(2, 24)
     assert np.array_equal(netlist.play(codes), expected(made, netlist, codes))
@@ -79,3 +83,58 @@ def test_three_channels_of_16_bits_that_a_dac_clips(tmp_path: Path) -> None:
     wanted = expected(made, netlist, codes)
     assert {wanted.min(), wanted.max()} == {-(1 << 23), (1 << 23) - 1}
     assert np.array_equal(netlist.play(codes), wanted)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("rate", "channels"), [pytest.param(200_000, 1, id="200 kS/s"), pytest.param(48_000, 2, id="two channels")]
+)
+def test_an_adc_and_a_dac_on_spis(rate: int, channels: int, tmp_path: Path) -> None:
+    """12 bits at the clock of a ULX3S, through a filter that takes a sample every clock."""
+    narrow = {"bits": 12, "signed": True, "range": [-1.0, 1.0]}
+    spec = SPEC | {
+        "sample_rate": rate,
+        "channels": channels,
+        "input": {"x": narrow},
+        "output": narrow,
+        "converter": {"x": {"device": "ad7476a", "range": [-1.0, 1.0]}, "output": {"device": "mcp4921"}},
+        "hardware": {"clock": 25e6, "architecture": "parallel"},
+    }
+    made = sosmith.design(spec)
+    netlist = build(made.core, tmp_path)
+    codes = signal(channels, 12)
+    assert np.array_equal(netlist.play(codes), expected(made, netlist, codes))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("baud", "channels", "is_enough"),
+    [
+        pytest.param(3_000_000, 1, True, id="one at 3 Mbaud"),
+        pytest.param(3_000_000, 2, False, id="two at 3 Mbaud"),
+        pytest.param(6_000_000, 2, True, id="two at 6 Mbaud"),
+    ],
+)
+def test_results_over_the_link_in_simulated_time(baud: int, channels: int, is_enough: bool, tmp_path: Path) -> None:
+    """A host that asks again at once: the board's time stands still until it does."""
+    narrow = {"bits": 16, "signed": True, "range": [-1.0, 1.0]}
+    board = BOARDS["ulx3s_25f"]
+    design = sosmith.design(SPEC | {"channels": channels, "input": {"x": narrow}, "output": narrow}).core
+    netlist = build(design, tmp_path, clock=wiring_of(design, board).clock(board), baud=baud)
+    ours, theirs = socket.socketpair()
+    codes = signal(channels, 16)
+    with netlist.at(theirs.fileno(), wait=60_000, codes=codes):
+        theirs.close()
+        with Board.on(SocketLine(ours)) as host:
+            host.counters()  # from here on they count
+            results: list[int] = []
+            while len(results) < FRAMES * channels:
+                host.counters()
+                found = host.poll()
+                results += [] if found is None else found[1].codes.tolist()
+            missed = host.counters()["missed"]
+    assert missed == 0 if is_enough else missed > len(results) // 10
+    if is_enough:
+        assert netlist.schedule is not None
+        wanted = design.datapath.compute(fed_codes(netlist.schedule, codes)).reshape(-1)
+        assert results[: wanted.size] == wanted.tolist()
