@@ -16,14 +16,19 @@ import sys
 import tempfile
 import tomllib
 from collections.abc import Sequence
+from fractions import Fraction
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import sosmith
+from sosmith.gen.fpga.audio_clock import audio_pll
 from sosmith.gen.fpga.boards import BOARDS, BUILDABLE, PROJECTS, RATE
 from sosmith.hdl.bus.link import LEDS
+from sosmith.model.converters.i2s_converter import I2S_CONVERTERS
+from sosmith.model.converters.i2s_frame import I2sFrame
 from sosmith.model.converters.spi_converter import CONVERTERS, ReadingFault
+from sosmith.model.converters.spi_dac import DAC_FRAME_BITS, SPI_DACS
 
 ROOT = Path(__file__).resolve().parent.parent
 RECORD = ROOT / "benchmarks" / "boards.json"
@@ -39,6 +44,15 @@ DESIGNS = (
 MEASURED = ("icebreaker", "icestick", "ice40_hx8k_b_evn", "ulx3s_25f", "tang_nano_9k")
 """Boards to build for; the other ones have FPGAs of the same families, which are as large or larger."""
 
+AUDIO = ("recipes/live", 2)
+"""The example with audio converters."""
+
+BUILDS = (
+    *((*design, board) for design in DESIGNS for board in MEASURED),
+    *((*AUDIO, board) for board in ("icebreaker", "ulx3s_25f", "tang_nano_9k")),
+)
+"""Examples, their numbers of channels and boards, in the order of the tables."""
+
 _CELLS = {
     "ice40": ("ICESTORM_LC", "ICESTORM_DSP", "ICESTORM_RAM"),
     "ecp5": ("TRELLIS_COMB", "MULT18X18D", "DP16KD"),
@@ -48,7 +62,7 @@ _CELLS = {
 
 PARTS = {
     name: re.compile(rf"(?<=<!-- {name} -->\n).*?(?=<!-- end of {name} -->)", re.DOTALL)
-    for name in ("boards", "headers", "converters", "faults", "built")
+    for name in ("boards", "headers", "converters", "dacs", "audio", "audio pins", "audio clocks", "faults", "built")
 }
 
 
@@ -148,6 +162,66 @@ def header_table() -> str:
     return "\n".join(rows) + "\n"
 
 
+def dac_table() -> str:
+    """Return the DACs on an SPI, in Markdown."""
+    rows = ["| DAC | `device` | words | SCK, MHz, at most | clocks of a frame |", "|---|---|---|---|---|"]
+    for name, device in SPI_DACS.items():
+        rows.append(
+            f"| {device.title} | `{name}` | {device.width} bits | {float(device.timing.clock) / 1e6:g} "
+            f"| {DAC_FRAME_BITS} |"
+        )
+    return "\n".join(rows) + "\n"
+
+
+def audio_table() -> str:
+    """Return the audio converters, in Markdown."""
+    rows = ["| converter | `device` | | MCLK / sample rate: sample rates, kHz |", "|---|---|---|---|"]
+    for name, device in I2S_CONVERTERS.items():
+        kinds: dict[str, list[int]] = {}
+        for ratio, rates in device.ratios:
+            text = ", ".join(f"{low / 1000:g} to {high / 1000:g}" for low, high in rates)
+            kinds.setdefault(text, []).append(ratio)
+        allowed = "; ".join(f"{', '.join(map(str, ratios))}: {text}" for text, ratios in kinds.items())
+        rows.append(f"| {device.title} | `{name}` | {'DAC' if device.is_dac else 'ADC'} | {allowed} |")
+    return "\n".join(rows) + "\n"
+
+
+def audio_pin_table() -> str:
+    """Return the pins for audio converters on each board, in Markdown."""
+    rows = [
+        "| board | MCLK, LRCK, BCLK, data of the DAC | MCLK, LRCK, BCLK, data of the ADC | further data |",
+        "|---|---|---|---|",
+    ]
+    for board in BOARDS.values():
+        if board.audio:
+            parts = (board.audio[:4], board.audio[4:8], board.audio[8:])
+            rows.append(f"| {board.title} | {' | '.join(', '.join(part) for part in parts)} |")
+    return "\n".join(rows) + "\n"
+
+
+def audio_clock_table() -> str:
+    """Return what boards make of 48 kHz, in Markdown."""
+    rows = [
+        "| board | its clock, MHz | clock of the design, MHz | MCLK, MHz | sample rate, Hz | ppm |",
+        "|---|---|---|---|---|---|",
+    ]
+    pair, wanted = [I2S_CONVERTERS["pcm1808"], I2S_CONVERTERS["pcm5102a"]], Fraction(48_000)
+    for board in BOARDS.values():
+        if not board.audio:
+            continue
+        try:
+            pll = audio_pll(board, pair, wanted)
+        except sosmith.SpecificationError:
+            rows.append(f"| {board.title} | {board.clock / 1e6:g} | not within 1 % | | | |")
+            continue
+        clock = Fraction(board.clock) if pll is None else pll.clock
+        frame = I2sFrame.of(pair, clock=clock, sample_rate=wanted)
+        figures = (board.clock, clock, clock * frame.ratio / frame.clocks)
+        cells = [*(f"{float(hertz) / 1e6:.6g}" for hertz in figures), f"{float(clock / frame.clocks):,.2f}"]
+        rows.append(f"| {board.title} | {' | '.join(cells)} | {1e6 * float(frame.deviation(clock, wanted)):+,.0f} |")
+    return "\n".join(rows) + "\n"
+
+
 def fault_list() -> str:
     """Return what a reading may be wrong with, in Markdown."""
     return "".join(f"- {fault.meaning};\n" for fault in ReadingFault).removesuffix(";\n") + ".\n"
@@ -184,9 +258,7 @@ def _share(cells: dict[str, int] | None) -> str:
 def read() -> list[dict[str, Any]]:
     """Read the record, in the order of the tables."""
     rows = json.loads(RECORD.read_text(encoding="utf-8")) if RECORD.exists() else []
-    order = {
-        (*made, board): k for k, (made, board) in enumerate((made, board) for made in DESIGNS for board in MEASURED)
-    }
+    order = {build: k for k, build in enumerate(BUILDS)}
     return sorted(rows, key=lambda row: order[row["example"], row["channels"], row["board"]])
 
 
@@ -198,7 +270,16 @@ def write(rows: Sequence[dict[str, Any]]) -> None:
 def renew() -> None:
     """Write the tables of the document."""
     text = DOCUMENT.read_text(encoding="utf-8")
-    made = {"boards": board_table, "headers": header_table, "converters": converter_table, "faults": fault_list}
+    made = {
+        "boards": board_table,
+        "headers": header_table,
+        "converters": converter_table,
+        "dacs": dac_table,
+        "audio": audio_table,
+        "audio pins": audio_pin_table,
+        "audio clocks": audio_clock_table,
+        "faults": fault_list,
+    }
     for name, table in made.items():
         text = PARTS[name].sub(lambda _, table=table: table(), text)
     DOCUMENT.write_text(PARTS["built"].sub(lambda _: built_table(read()), text), encoding="utf-8")
@@ -215,12 +296,11 @@ def main() -> None:
         sys.exit("\n".join(differences(read())) or None)
     rows = [] if asked.again else read()
     there = {(row["example"], row["channels"], row["board"]) for row in rows}
-    for example, channels in () if asked.page else DESIGNS:
-        for board in MEASURED:
-            if (example, channels, board) not in there:
-                print(f"{example}, {channels} channels, {board}", flush=True)
-                rows.append(built(example, channels, board))
-                write(rows)
+    for example, channels, board in () if asked.page else BUILDS:
+        if (example, channels, board) not in there:
+            print(f"{example}, {channels} channels, {board}", flush=True)
+            rows.append(built(example, channels, board))
+            write(rows)
     renew()
 
 

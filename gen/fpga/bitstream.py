@@ -15,6 +15,7 @@ from typing import Any
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.fpga.platform_plan import SEED, board_plan, text_of
 from sosmith.gen.fpga.tools import Tool, find_tool
+from sosmith.gen.fpga.wiring import PLAIN, Wiring
 from sosmith.model.errors import ShortfallError, ToolError
 
 _SUFFIX = {"ice40": "bin", "ecp5": "bit", "gowin": "fs"}
@@ -125,7 +126,7 @@ def build(
     board: Board,
     progress: Callable[[str], None] = lambda step: None,
     *,
-    selects: int = 0,
+    wiring: Wiring = PLAIN,
 ) -> Bitstream:
     """Make a bitstream; takes some tens of seconds, and a minute more on the very first call.
 
@@ -136,13 +137,13 @@ def build(
     verilog : str
         SystemVerilog of what goes into the FPGA.
     top : str
-        Its top module, with the ports of `sosmith.hdl.boards.board_top.BoardTop`, for the board's clock.
+        Its top module, with the ports of `sosmith.hdl.boards.board_top.BoardTop`, for the clock of `wiring`.
     board : Board
         The board.
     progress : callable
         Called with the name of each step.
-    selects : int
-        Chip selects of its converters; 0 without converters.
+    wiring : Wiring
+        Pins of its converters, and what makes its clock.
 
     Raises
     ------
@@ -154,7 +155,7 @@ def build(
         If the design has more cells than the FPGA, or cannot be placed for another reason.
     """
     name = f"{top}_{board.name}"
-    plan = board_plan(verilog, top, name, board, selects)
+    plan = board_plan(verilog, top, name, board, wiring)
     commands = [_translated(command) for command in json.loads(text_of(plan, f"build_{name}.json"))["commands"]]
     tools = {command[0]: find_tool(command[0]) for command in commands}
     with TemporaryDirectory(prefix="sosmith-") as scratch:

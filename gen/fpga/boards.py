@@ -41,6 +41,8 @@ class Device:
         Cell type of the block RAM: SB_RAM40_4K holds 4,096 bits, DP16KD 18,432, SDPB 16,384.
     block_rams : int
         Number of block RAMs.
+    pll_limit : int
+        Highest clock in Hz that its PLL is asked for; 0 if none is used.
     """
 
     family: str
@@ -53,6 +55,7 @@ class Device:
     multipliers: int
     block_ram: str
     block_rams: int
+    pll_limit: int = 0
 
     def luts(self, cells: dict[str, int]) -> int:
         """Count the LUT4 that a netlist takes, also as carry cells and distributed memory; `cells` as for `excess`."""
@@ -101,6 +104,9 @@ class Board:
         Its name in openFPGALoader.
     header : tuple of str
         Pins of its headers for the SPI of converters: SCK, MOSI, MISO, then the chip selects.
+    audio : tuple of str
+        Pins of its headers for audio converters, in the order of a Pmod I2S2: MCLK, LRCK, BCLK and data of a DAC, the
+        same of an ADC, then data lines of further ones.
     """
 
     name: str
@@ -112,21 +118,7 @@ class Board:
     platform: str | None = None
     loader: str | None = None
     header: tuple[str, ...] = ()
-
-
-_BUS_PINS = 3
-
-
-def check_selects(board: Board, selects: int) -> None:
-    """Check that a board has pins for so many chip selects.
-
-    Raises
-    ------
-    SpecificationError
-        If it has fewer.
-    """
-    if selects > (there := max(len(board.header) - _BUS_PINS, 0)):
-        raise SpecificationError(f"converters must be at most {there} on the {board.title}, not {selects}")
+    audio: tuple[str, ...] = ()
 
 
 # Numbers of cells are those that nextpnr 0.11.1 reports for an empty design.
@@ -141,6 +133,7 @@ _UP5K = Device(
     multipliers=8,
     block_ram="SB_RAM40_4K",
     block_rams=30,
+    pll_limit=25_000_000,  # cores close timing at some 34 MHz
 )
 _HX8K = Device(
     family="ice40",
@@ -153,6 +146,7 @@ _HX8K = Device(
     multipliers=0,
     block_ram="SB_RAM40_4K",
     block_rams=32,
+    pll_limit=50_000_000,
 )
 _HX1K = replace(_HX8K, title="iCE40 HX1K", placer="--hx1k", logic_cells=1280, block_rams=16)
 _ECP5_25 = Device(
@@ -166,6 +160,7 @@ _ECP5_25 = Device(
     multipliers=28,
     block_ram="DP16KD",
     block_rams=56,
+    pll_limit=50_000_000,
 )
 _ECP5_12 = replace(_ECP5_25, title="ECP5 LFE5U-12F", placer="--12k")  # the same die
 _ECP5_45 = replace(_ECP5_25, title="ECP5 LFE5U-45F", placer="--45k", logic_cells=43848, multipliers=72, block_rams=108)
@@ -184,6 +179,7 @@ _GW1NR_9C = Device(
     multipliers=0,
     block_ram="SDPB",
     block_rams=26,
+    pll_limit=50_000_000,
 )
 _GW2AR_18C = replace(
     _GW1NR_9C,
@@ -226,6 +222,8 @@ _ULX3S = Board(
     loader="ulx3s",
     # GP0 and GN0 to GP9 and GN9
     header=_pins("B11 C11 A10 A11 A9 B10 B9 C10 A7 A8 C8 B8 C6 C7 A6 B6 A4 A5 A2 B1"),
+    # GP14 to GP17, GN14 to GN17; GP18, GN18, GP19, GN19
+    audio=_pins("U18 N17 N16 L16 U17 P16 M17 L17 H18 H17 F17 G18"),
 )
 
 
@@ -248,6 +246,8 @@ _ALL = (
         loader="ice40_generic",
         # PMOD1A as an SPI, chip selects 1 and 7 to 10; PMOD1B; PMOD2
         header=_pins("45 2 47 4 3 48 46 44 43 38 34 31 42 36 32 28 27 25 21 19 26 23 20 18"),
+        # PMOD1B, then PMOD2
+        audio=_pins("43 38 34 31 42 36 32 28 27 25 21 19"),
     ),
     Board(name="upduino", title="UPduino 3", device=_UP5K, package="sg48", speed="", clock=12_000_000),
     Board(
@@ -261,6 +261,7 @@ _ALL = (
         loader="ice40_generic",
         # J2, from its first pins on
         header=_pins("R15 P16 P15 N16 M15 M16 L16 K15 K16 K14 J14 G14 F14 J15 H14 H16 G15 G16 F15 F16 E14"),
+        audio=_pins("J14 G14 F14 J15 H16 G15 G16 F15 F16 E14"),
     ),
     Board(
         name="icestick",
@@ -273,12 +274,14 @@ _ALL = (
         loader="ice40_generic",
         # the Pmod J2 as an SPI, chip selects 1 and 7 to 10; J1; J3
         header=_pins("81 79 80 78 87 88 90 91 112 113 114 115 116 117 118 119 62 61 60 56 48 47 45 44"),
+        # J1, then J3
+        audio=_pins("112 113 114 115 116 117 118 119 62 61 60 56"),
     ),
     _ulx3s("12f", _ECP5_12),
     _ULX3S,
     _ulx3s("45f", _ECP5_45),
     _ulx3s("85f", _ECP5_85),
-    replace(_ULX3S, name="colorlight_i5", title="Colorlight i5", platform=None, loader=None, header=()),
+    replace(_ULX3S, name="colorlight_i5", title="Colorlight i5", platform=None, loader=None, header=(), audio=()),
     Board(
         name="orangecrab_25f",
         title="OrangeCrab 25F",
@@ -307,6 +310,7 @@ _ALL = (
         # J6 in litex-hub/litex-boards and in the repository of amaranth-boards, which has its bank at 3.3 V; 33 to 35
         # and 40 to 42 are an LCD's too
         header=_pins("25 26 27 28 29 30 33 34 40 35 41 42"),
+        audio=_pins("33 34 40 35 41 42 30 29"),
     ),
     Board(
         name="tang_nano_20k",
@@ -323,6 +327,7 @@ _ALL = (
         # V: 27 to 31, 41, 42, 48, 77, an LCD's, in sipeed/TangNano-20K-example, 71 and 72 in nand2mario/nestang, 73
         # in zizineco's
         header=_pins("73 77 27 28 29 30 31 42 41 48 72 71"),
+        audio=_pins("30 31 42 41 48 72 71 29"),
     ),
     Board(
         name="arty_a7",
@@ -334,6 +339,8 @@ _ALL = (
         platform="amaranth_boards.arty_a7:ArtyA7_35Platform",
         # the Pmod JA as an SPI, chip selects 1 and 7 to 10; JB; JC
         header=_pins("D12 B11 A11 G13 D13 B18 A18 K16 E15 E16 D15 C15 J17 J18 K15 J15 U12 V12 V10 V11 U14 V14 T13 U13"),
+        # JB, then JC
+        audio=_pins("E15 E16 D15 C15 J17 J18 K15 J15 U12 V12 V10 V11"),
     ),
     Board(
         name="cmod_s7",
@@ -345,6 +352,7 @@ _ALL = (
         platform="amaranth_boards.cmod_s7:CmodS7_Platform",
         # the Pmod as an SPI, chip selects 1 and 7 to 10; pins 1 to 9
         header=_pins("F3 H2 H4 J2 H3 H1 G1 F4 L1 M4 M3 N2 M2 P3 N3 P1 N1"),
+        audio=_pins("L1 M4 M3 N2 M2 P3 N3 P1"),
     ),
 )
 

@@ -8,9 +8,10 @@ from typing import Any
 from amaranth.build import Attrs, Pins, Resource, Subsignal
 from amaranth.build.run import BuildPlan
 
-from sosmith.gen.fpga.boards import Board, check_selects
+from sosmith.gen.fpga.boards import Board
 from sosmith.gen.fpga.tools import EXTRA
-from sosmith.hdl.boards.on_platform import SPI, OnPlatform
+from sosmith.gen.fpga.wiring import Wiring
+from sosmith.hdl.boards.on_platform import AUDIO, DACS, INPUTS, SPI, OnPlatform
 from sosmith.model.errors import ToolError
 
 SEED = 1
@@ -25,12 +26,12 @@ _PIN_ATTRIBUTES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
 """Attributes of a pin of 3.3 V, by family, and those of its pull-up."""
 
 
-def board_plan(verilog: str, top: str, name: str, board: Board, selects: int) -> BuildPlan:
+def board_plan(verilog: str, top: str, name: str, board: Board, wiring: Wiring) -> BuildPlan:
     """Return files and commands for a board, from its Amaranth platform.
 
     Parameters
     ----------
-    verilog, top, board, selects
+    verilog, top, board, wiring
         As for `sosmith.gen.fpga.bitstream.build`.
     name : str
         Name of the design.
@@ -43,7 +44,7 @@ def board_plan(verilog: str, top: str, name: str, board: Board, selects: int) ->
         If the board has too few pins for the converters.
     """
     assert board.platform is not None
-    check_selects(board, selects)
+    pins = {SPI: wiring.spi_pins(board), AUDIO: wiring.audio_pins(board), DACS: wiring.dac_pins(board)}
     module, _, kind = board.platform.partition(":")
     try:
         platform = getattr(import_module(module), kind)()
@@ -52,27 +53,28 @@ def board_plan(verilog: str, top: str, name: str, board: Board, selects: int) ->
             f"amaranth-boards is needed to build for a board, and was not found: pip install 'sosmith[{EXTRA}]'"
         ) from None
     _, _, options = board.device.synthesis.partition(" ")
-    wishes = f"--seed {SEED} --freq {board.clock / 1e6:g} --timing-allow-fail --report report.json"
+    wishes = f"--seed {SEED} --freq {float(wiring.clock(board)) / 1e6:g} --timing-allow-fail --report report.json"
     platform.add_file(f"{top}.sv", verilog)
-    if selects:
-        platform.add_resources([_converters(board, selects)])
-    return platform.prepare(
-        OnPlatform(top, converters=selects > 0), name, emit_src=False, synth_opts=options, nextpnr_opts=wishes
-    )
+    for resource, signals in pins.items():
+        if signals:
+            platform.add_resources([_converters(resource, signals, board.device.family)])
+    names = {resource: tuple(signals) for resource, signals in pins.items() if signals}
+    top_level = OnPlatform(top, converters=names, pll=wiring.pll)
+    return platform.prepare(top_level, name, emit_src=False, synth_opts=options, nextpnr_opts=wishes)
 
 
-def _converters(board: Board, selects: int) -> Resource:
-    """Return the pins of the converters; that of MISO has a pull-up."""
-    sck, mosi, miso, *cs_n = board.header
-    plain, pulled_up = _PIN_ATTRIBUTES[board.device.family]
-    return Resource(
-        SPI,
-        0,
-        Subsignal("sck", Pins(sck, dir="o"), Attrs(**plain)),
-        Subsignal("mosi", Pins(mosi, dir="o"), Attrs(**plain)),
-        Subsignal("miso", Pins(miso, dir="i"), Attrs(**plain, **pulled_up)),
-        Subsignal("cs_n", Pins(" ".join(cs_n[:selects]), dir="o"), Attrs(**plain)),
-    )
+def _converters(name: str, pins: dict[str, tuple[str, ...]], family: str) -> Resource:
+    """Return the pins of converters; those of inputs have a pull-up."""
+    plain, pulled_up = _PIN_ATTRIBUTES[family]
+    parts = [
+        Subsignal(
+            signal,
+            Pins(" ".join(places), dir="i" if signal in INPUTS else "o"),
+            Attrs(**plain, **pulled_up) if signal in INPUTS else Attrs(**plain),
+        )
+        for signal, places in pins.items()
+    ]
+    return Resource(name, 0, *parts)
 
 
 def text_of(plan: BuildPlan, file: str) -> str:

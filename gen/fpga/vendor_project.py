@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.fpga.platform_plan import board_plan, text_of
+from sosmith.gen.fpga.wiring import PLAIN, Wiring
 
 TOOL = "Vivado"
 """The tools that projects are written for."""
@@ -41,7 +42,7 @@ class Project:
         return f"vivado -mode batch -source {self.name}.tcl"
 
 
-def project(verilog: str, top: str, board: Board, *, selects: int = 0) -> Project:
+def project(verilog: str, top: str, board: Board, *, wiring: Wiring = PLAIN) -> Project:
     """Make a project; parameters as for `sosmith.gen.fpga.bitstream.build`.
 
     Raises
@@ -52,6 +53,6 @@ def project(verilog: str, top: str, board: Board, *, selects: int = 0) -> Projec
         If the board has too few pins for the converters.
     """
     name = f"{top}_{board.name}"
-    made = board_plan(verilog, top, name, board, selects)
+    made = board_plan(verilog, top, name, board, wiring)
     wanted = [f"{top}.sv", *(f"{name}{kind}" for kind in _KINDS)]
     return Project(board, name, {file: text_of(made, file) for file in wanted})

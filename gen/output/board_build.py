@@ -6,7 +6,6 @@ import hashlib
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
-from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,7 @@ from sosmith.gen.core import CoreDesign
 from sosmith.gen.fpga.bitstream import Bitstream, build, fingerprint
 from sosmith.gen.fpga.boards import RATE, Board
 from sosmith.gen.fpga.platform_plan import SEED
-from sosmith.gen.output.board_top import board_verilog, selects_of, top_name
+from sosmith.gen.output.board_top import board_verilog, schedule_of, top_name, wiring_of
 from sosmith.gen.output.verilog import core_verilog
 from sosmith.gen.version import __version__
 from sosmith.model.text_files import to_json, write_contents
@@ -125,7 +124,9 @@ def build_facts(design: CoreDesign, board: Board, rate: int, core: str) -> dict[
     core : str
         The core's SystemVerilog.
     """
-    return {
+    clock = wiring_of(design, board).clock(board)
+    devices = [each.reading.converter.title for each in design.spec.converters]
+    made = {
         "name": design.datapath.name,
         "sosmith_version": __version__,
         "board": board.name,
@@ -134,11 +135,21 @@ def build_facts(design: CoreDesign, board: Board, rate: int, core: str) -> dict[
         "design": hashlib.sha256(core.encode()).hexdigest(),
         "architecture": design.architecture.name,
         "channels": design.spec.channels,
-        "clock_hz": board.clock,
+        "clock_hz": int(clock) if clock.denominator == 1 else float(clock),
         "line_rate_baud": rate,
-        "converters": [each.reading.converter.title for each in design.spec.converters],
+        "converters": devices if design.spec.dac is None else [*devices, design.spec.dac.converter.title],
         # what the core can take at the board's clock, but for the line
-        "samples_per_second": board.clock / (design.architecture.cycles_per_sample * design.spec.channels),
+        "samples_per_second": float(clock) / (design.architecture.cycles_per_sample * design.spec.channels),
+    }
+    frame = schedule_of(design, clock).frame if design.spec.converters else None
+    if frame is None:
+        return made
+    return made | {
+        "sample_rate": {
+            "hz": float(clock / frame.clocks),
+            "ppm": round(float(frame.deviation(clock, design.spec.sample_rate)) * 1e6, 1),
+            "mclk_hz": float(clock * frame.ratio / frame.clocks),
+        }
     }
 
 
@@ -164,7 +175,7 @@ def build_board(
         If the design does not fit the link.
     """
     core, verilog = texts(design, board, rate, progress)
-    made = build(verilog, top_name(design), board, progress, selects=selects_of(design, board))
+    made = build(verilog, top_name(design), board, progress, wiring=wiring_of(design, board))
     return BoardBuild(design, rate, verilog, core, made)
 
 
@@ -194,7 +205,7 @@ def board_cost(
     if cache is not None and (cache / name).exists():
         found: dict[str, Any] = json.loads((cache / name).read_text(encoding="utf-8"))
         return found
-    bitstream = build(verilog, top_name(design), board, progress, selects=selects_of(design, board))
+    bitstream = build(verilog, top_name(design), board, progress, wiring=wiring_of(design, board))
     made = BoardBuild(design, RATE, verilog, core, bitstream).summary
     if cache is not None:
         write_contents(cache, {name: to_json(made).encode()})
@@ -205,4 +216,4 @@ def texts(design: CoreDesign, board: Board, rate: int, progress: Callable[[str],
     """Return the SystemVerilog of the core, and of the board's top."""
     progress("SystemVerilog of the board")
     core = core_verilog(design)
-    return core, board_verilog(design, clock=Fraction(board.clock), rate=rate, core=core)
+    return core, board_verilog(design, clock=wiring_of(design, board).clock(board), rate=rate, core=core)

@@ -12,7 +12,7 @@ from sosmith.gen.core import CoreDesign
 from sosmith.gen.fpga.boards import RATE, Board
 from sosmith.gen.fpga.vendor_project import TOOL, Project, project
 from sosmith.gen.output.board_build import build_facts, texts
-from sosmith.gen.output.board_top import selects_of, top_name
+from sosmith.gen.output.board_top import top_name, wiring_of
 from sosmith.model.text_files import to_json, write_contents
 
 
@@ -66,5 +66,5 @@ def board_project(
     """Make the project of a design for a board; parameters and errors as for `build_board`, but nothing is built."""
     core, verilog = texts(design, board, rate, progress)
     progress("project files")
-    made = project(verilog, top_name(design), board, selects=selects_of(design, board))
+    made = project(verilog, top_name(design), board, wiring=wiring_of(design, board))
     return BoardProject(design, rate, core, made)

@@ -6,13 +6,16 @@ from fractions import Fraction
 from typing import Literal
 
 from sosmith.gen.core import CoreDesign
+from sosmith.gen.fpga.audio_clock import audio_pll
 from sosmith.gen.fpga.boards import RATE, Board
+from sosmith.gen.fpga.wiring import PLAIN, Wiring
 from sosmith.gen.output.identity import identity
 from sosmith.gen.output.verilog import core_verilog, to_rtlil, to_verilog
 from sosmith.hdl.boards.board_top import BoardTop
 from sosmith.hdl.bus.command_engine import MAX_CHANNELS, MAX_READINGS, MAX_SAMPLE_BYTES
 from sosmith.hdl.bus.uart import MIN_CLOCKS
-from sosmith.model.converters.spi_schedule import Schedule
+from sosmith.model.converters.i2s_converter import I2sConverter
+from sosmith.model.converters.schedule import Schedule
 from sosmith.model.errors import SpecificationError
 
 
@@ -79,14 +82,18 @@ def schedule_of(design: CoreDesign, clock: Fraction) -> Schedule:
     Raises
     ------
     SpecificationError
-        If the core has other inputs than the converters, more of them than a message of the link holds, or the
-        converters are too slow.
+        If the core has other inputs or another output than the converters, more inputs than a message of the link
+        holds, or the converters are too slow.
     """
     spec, ports = design.spec, design.datapath.inputs
     if ports != tuple(each.reading.port for each in spec.converters):
         found = " and ".join(port.name for port in ports)
         wanted = " and ".join(each.reading.port.name for each in spec.converters)
         raise SpecificationError(f"the core must have the inputs {wanted} of the converters, not {found}")
+    if spec.dac is not None and spec.dac.port != design.datapath.output:
+        raise SpecificationError(
+            f"the core must have the output {spec.dac.port.name} of the converter, not {design.datapath.output.name}"
+        )
     if spec.channels * len(ports) > MAX_READINGS:
         raise SpecificationError(
             f"inputs of all channels must be at most {MAX_READINGS} with converters, not {spec.channels * len(ports):,}"
@@ -94,6 +101,7 @@ def schedule_of(design: CoreDesign, clock: Fraction) -> Schedule:
     return Schedule.of(
         tuple(each.reading for each in spec.converters),
         tuple(each.timing for each in spec.converters),
+        writing=spec.dac,
         channels=spec.channels,
         clock=clock,
         sample_rate=spec.sample_rate,
@@ -101,9 +109,29 @@ def schedule_of(design: CoreDesign, clock: Fraction) -> Schedule:
     )
 
 
-def selects_of(design: CoreDesign, board: Board) -> int:
-    """Return how many chip selects the converters of a design have on a board; 0 without converters."""
-    return sum(schedule_of(design, Fraction(board.clock)).selects) if design.spec.converters else 0
+def wiring_of(design: CoreDesign, board: Board) -> Wiring:
+    """Return what the top of a design needs of a board: pins for its converters, and a clock that fits them.
+
+    Raises
+    ------
+    SpecificationError
+        As `schedule_of`, or if no clock of the board fits audio converters.
+    """
+    spec = design.spec
+    if not spec.converters:
+        return PLAIN
+    users = (*(each.reading for each in spec.converters), *([spec.dac] if spec.dac is not None else ()))
+    audio = [user.converter for user in users if isinstance(user.converter, I2sConverter)]
+    pll = audio_pll(board, audio, spec.sample_rate) if audio else None
+    schedule = schedule_of(design, Fraction(board.clock) if pll is None else pll.clock)
+    return Wiring(
+        selects=sum(schedule.selects),
+        audio=bool(audio),
+        lines_in=sum(schedule.lines_in),
+        lines_out=schedule.lines_out,
+        dac_selects=schedule.dac_selects,
+        pll=pll,
+    )
 
 
 def board_verilog(design: CoreDesign, *, clock: Fraction, rate: int = RATE, core: str | None = None) -> str:

@@ -6,15 +6,18 @@ Each function checks one subject and raises `UnfitError` with the path of the ke
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 
 from sosmith.gen.specification.choices import AUTO, CALIBRATION_INPUTS, FAMILIES, KINDS, LOOK_AHEAD, LOSSES, MAX_RATIO
 from sosmith.gen.specification.combinations import check_combinations
-from sosmith.gen.specification.schema import MAX_ORDER, Document, FilterTable, InputTable
+from sosmith.gen.specification.converters import ADCS, DACS, OUTPUT
+from sosmith.gen.specification.schema import MAX_ORDER, ConverterTable, Document, FilterTable, InputTable
 from sosmith.gen.specification.uncertainty import check_coefficients
 from sosmith.gen.specification.values import UnfitError, identifier, key_text, listed, literal, one_of, together
-from sosmith.model.converters.spi_converter import CONVERTERS
+from sosmith.model.converters.i2s_converter import I2sConverter
+from sosmith.model.converters.spi_converter import Converter
+from sosmith.model.converters.spi_dac import SpiDac
 
 MARGIN = Fraction(1, 10**6)
 """Minimum distance of a band edge from 0 and from half the sample rate, as a fraction of the sample rate.
@@ -95,17 +98,30 @@ def _check_inputs(document: Document) -> None:
 
 def _check_converters(document: Document) -> None:
     tables = document.converter
-    if tables and set(tables) != set(document.input):
+    inputs = {name: table for name, table in tables.items() if name in document.input or name != OUTPUT}
+    if tables and set(inputs) != set(document.input):
         expected = f"a table for each of the inputs {listed(list(document.input))}, or none"
         raise UnfitError(expected, ", ".join(map(literal, tables)), where="converter")
     for name, table in tables.items():
-        where, converter = f"converter.{key_text(name)}", CONVERTERS[table.device]
-        if converter.step is None and table.range is None:
-            expected = f"the values of the input at the readings 0 and {2**converter.width}, [low, high]"
-            raise UnfitError(expected, "missing", where=f"{where}.range")
-        for key in ("range", "supply") if converter.step is not None else ():
-            if (found := getattr(table, key)) is not None:
-                raise UnfitError(f"left out for {table.device}", literal(found), where=f"{where}.{key}")
+        _check_converter(key_text(name), table, ADCS if name in inputs else DACS)
+
+
+def _check_converter(
+    name: str, table: ConverterTable, devices: Mapping[str, Converter | I2sConverter | SpiDac]
+) -> None:
+    where = f"converter.{name}"
+    if table.device not in devices:
+        kind = "a DAC" if devices is DACS else "an ADC"
+        raise UnfitError(f"{kind}, {one_of(tuple(devices))}", literal(table.device), where=f"{where}.device")
+    device = devices[table.device]
+    by_range = isinstance(device, Converter) and device.step is None
+    if by_range and table.range is None:
+        expected = f"the values of the input at the readings 0 and {2**device.width}, [low, high]"
+        raise UnfitError(expected, "missing", where=f"{where}.range")
+    without = () if by_range else ("range", "supply") if isinstance(device, Converter) else ("supply",)
+    for key in without:
+        if (found := getattr(table, key)) is not None:
+            raise UnfitError(f"left out for {table.device}", literal(found), where=f"{where}.{key}")
 
 
 def _check_range(table: InputTable, where: str) -> None:

@@ -48,7 +48,9 @@ from sosmith.gen.specification.values import (
     together,
     whole,
 )
+from sosmith.model.converters.i2s_converter import I2S_CONVERTERS
 from sosmith.model.converters.spi_converter import CONVERTERS, SUPPLIES
+from sosmith.model.converters.spi_dac import SPI_DACS
 from sosmith.model.dataflow.protection import PROTECTIONS
 from sosmith.model.suggestion import did_you_mean
 
@@ -198,10 +200,13 @@ class WearTable(Table):
     sensor_range: Annotated[Fraction | None, PlainValidator(number)] = None
 
 
-class ConverterTable(Table):
-    """``[converter.NAME]``: the converter that a board reads an input from."""
+_DEVICES = (*CONVERTERS, *I2S_CONVERTERS, *SPI_DACS)
 
-    device: Annotated[str, PlainValidator(choice(tuple(CONVERTERS)))] = Field(description=one_of(tuple(CONVERTERS)))
+
+class ConverterTable(Table):
+    """``[converter.NAME]``: the converter that a board reads an input from, or writes the output to."""
+
+    device: Annotated[str, PlainValidator(choice(_DEVICES))] = Field(description=one_of(_DEVICES))
     range: Annotated[tuple[Fraction, Fraction] | None, PlainValidator(rising_pair)] = None
     supply: Annotated[Fraction | None, PlainValidator(between(*SUPPLIES, "V"))] = None
 

@@ -12,11 +12,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sosmith.gen.specification.choices import CALIBRATION_INPUTS
-from sosmith.gen.specification.converters import ConverterSpec, converters
+from sosmith.gen.specification.converters import ConverterSpec, converters, dac
 from sosmith.gen.specification.toml_text import toml_text
 from sosmith.gen.specification.uncertainty import CoefficientsSpec, UncertaintySpec
 from sosmith.gen.specification.values import UnfitError
 from sosmith.gen.specification.wear_limits import WearSpec
+from sosmith.model.converters.dac_writing import Writing
 from sosmith.model.errors import SpecificationError
 from sosmith.model.foreign_files import read_text
 from sosmith.model.port import Port
@@ -172,6 +173,8 @@ class Specification:
         The hardware.
     converters : tuple of ConverterSpec
         What a board reads each input from; empty if samples come over the link.
+    dac : Writing or None
+        How a board writes results to a DAC; None without one.
     """
 
     path: Path
@@ -189,6 +192,7 @@ class Specification:
     uncertainty: UncertaintySpec | None = None
     hardware: HardwareSpec
     converters: tuple[ConverterSpec, ...] = ()
+    dac: Writing | None = None
 
 
 def load(path: Path) -> Specification:
@@ -280,6 +284,7 @@ def _specification(path: Path, tree: dict[str, Any], document: Document) -> Spec
             samples_per_clock=hardware.samples_per_clock,
         ),
         converters=converters(inputs, document.converter),
+        dac=dac(inputs, output_port, document.converter),
     )
 
 

@@ -19,6 +19,7 @@ With converters, a front-end feeds the core, and the link fetches what it keeps:
                  |      |                    ^    |                          |      |
                  |      |------------------- | -- | ----- s_axil_* --------->|      |
                  +------+                 miso    +--> sck, mosi, cs_n n     +------+
+                                          din n        mclk, bclk, lrck, dout n
 
 One clock for all. Latency: that of the link, `sosmith.hdl.bus.link`, of the front-end,
 `sosmith.hdl.converters.front_end`, and of the core.
@@ -37,7 +38,8 @@ from amaranth.lib.wiring import In, Out
 from sosmith.hdl.bus.command_engine import Face, core_side
 from sosmith.hdl.bus.link import LEDS, Link
 from sosmith.hdl.converters.front_end import FrontEnd
-from sosmith.model.converters.spi_schedule import Schedule
+from sosmith.hdl.converters.pins import converter_pins
+from sosmith.model.converters.schedule import Schedule
 
 
 class BoardTop(wiring.Component):
@@ -70,8 +72,8 @@ class BoardTop(wiring.Component):
     leds : Out(3)
         High for a LED that is lit. 0: changes with each request that is carried out. 1: a byte or a frame was
         damaged, since the last session began. 2: the last result has a flag `wear_critical` or `fault`.
-    sck, mosi, miso, cs_n : Out(1), Out(1), In(1), Out(n)
-        With converters, their SPI, with a chip select for each.
+    sck, mosi, miso, cs_n, mclk, bclk, lrck, din, dout
+        With converters, their SPI and I2S, as in `sosmith.hdl.converters.pins`.
     """
 
     def __init__(
@@ -93,7 +95,7 @@ class BoardTop(wiring.Component):
         )
         members: dict[str, In | Out] = {"clk": In(1), "rst": In(1), "rx": In(1), "tx": Out(1), "leds": Out(LEDS)}
         if schedule is not None:
-            members |= {"sck": Out(1), "mosi": Out(1), "miso": In(1), "cs_n": Out(sum(schedule.selects))}
+            members |= converter_pins(schedule)
         super().__init__(members)
 
     def elaborate(self, platform: object) -> Module:
@@ -118,11 +120,8 @@ class BoardTop(wiring.Component):
             front.clk.eq(self.clk),
             front.rst.eq(self.rst),
             core.aresetn.eq(front.aresetn),
-            self.sck.eq(front.sck),
-            self.mosi.eq(front.mosi),
-            front.miso.eq(self.miso),
-            self.cs_n.eq(front.cs_n),
         ]
+        self.join(m, self, front, converter_pins(self.schedule))
         self.join(m, front, link, core_side(self.face))
         self.join(m, core, front, core_side(replace(self.face, readings=0, address_bits=0)))
         return m

@@ -2,7 +2,7 @@ r"""Reads a frame from one of several converters on an SPI, mode 0.
 
 ::
 
-    i_command 5 --i_start--> [command] << 1 ----------------> mosi
+    i_command c --i_start--> [command] << 1 ----------------> mosi
     i_bits 6 --------------> [left] - 1                       sck, from a register
     i_select n ------------> [cs_n] n ----------------------> cs_n n
     miso --->[sync0]-->[sync1]--> [frame] 32 << 1 ---> o_frame 32, o_done for one clock
@@ -27,7 +27,7 @@ FRAME_BITS = 32
 """Bits of the longest frame."""
 
 COMMAND_BITS = 5
-"""Bits of the longest command."""
+"""Bits of the longest command of an ADC."""
 
 
 class SpiReader(wiring.Component):
@@ -36,11 +36,13 @@ class SpiReader(wiring.Component):
     Parameters
     ----------
     half : int
-        Clocks of half an SCK period, at least 2.
+        Clocks of half an SCK period, at least 2; 1 where nothing is read.
     deselect : int
         Clocks for which CS is high between two frames, at least 1.
     selects : int
         Number of converters.
+    command_bits : int
+        Bits that are sent, 1 to 32: 16 make it a writer for DACs.
 
     Members
     -------
@@ -48,7 +50,7 @@ class SpiReader(wiring.Component):
         High for one clock to begin a frame; only while none is read.
     i_select : In(selects)
         The converter, one-hot.
-    i_command : In(5)
+    i_command : In(command_bits)
         What is sent first, from the highest bit on; zeros follow.
     i_bits : In(6)
         Clocks of the frame, 1 to 32.
@@ -60,13 +62,13 @@ class SpiReader(wiring.Component):
         The SPI; ``cs_n`` is low for the converter that is read.
     """
 
-    def __init__(self, *, half: int, deselect: int, selects: int) -> None:
-        self.half, self.deselect, self.selects = half, deselect, selects
+    def __init__(self, *, half: int, deselect: int, selects: int, command_bits: int = COMMAND_BITS) -> None:
+        self.half, self.deselect, self.selects, self.command_bits = half, deselect, selects, command_bits
         super().__init__(
             {
                 "i_start": In(1),
                 "i_select": In(selects),
-                "i_command": In(COMMAND_BITS),
+                "i_command": In(command_bits),
                 "i_bits": In(range(FRAME_BITS + 1)),
                 "o_frame": Out(FRAME_BITS),
                 "o_done": Out(1),
@@ -82,7 +84,7 @@ class SpiReader(wiring.Component):
         m = Module()
         taken = Signal(2)
         m.d.sync += taken.eq(Cat(self.miso, taken))
-        command = Signal(COMMAND_BITS)
+        command = Signal(self.command_bits)
         left = Signal.like(self.i_bits)
         timer = Signal(range(max(self.half, self.deselect)))
         ends = timer == 0

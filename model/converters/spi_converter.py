@@ -4,6 +4,7 @@
 MCP3202   Microchip DS21034: table 1-1 (timing), section 5.1 and figure 5-1 (frame)
 MCP3204   Microchip DS21298: table 1-1 (timing), section 5.0 and figure 5-1 (frame)
 MAX31855  Maxim Integrated 19-5793: serial interface characteristics, table 2 (frame), serial interface
+AD7476A   Analog Devices AD7476A/AD7477A/AD7478A, Rev. F: table 4 (timing), figures 3 and 24 (frame)
 ========  ==============================================================================================
 
 All take SPI mode 0: data is taken at rising edges of SCK and changes at falling ones, the highest bit first.
@@ -185,6 +186,17 @@ _MAX31855 = Timing(
     power_up=200 * ms,  # likewise
 )
 
+_AD7476A = Timing(
+    clock=Fraction(20_000_000),
+    high=20 * ns,  # 40 % of a period
+    low=20 * ns,  # likewise
+    select=10 * ns,
+    deselect=90 * ns,  # quiet for 50 ns, behind the up to 36 ns in which the output is let go
+    setup=0 * ns,
+    hold=0 * ns,
+    valid=40 * ns,
+)
+
 CONVERTERS = {
     # start, SGL/DIFF = 1, ODD/SIGN, MSBF = 1; null bit; 12 bits
     "mcp3202": Converter(
@@ -227,6 +239,17 @@ CONVERTERS = {
         step=Fraction(1, 4),
         timing=_MAX31855,
         fast=_MAX31855,
+    ),
+    # four zeros, 12 bits
+    "ad7476a": Converter(
+        title="AD7476A",
+        inputs=1,
+        bits=16,
+        low=0,
+        width=12,
+        zeros=(12, 13, 14, 15),
+        timing=_AD7476A,
+        fast=_AD7476A,
     ),
 }
 """Converters by their names in a specification."""

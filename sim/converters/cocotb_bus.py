@@ -89,8 +89,8 @@ class Adc:
         return None
 
 
-class ThermocoupleConverter:
-    """A MAX31855.
+class PlainConverter:
+    """A MAX31855 or an AD7476A, which take no command.
 
     Parameters
     ----------
@@ -99,17 +99,17 @@ class ThermocoupleConverter:
     timing : Timing
         Limits.
     frames : callable
-        Gives the 32 bits of the next conversion; `thermocouple_frame` makes them.
+        Gives the bits of the next conversion; `thermocouple_frame` makes those of a MAX31855.
+    clocks : int
+        How many these are.
     """
 
-    clocks = 32
-
-    def __init__(self, name: str, timing: Timing, frames: Callable[[], int]) -> None:
-        self.name, self.timing, self._frames = name, timing, frames
+    def __init__(self, name: str, timing: Timing, frames: Callable[[], int], clocks: int = 32) -> None:
+        self.name, self.timing, self._frames, self.clocks = name, timing, frames, clocks
 
     def select(self) -> None:
         """Begin a frame; a conversion that goes on is lost."""
-        self._frame, self._left = self._frames(), 32
+        self._frame, self._left = self._frames(), self.clocks
 
     def rise(self, bit: int) -> None:
         """There is no command."""
@@ -122,6 +122,45 @@ class ThermocoupleConverter:
         """Return the next bit."""
         self._left -= 1
         return self._frame >> self._left & 1 if self._left >= 0 else 0
+
+
+class Dac:
+    """A MCP4921.
+
+    Parameters
+    ----------
+    name : str
+        Name in messages.
+    timing : Timing
+        Limits.
+    """
+
+    clocks = 16
+
+    def __init__(self, name: str, timing: Timing) -> None:
+        self.name, self.timing = name, timing
+        self.words: list[int] = []
+        """The words that it got."""
+
+    def select(self) -> None:
+        """Begin a frame."""
+        self._bits: list[int] = []
+
+    def rise(self, bit: int) -> None:
+        """Take a bit."""
+        self._bits.append(bit)
+        if len(self._bits) == self.clocks:
+            ignored, _, single, on = self._bits[:4]
+            assert (ignored, single, on) == (0, 1, 1), f"the {self.name} must be written to with gain 1, and on"
+            self.words.append(sum(level << 11 - place for place, level in enumerate(self._bits[4:])))
+
+    def first(self) -> int | None:
+        """Drive nothing."""
+        return None
+
+    def fall(self) -> int | None:
+        """Drive nothing."""
+        return None
 
 
 def thermocouple_frame(
@@ -139,11 +178,11 @@ class SpiBus:
     ----------
     dut : handle
         With the ports ``sck``, ``mosi``, ``miso`` and ``cs_n``.
-    models : sequence of Adc or ThermocoupleConverter
+    models : sequence of Adc, PlainConverter or Dac
         In the order of ``cs_n``; None where no converter is.
     """
 
-    def __init__(self, dut: Any, models: Sequence[Adc | ThermocoupleConverter | None]) -> None:
+    def __init__(self, dut: Any, models: Sequence[Adc | PlainConverter | Dac | None]) -> None:
         self.dut, self.models = dut, models
         self.frames = [0] * len(models)
         """Complete frames of each converter."""
@@ -183,7 +222,7 @@ class SpiBus:
             (self._rose if sck else self._fell)(selected[0], mosi, now)
         self._cs, self._sck, self._mosi = cs, sck, mosi
 
-    def _selected(self, number: int, model: Adc | ThermocoupleConverter, sck: int, now: float) -> None:
+    def _selected(self, number: int, model: Adc | PlainConverter | Dac, sck: int, now: float) -> None:
         assert sck == 0, f"SCK must be low when the {model.name} is selected, not high"
         timing, before = model.timing, self._cs_time[number]
         if before is not None:
@@ -195,7 +234,7 @@ class SpiBus:
         model.select()
         self._drive(model.first(), timing)
 
-    def _deselected(self, number: int, model: Adc | ThermocoupleConverter, sck: int, now: float) -> None:
+    def _deselected(self, number: int, model: Adc | PlainConverter | Dac, sck: int, now: float) -> None:
         assert self._rises == model.clocks, (
             f"a frame of the {model.name} must have {model.clocks} clocks, not {self._rises}"
         )
@@ -203,7 +242,7 @@ class SpiBus:
         self.frames[number] += 1
         self._drive(None, None)
 
-    def _rose(self, model: Adc | ThermocoupleConverter, mosi: int, now: float) -> None:
+    def _rose(self, model: Adc | PlainConverter | Dac, mosi: int, now: float) -> None:
         timing = model.timing
         if self._rise is None:
             begun = max(time for time in self._cs_time if time is not None)
@@ -221,7 +260,7 @@ class SpiBus:
         self._rises += 1
         model.rise(mosi)
 
-    def _fell(self, model: Adc | ThermocoupleConverter, mosi: int, now: float) -> None:
+    def _fell(self, model: Adc | PlainConverter | Dac, mosi: int, now: float) -> None:
         assert self._rise is not None
         _least(f"SCK of the {model.name} must be high", model.timing.high, now - self._rise)
         self._fall = now
@@ -240,7 +279,7 @@ class SpiBus:
         """Change the output; until it is valid it is the other level."""
         self._change += 1
         final = PULLED_UP if level is None else level
-        if timing is None:
+        if timing is None or not timing.valid:
             self.dut.miso.value = final
             return
         self.dut.miso.value = 1 - final

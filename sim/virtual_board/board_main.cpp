@@ -1,6 +1,6 @@
 // Runs the top of a board, with a file descriptor at the other end of its serial line.
 //
-//   board FD CLOCKS_PER_BIT CLOCKS_PER_SECOND QUIET WAIT [VALUES]
+//   board FD CLOCKS_PER_BIT CLOCKS_PER_SECOND QUIET WAIT [VALUES [HEARD FRAMES]]
 //
 // What arrives at FD is sent to `rx`, 8 data bits, no parity, one stop bit; what `tx` sends is written to FD. At most
 // CLOCKS_PER_SECOND clocks are simulated in a second, or as many as can be if it is 0. After QUIET clocks without
@@ -8,6 +8,7 @@
 // stop: the board measures by itself, with converters that give what is in the file VALUES. With WAIT, the clock also stops behind every frame from the
 // board, for that many milliseconds or until a byte arrives, so that the host seems to answer at once. Ends when the
 // other side of FD is closed, and prints the number of clocks, of bytes that were sent to the board, and of bytes from it.
+// What DACs get is written to the file HEARD; if FRAMES is not 0, it begins at once, and ends with that frame or sample.
 #include "Vtop.h"
 #include "pins.h"
 #include "verilated.h"
@@ -135,10 +136,14 @@ private:
 
 int main(int argc, char** argv) {
     Converters converters;
-    if (argc < 6 || (argc > 6 && !converters.load(argv[6]))) {
-        std::fprintf(stderr, "usage: board FD CLOCKS_PER_BIT CLOCKS_PER_SECOND QUIET WAIT [VALUES]\n");
+    FILE* heard = argc > 7 ? std::fopen(argv[7], "w") : nullptr;
+    if (argc < 6 || (argc > 6 && !converters.load(argv[6])) || (argc > 7 && (argc < 9 || !heard))) {
+        std::fprintf(stderr, "usage: board FD CLOCKS_PER_BIT CLOCKS_PER_SECOND QUIET WAIT [VALUES [HEARD FRAMES]]\n");
         return 2;
     }
+    converters.audio.record(converters.dac_count ? nullptr : heard);
+    converters.dacs.record(heard);
+    const uint64_t frames = argc > 8 ? std::strtoull(argv[8], nullptr, 10) : 0;
     const int fd = std::atoi(argv[1]);
     const double per_bit = std::atof(argv[2]);
     const double per_second = std::atof(argv[3]);
@@ -154,12 +159,13 @@ int main(int argc, char** argv) {
     board->rx = 1;
     const uint64_t turn = uint64_t(kBits * per_bit);  // a byte
     uint64_t clocks = 0, silent = 0, paced = 0;
-    if (quiet == 0) {
+    if (quiet == 0 && frames == 0) {
         pollfd byte{fd, POLLIN, 0};
         poll(&byte, 1, -1);
     }
+    const auto played = [&] { return converters.dac_count ? converters.dacs.samples() : converters.audio.frames(); };
     double started = now();
-    while (!sender.closed()) {
+    while (!sender.closed() && (frames == 0 || played() < frames)) {
         if (clocks % turn == 0) {
             sender.refill();
             receiver.flush();
@@ -170,6 +176,8 @@ int main(int argc, char** argv) {
         board->clk = 1;
         board->eval();
         exchange(converters, *board, 0);
+        listen(converters.audio, *board, 0);
+        write(converters, *board, 0);
         const bool answered = receiver.take(board->tx);
         ++clocks;
         if (answered && wait > 0 && !sender.waiting()) {
@@ -197,6 +205,7 @@ int main(int argc, char** argv) {
         }
     }
     board->final();
+    if (heard) std::fclose(heard);
     std::printf("%llu %llu %llu\n", (unsigned long long)clocks, (unsigned long long)sender.bytes(),
                 (unsigned long long)receiver.bytes());
     return 0;

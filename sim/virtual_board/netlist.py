@@ -25,12 +25,12 @@ from sosmith.gen.fpga.boards import Board
 from sosmith.gen.fpga.synthesis import synthesize
 from sosmith.gen.output.board_top import board_verilog, schedule_of, top_name
 from sosmith.model.arrays import Codes
-from sosmith.model.converters.spi_schedule import Schedule
+from sosmith.model.converters.schedule import Schedule
 from sosmith.model.errors import SpecificationError, ToolError
 from sosmith.model.link.protocol import MAX_BODY, WINDOWS
 from sosmith.model.text_files import write_files
 from sosmith.sim.converters import values
-from sosmith.sim.converters.values import MAX_SELECTS, values_text
+from sosmith.sim.converters.values import MAX_SELECTS, values_text, words_of
 from sosmith.sim.gate_level import with_cell_models
 from sosmith.sim.simulators import find_simulator
 from sosmith.sim.verilated_model import LIBRARY_SECONDS, Builder
@@ -69,7 +69,14 @@ class Netlist:
 
     @contextmanager
     def at(
-        self, end: int, *, speed: float = 0.0, wait: int = 0, codes: Codes | None = None
+        self,
+        end: int,
+        *,
+        speed: float = 0.0,
+        wait: int = 0,
+        codes: Codes | None = None,
+        heard: Path | None = None,
+        frames: int = 0,
     ) -> Iterator[subprocess.Popen[str]]:
         """Run the board with a file descriptor at the other end of its line, until the context ends.
 
@@ -87,12 +94,18 @@ class Netlist:
         codes : ndarray of int, shape (samples, channels, inputs), or None
             What the converters of the board measure from its first sample on, as codes of the inputs; the end stays.
             None for a board without converters, or one whose converters are not there.
+        heard : Path or None
+            Where the words of its DACs are written, with `codes`.
+        frames : int
+            Words of the DACs after which the board ends; it then begins at once. 0 to go on.
         """
         arguments = (end, float(self.clock / self.baud), float(self.clock) * speed, self.quiet, wait)
         command = [str(self.program), *map(str, arguments)]
         if codes is not None and self.schedule is not None:
             (file,) = write_files(self.program.parent, {"values.txt": values_text(self.schedule, codes)})
             command.append(str(file))
+        if heard is not None:
+            command += [str(heard), str(frames)]
         with subprocess.Popen(
             command, pass_fds=[end], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, text=True
         ) as process:
@@ -100,6 +113,35 @@ class Netlist:
                 yield process
             finally:
                 process.kill()
+
+    def play(self, codes: Codes) -> Codes:
+        """Run the board until its DACs got the result of what its ADCs measured; return all words that they got.
+
+        Parameters
+        ----------
+        codes : ndarray of int, shape (samples, channels, inputs)
+            What the converters measure, as codes of the inputs.
+
+        Returns
+        -------
+        ndarray of int, shape (silent + samples, channels)
+            Words of the DACs, from the first one on; `Schedule.silent` come before the results.
+
+        Raises
+        ------
+        ToolError
+            If the program fails.
+        """
+        assert self.schedule is not None
+        heard = self.program.parent / "heard.txt"
+        ours, theirs = socket.socketpair()
+        with ours, theirs:
+            frames = len(codes) + self.schedule.silent
+            with self.at(theirs.fileno(), codes=codes, heard=heard, frames=frames) as process:
+                process.communicate()
+        if process.returncode:
+            raise ToolError(f"the simulation of the board must end by itself, not with status {process.returncode}")
+        return words_of(heard.read_text(encoding="ascii"), self.schedule)
 
 
 def build(

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Any
 
 import click
 
-from sosmith.commands.options import BAUD, CORE, REALIZATION, SEED, SPEC
+from sosmith.commands.options import BAUD, CORE, REALIZATION, SEED, SPEC, completed_by
+from sosmith.interface.choices import BUILDABLE, PROJECTS, board_named
 from sosmith.interface.files import default_folder
 from sosmith.model.errors import SpecificationError
 from sosmith.output_paths import folder_option
@@ -44,7 +46,20 @@ class _Speed(click.ParamType[float]):
 @click.option(
     "--clock", type=click.FloatRange(min=0, min_open=True), help="Clock in Hz.  [default: that of the specification]"
 )
+@click.option(
+    "--board",
+    metavar="BOARD",
+    callback=lambda ctx, parameter, name: None if name is None else board_named(name, (*BUILDABLE, *PROJECTS)),
+    shell_complete=completed_by((*BUILDABLE, *PROJECTS)),
+    help="Run at the clock of this board, as `sosmith build` makes it.",
+)
 @BAUD
+@click.option(
+    "--heard",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE.wav",
+    help="Play --trace once, without a port, and write what the DAC of [converter.output] gets.",
+)
 @click.option(
     "--trace",
     metavar="FILE|SCENARIO",
@@ -77,7 +92,9 @@ def board_command(
     core: str | None,
     realization: str | None,
     clock: float | None,
+    board: str | None,
     baud: int,
+    heard: Path | None,
     trace: str | None,
     speed: float | None,
     fault: float | None,
@@ -92,12 +109,15 @@ def board_command(
     `simulate --port` take its path as a port.
 
     With [converter.NAME] tables in SPEC, models of these converters are at the pins of the board, and give what is in
-    --trace, from the moment on at which a host opens the port; the last value stays.
+    --trace, from the moment on at which a host opens the port; the last value stays. With --heard, the trace is played
+    from its begin to its end instead, and what the DAC gets is compared with the integer model: exits with 1 if one
+    bit differs.
 
     \b
         sosmith board my.toml --virtual
         sosmith board my.toml --virtual --trace wear_ramp
         sosmith board my.toml --virtual --speed 1 --fault 1000
+        sosmith board my.toml --virtual --board ulx3s_25f --trace music.wav --heard filtered.wav
     """
     if not virtual:
         raise SpecificationError("--virtual must be given: a real board is made by `sosmith build`")
@@ -109,6 +129,10 @@ def board_command(
     measures = bool(asked.checked.converters)
     if trace is not None and not measures:
         raise SpecificationError("--trace must come with [converter.NAME] tables in SPEC, or be given to `monitor`")
+    if heard is not None and asked.checked.dac is None:
+        raise SpecificationError("--heard must come with a table [converter.output] in SPEC")
+    if board is not None and clock is not None:
+        raise SpecificationError("--clock must be left out with --board, which has its own")
     if model and measures:
         raise SpecificationError("--model must be left out for a board with converters")
     with show_progress() as step:
@@ -120,7 +144,18 @@ def board_command(
             step("model of the board")
             modelled = ModelBoard(made, baud=baud)
         else:
-            board = NetlistBoard(made, folder, clock=clock, baud=baud, trace=trace, seed=seed, progress=step)
+            netlist = NetlistBoard(
+                made, folder, clock=clock, board=board, baud=baud, trace=trace, seed=seed, progress=step
+            )
+        if heard is not None:
+            step("playing")
+            frames, wrong = netlist.play(heard)
+    if heard is not None:
+        verdict = "all as in the integer model" if wrong == 0 else f"{wrong:,} words differ from the integer model"
+        click.echo(f"{heard}: {frames:,} samples of each channel, {verdict}")
+        if wrong:
+            sys.exit(1)
+        return
     with Terminal() as terminal:
         click.echo(terminal.path)
         if model:
@@ -128,4 +163,4 @@ def board_command(
             modelled.serve(terminal, damage)
         else:
             note(f"{asked.name} is at {terminal.path}; Ctrl-C ends it")
-            board.serve(terminal, damage, speed)
+            netlist.serve(terminal, damage, speed)

@@ -113,5 +113,8 @@ def build_table(summary: Mapping[str, Any]) -> Table:
         rows.append(("timing", f"{met}: {clock['achieved_mhz']:.2f} MHz, {needed}"))
     if "project" in summary:
         rows.append(("timing", f"not known: {summary['project']['tool']} was not run"))
+    if "sample_rate" in summary:
+        rate = summary["sample_rate"]
+        rows.append(("sample rate", f"{rate['hz']:,.2f} Hz: {rate['ppm']:+,.0f} ppm; MCLK {rate['mclk_hz']:,.0f} Hz"))
     rows.append(("serial line", f"{summary['line_rate_baud']:,} baud"))
     return Table(f"{summary['name']} on {summary['title']}", rows)

@@ -9,10 +9,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sosmith.gen.fpga.boards import find_board
+from sosmith.gen.output.board_top import wiring_of
 from sosmith.instrument.scenarios.traces import default_scenario, traces_for
 from sosmith.interface.certificate import Progress
 from sosmith.interface.design import Design
-from sosmith.model.errors import ToolError
+from sosmith.model.errors import SpecificationError, ToolError
+from sosmith.model.port import Port
+from sosmith.model.text_files import write_file
+from sosmith.model.traces.wav_file import check_rate, wav_bytes
+from sosmith.sim.converters.values import fed_codes
 from sosmith.sim.virtual_board.line_damage import LineDamage
 from sosmith.sim.virtual_board.terminal import Terminal
 
@@ -58,6 +64,7 @@ class NetlistBoard:
         *,
         clock: float | None,
         baud: int,
+        board: str | None = None,
         trace: str | None,
         seed: int,
         progress: Progress,
@@ -70,8 +77,45 @@ class NetlistBoard:
         if self._measures:
             traces = traces_for(core, trace or default_scenario(core), seed=seed)
             self._codes = np.stack([each.codes for each in traces], axis=1)
+        self._core = core
         rate = core.spec.hardware.clock if clock is None else Fraction(clock)
+        if board is not None:
+            target = find_board(board)
+            rate = wiring_of(core, target).clock(target)
         self._netlist: Netlist = build(core, folder, clock=rate, baud=baud, progress=lambda step: progress(step, 0, 0))
+
+    def play(self, heard: Path) -> tuple[int, int]:
+        """Run without a host until the converters gave the whole trace; write what the DACs got of it.
+
+        Parameters
+        ----------
+        heard : Path
+            WAV file for the results, from the first one on, a channel for each of the core.
+
+        Returns
+        -------
+        tuple of int
+            Frames, and words that differ from those of the integer model.
+
+        Raises
+        ------
+        ToolError
+            If the simulation fails, or the disk is full.
+        SpecificationError
+            If the board has no DAC, the sample rate is none of a WAV file, or the file cannot be written.
+        """
+        schedule, spec = self._netlist.schedule, self._core.spec
+        if schedule is None or schedule.writing is None or self._codes is None:
+            raise SpecificationError("the board must have a converter of the output to be heard, not results only")
+        check_rate(heard, spec.sample_rate)
+        words = self._netlist.play(self._codes)
+        wanted = schedule.writing.words(self._core.datapath.compute(fed_codes(schedule, self._codes)))
+        silent = np.zeros((schedule.silent, words.shape[1]), np.int64)
+        wrong = int(np.count_nonzero(words != np.concatenate([silent, wanted])))
+        dac = schedule.writing.converter
+        port = Port(name="heard", bits=dac.width, signed=dac.lowest < 0, lsb=Fraction(1), zero=Fraction(0), unit="")
+        write_file(heard, wav_bytes(words[schedule.silent :], port, spec.sample_rate))
+        return len(wanted), wrong
 
     def serve(self, terminal: Terminal, damage: LineDamage | None, speed: float | None = None) -> None:
         """Run at the terminal until interrupted, at `speed` times real time; 0 is as fast as it goes.

@@ -41,7 +41,9 @@ def test_pins_for_converters_are_at_a_connector() -> None:
         connectors = getattr(import_module(module), kind).connectors if board.header else ()
         if connectors:  # amaranth-boards has none of the Tang Nanos
             checked.append(board.name)
-            assert {*board.header} <= {pin for connector in connectors for pin in connector.mapping.values()}
+            assert {*board.header, *board.audio} <= {
+                pin for connector in connectors for pin in connector.mapping.values()
+            }
     assert len(checked) == 9
 
 

@@ -14,6 +14,7 @@ from tests.sim.lint import lint
 import sosmith
 from sosmith.gen.fpga.boards import BOARDS, PROJECTS
 from sosmith.gen.fpga.vendor_project import Project, project
+from sosmith.gen.fpga.wiring import Wiring
 from sosmith.gen.output.board_top import board_verilog, top_name
 from sosmith.gen.output.packages.lint_waivers import WAIVERS
 from sosmith.model.errors import SpecificationError
@@ -53,7 +54,7 @@ WAIVED_HERE = ("UNUSEDPARAM",)  # of the primitives above
 
 @pytest.fixture(scope="module", params=PROJECTS)
 def made(request: pytest.FixtureRequest) -> Project:
-    return project(TOP, "tiny", BOARDS[request.param], selects=SELECTS)
+    return project(TOP, "tiny", BOARDS[request.param], wiring=Wiring(selects=SELECTS))
 
 
 def ports_of(text: str, top: str) -> set[str]:

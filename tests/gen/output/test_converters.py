@@ -9,8 +9,9 @@ from tests.gen.output.converter_board import SPEC
 
 import sosmith
 from sosmith.gen.core import CoreDesign, design_core
-from sosmith.gen.fpga.boards import BOARDS, check_selects
-from sosmith.gen.output.board_top import schedule_of, selects_of
+from sosmith.gen.fpga.boards import BOARDS
+from sosmith.gen.fpga.wiring import Wiring
+from sosmith.gen.output.board_top import schedule_of, wiring_of
 from sosmith.model.errors import SpecificationError
 
 CLOCK = Fraction(12_000_000)
@@ -29,7 +30,7 @@ def test_clocks_and_intervals_follow_from_the_data_sheets(made: CoreDesign) -> N
     assert schedule.intervals == (1, 11)  # more than 100 ms
     assert schedule.first == 19  # 200 ms at the end of the 20th period
     assert schedule.selects == (2, 5)
-    assert selects_of(made, BOARDS["icebreaker"]) == 7
+    assert wiring_of(made, BOARDS["icebreaker"]) == Wiring(selects=7)
 
 
 def test_a_higher_supply_is_faster(made: CoreDesign) -> None:
@@ -52,13 +53,3 @@ def test_what_does_not_fit_is_refused(made: CoreDesign) -> None:
     refused("the core must have the inputs voltage and temperature of the converters, not clearance_in", alone)
     many = replace(made, spec=replace(made.spec, channels=121))
     refused("inputs of all channels must be at most 241 with converters, not 242", many)
-
-
-def test_a_board_has_pins_for_so_many_converters() -> None:
-    check_selects(BOARDS["icestick"], 21)
-    with pytest.raises(SpecificationError, match=r"^converters must be at most 21 on the iCEstick, not 22$"):
-        check_selects(BOARDS["icestick"], 22)
-    with pytest.raises(SpecificationError, match=r"^converters must be at most 0 on the UPduino 3, not 1$"):
-        check_selects(BOARDS["upduino"], 1)
-    for board in BOARDS.values():
-        assert len(set(board.header)) == len(board.header)

@@ -86,6 +86,9 @@ ADC = "\n[converter.voltage]\ndevice = 'mcp3204'\nrange = {}"
 THERMOCOUPLE = "\n[converter.temperature]\ndevice = 'max31855'"
 
 
+DEVICES = "mcp3202, mcp3204, max31855, ad7476a, pcm1808, cs5343, pcm5102a, cs4344, mcp4921"
+
+
 DECIMATED = "\n# decimated\n"
 """Stands for `filter.decimate`, which is in another table."""
 
@@ -1053,7 +1056,7 @@ BAD = [
         "unknown converter",
         CLOCK,
         CLOCK + ADC.format("[0, 10]").replace("mcp3204", "mcp3208") + THERMOCOUPLE,
-        "converter.voltage.device must be one of mcp3202, mcp3204, max31855, not 'mcp3208' (did you mean mcp3204?)",
+        f"converter.voltage.device must be one of {DEVICES}, not 'mcp3208' (did you mean mcp3204?)",
     ),
     (
         "converter without a range",
@@ -1089,7 +1092,38 @@ BAD = [
         "converter without a device",
         CLOCK,
         CLOCK + "\n[converter.voltage]\nrange = [0, 10]" + THERMOCOUPLE,
-        "converter.voltage.device must be one of mcp3202, mcp3204, max31855, not missing",
+        f"converter.voltage.device must be one of {DEVICES}, not missing",
+    ),
+    (
+        "converter of the output alone",
+        CLOCK,
+        CLOCK + "\n[converter.output]\ndevice = 'cs4344'",
+        "converter must be a table for each of the inputs voltage and temperature, or none, not 'output'",
+    ),
+    (
+        "ADC at the output",
+        CLOCK,
+        CLOCK + ADC.format("[0, 10]") + THERMOCOUPLE + "\n[converter.output]\ndevice = 'pcm1808'",
+        "converter.output.device must be a DAC, one of pcm5102a, cs4344, mcp4921, not 'pcm1808'",
+    ),
+    (
+        "DAC at an input",
+        CLOCK,
+        CLOCK + ADC.format("[0, 10]").replace("mcp3204", "cs4344") + THERMOCOUPLE,
+        "converter.voltage.device must be an ADC, one of mcp3202, mcp3204, max31855, ad7476a, pcm1808, cs5343, not "
+        "'cs4344'",
+    ),
+    (
+        "audio converter with a supply",
+        CLOCK,
+        CLOCK + ADC.format("[0, 10]").replace("mcp3204", "pcm1808") + "\nsupply = 3.3" + THERMOCOUPLE,
+        "converter.voltage.supply must be left out for pcm1808, not 3.3",
+    ),
+    (
+        "output between words",
+        CLOCK,
+        CLOCK + ADC.format("[0, 10]") + THERMOCOUPLE + "\n[converter.output]\ndevice = 'cs4344'\nrange = [0.0, 10.0]",
+        "converter.output must be one that has an LSB of clearance of a whole number of its steps, not of 409.6",
     ),
     (
         "steps between codes",

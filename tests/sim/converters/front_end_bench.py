@@ -19,11 +19,11 @@ from cocotb.clock import Clock
 from cocotb.triggers import ClockCycles, FallingEdge, RisingEdge
 
 from sosmith.model.converters.spi_converter import CONVERTERS
-from sosmith.sim.converters.cocotb_bus import Adc, SpiBus, ThermocoupleConverter
+from sosmith.sim.converters.cocotb_bus import Adc, PlainConverter, SpiBus
 
 
-def models(job: dict[str, Any]) -> list[Adc | ThermocoupleConverter]:
-    made: list[Adc | ThermocoupleConverter] = []
+def models(job: dict[str, Any]) -> list[Adc | PlainConverter]:
+    made: list[Adc | PlainConverter] = []
     for reading in job["readings"]:
         converter = CONVERTERS[reading["device"]]
         scale = Fraction(reading["scale"])
@@ -36,10 +36,10 @@ def models(job: dict[str, Any]) -> list[Adc | ThermocoupleConverter]:
         for first in range(0, len(values), converter.inputs):
             mine = values[first : first + converter.inputs]
             name = f"{converter.title} {first}"
-            if converter.step is None:
+            if converter.command_bits:
                 made.append(Adc(name, converter.inputs, timing, counts(mine)))
             else:
-                made.append(ThermocoupleConverter(name, timing, lambda mine=mine: next(mine[0])))
+                made.append(PlainConverter(name, timing, lambda mine=mine: next(mine[0]), converter.bits))
     return made
 
 

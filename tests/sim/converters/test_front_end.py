@@ -18,9 +18,9 @@ from cocotb_tools.runner import Icarus
 
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.hdl.converters.front_end import FrontEnd, _Scan
+from sosmith.model.converters.reading import Reading
+from sosmith.model.converters.schedule import Schedule
 from sosmith.model.converters.spi_converter import CONVERTERS, ReadingFault
-from sosmith.model.converters.spi_reading import Reading
-from sosmith.model.converters.spi_schedule import Schedule
 from sosmith.model.dataflow.status import Flag
 from sosmith.model.port import Port
 from sosmith.sim.converters.cocotb_bus import thermocouple_frame
@@ -60,7 +60,8 @@ class Case:
 
 
 def case(clock: int, rate: int, channels: int, samples: int, scale: Fraction = Fraction(1), **devices: Port) -> Case:
-    spans = {"mcp3202": (Fraction(0), Fraction(10)), "mcp3204": (Fraction(-1), Fraction(1)), "max31855": None}
+    span = (Fraction(-1), Fraction(1))
+    spans = {"mcp3202": (Fraction(0), Fraction(10)), "mcp3204": span, "ad7476a": span, "max31855": None}
     readings = tuple((name, Reading.of(CONVERTERS[name], port, spans[name])) for name, port in devices.items())
     return Case(clock, rate, channels, readings, samples, scale)
 
@@ -70,6 +71,8 @@ CASES = {
     "instrument": case(100_000, 100, 3, 40, mcp3202=VOLTAGE, max31855=TEMPERATURE),
     # As fast as an MCP3204 allows, at almost the highest sample rate, of which the clock is no multiple.
     "adc": case(12_000_000, 11_400, 4, 8, mcp3204=SIGNED),
+    # 250,000 samples a second.
+    "fast": case(25_000_000, 250_000, 1, 20, ad7476a=SIGNED),
     # As fast as a MAX31855 allows, which converts faster here.
     "thermocouple": case(50_000_000, 10_000, 2, 30, Fraction(1, 500), max31855=TEMPERATURE),
 }
@@ -203,14 +206,14 @@ def test_what_the_model_makes_of_a_frame() -> None:
     assert held == [True, False, True, False]
 
 
-def without_faults(scan: Any, reading: Reading, code: Signal) -> Value:
+def without_faults(scan: Any, reading: Reading, frame: Value, code: Signal) -> Value:
     """Take every reading for a good one."""
     return Const(0, len(ReadingFault))
 
 
-def with_wrong_bits(scan: Any, reading: Reading, code: Signal) -> Value:
+def with_wrong_bits(scan: Any, reading: Reading, frame: Value, code: Signal) -> Value:
     """Take a wrong null bit for a right one."""
-    return FAULTS(scan, reading, code) & ~(1 << ReadingFault.FRAME)
+    return FAULTS(scan, reading, frame, code) & ~(1 << ReadingFault.FRAME)
 
 
 FAULTS = _Scan.faults

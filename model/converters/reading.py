@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
+from sosmith.model.converters.i2s_converter import I2sConverter
 from sosmith.model.converters.spi_converter import THERMOCOUPLE_FAULTS, Converter, ReadingFault
 from sosmith.model.port import Port
 
@@ -32,7 +33,7 @@ class Reading:
 
     Attributes
     ----------
-    converter : Converter
+    converter : Converter or I2sConverter
         The converter.
     port : Port
         The input.
@@ -51,23 +52,26 @@ class Reading:
     (12800, ())
     """
 
-    converter: Converter
+    converter: Converter | I2sConverter
     port: Port
     offset: int
     gain: int
 
     @classmethod
-    def of(cls, converter: Converter, port: Port, span: tuple[Fraction, Fraction] | None = None) -> Reading:
+    def of(
+        cls, converter: Converter | I2sConverter, port: Port, span: tuple[Fraction, Fraction] | None = None
+    ) -> Reading:
         """Return how a port is read from a converter.
 
         Parameters
         ----------
-        converter : Converter
+        converter : Converter or I2sConverter
             The converter.
         port : Port
             The input, in degC for a converter of temperatures.
         span : tuple of Fraction or None
-            Values of the input at the reading 0 and at ``2**width``, rising; None for a converter of temperatures.
+            Values of the input at the lowest reading and a step above the highest one, rising; None for a converter of
+            temperatures.
 
         Raises
         ------
@@ -78,7 +82,8 @@ class Reading:
             assert converter.step is not None
             zero, step = Fraction(0), converter.step
         else:
-            zero, step = span[0], (span[1] - span[0]) / 2**converter.width
+            step = (span[1] - span[0]) / 2**converter.width
+            zero = span[0] - converter.lowest * step
         gain, offset = step / port.lsb, (zero - port.zero) / port.lsb
         if gain.denominator != 1:
             raise UnfitReadingError(f"steps of a whole number of LSB of {port.name}", f"of {_shown(gain)}")
