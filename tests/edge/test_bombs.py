@@ -293,7 +293,9 @@ def workbook(parts: dict[str, bytes]) -> bytes:
 BOOKS: dict[str, Callable[[], bytes]] = {
     "zeros": lambda: workbook({"xl/worksheets/sheet1.xml": bytes(100 << 20)}),
     "tags": lambda: workbook({"xl/worksheets/sheet1.xml": b"<a/>" * 2_000_000}),
-    "entities": lambda: workbook({"xl/workbook.xml": b'<!DOCTYPE a [<!ENTITY b "bbbb"><!ENTITY c "&b;&b;">]><a>&c;</a>'}),
+    "entities": lambda: workbook(
+        {"xl/workbook.xml": b'<!DOCTYPE a [<!ENTITY b "bbbb"><!ENTITY c "&b;&b;">]><a>&c;</a>'}
+    ),
     "a text instead": lambda: json.dumps([[]] * 1000).encode(),
 }
 
