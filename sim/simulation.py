@@ -17,7 +17,7 @@ import numpy as np
 
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.fpga.boards import Board
-from sosmith.gen.fpga.synthesis import synthesize
+from sosmith.gen.fpga.synthesis import Netlist, synthesize
 from sosmith.gen.output.core_facts import CoreFacts, InterfaceFacts, core_facts
 from sosmith.gen.output.generate import generate
 from sosmith.gen.output.vectors import Vectors, vector_files, whole_beats
@@ -99,21 +99,16 @@ def simulate(
         codes = side_by_side([trace.codes for trace in traces])
         sent = whole_beats(codes, facts.interface.inputs)
         if hardware is not None:
-            result = first_copies(
-                hardware(
-                    source.read_text(encoding="utf-8"), sent, lambda done, total: progress("running", done, total)
-                ),
-                facts.interface.copies_per_result,
-            )
+            result = _results_of(hardware, source, sent, facts.interface, progress)
         else:
+            folder = directory / "simulation"
             if gates is not None:
-                progress(f"synthesizing for {gates.title}", 0, 0)
-                netlist = synthesize(source, design.datapath.name, gates, directory / "gates" / gates.name)
-                source = with_cell_models(netlist, scrambled=not design.spec.hardware.reload)
+                folder = directory / "gates" / gates.name
+                source, netlist = _gate_level(design, source, gates, folder, progress)
             bench = SimulatorBench(
                 source=source,
                 interface=facts.interface,
-                build_dir=directory / "simulation" if gates is None else directory / "gates" / gates.name,
+                build_dir=folder,
                 simulator=simulator,
                 seed=seed,
                 idle=idle,
@@ -157,6 +152,25 @@ def simulate(
         date=date,
         input_ranges=input_ranges(traces),
     )
+
+
+def _results_of(
+    hardware: Hardware, source: Path, sent: Codes, interface: InterfaceFacts, progress: Progress
+) -> CosimulationResult:
+    """Return the results of hardware, each of them once."""
+    text = source.read_text(encoding="utf-8")
+    return first_copies(
+        hardware(text, sent, lambda done, total: progress("running", done, total)), interface.copies_per_result
+    )
+
+
+def _gate_level(
+    design: CoreDesign, source: Path, board: Board, folder: Path, progress: Progress
+) -> tuple[Path, Netlist]:
+    """Synthesize a core for a board into a folder; return what is simulated instead of its source, and the netlist."""
+    progress(f"synthesizing for {board.title}", 0, 0)
+    netlist = synthesize(source, design.datapath.name, board, folder)
+    return with_cell_models(netlist, scrambled=not design.spec.hardware.reload), netlist
 
 
 @contextmanager

@@ -27,7 +27,6 @@ from sosmith.model.dataflow.status import STATUS_BITS, Flag
 from sosmith.model.full_scale import is_sound
 from sosmith.model.port import Port
 from sosmith.model.reload.registers import INTERFACE
-from sosmith.model.sections.direct_form import DirectForm1
 from sosmith.model.sections.horner import HornerStep
 
 
@@ -445,7 +444,7 @@ def _wear(design: CoreDesign) -> tuple[WearFacts, ...] | None:
 
 def _sections(section: Stage) -> Sequence[SectionFacts]:
     """Facts about each recursion of a section."""
-    feedback = tuple(section.feedback) if isinstance(section, DirectForm1) and section.feeds_errors_back else None
+    feedback: tuple[int, int] | None = getattr(section, "error_feedback", None)  # only direct forms have one
     return [_section(name, graph, feedback) for name, graph in recursions(section).items()]
 
 

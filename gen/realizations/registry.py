@@ -26,7 +26,7 @@ Row = Sequence[float]
 
 
 class Section(Stage, Protocol):
-    """A stage with coefficients."""
+    """A stage with coefficients; one in direct form has `error_feedback` too, as in `DirectForm1`."""
 
     @property
     def coefficients(self) -> dict[str, tuple[int, int]]:

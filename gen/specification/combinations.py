@@ -282,16 +282,22 @@ class Combination(NamedTuple):
         "ok", "no use", "refused" for a reason of principle, or "not yet".
     reason : str
         Why it is of no use, or refused; otherwise empty.
+    beside : str
+        Name of another option that the architecture takes, but not together with this one; otherwise empty.
     """
 
     row: str
     option: str
     verdict: str
     reason: str
+    beside: str = ""
 
 
 def combinations() -> tuple[Combination, ...]:
-    """Return all pairs: of an architecture and an option, and of two options of different keys."""
+    """Return all pairs: of an architecture and an option, and of two options of different keys.
+
+    After them, what a single architecture does not take together.
+    """
     with_architecture = [
         _combination(terms.name, option, terms.lacks.get(option)) for terms in TERMS.values() for option in OPTIONS
     ]
@@ -300,7 +306,12 @@ def combinations() -> tuple[Combination, ...]:
         for one, other in pairs(OPTIONS, 2)
         if one.key != other.key
     ]
-    return (*with_architecture, *of_options)
+    apart = [
+        _combination(terms.name, other, refusal)._replace(beside=one.name)
+        for terms in TERMS.values()
+        for (one, other), refusal in terms.apart.items()
+    ]
+    return (*with_architecture, *of_options, *apart)
 
 
 def _combination(row: str, option: Option, refusal: Refusal | None) -> Combination:

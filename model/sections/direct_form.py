@@ -180,9 +180,9 @@ class DirectForm1:
         return self.total_frac > self.y_frac
 
     @property
-    def feeds_errors_back(self) -> bool:
-        """Whether there are dropped bits and a recursion, so that the error feedback means anything."""
-        return self.drops and any(self.denominator)
+    def error_feedback(self) -> tuple[int, int] | None:
+        """The error feedback; None where no bits are dropped or nothing is fed back, so that it means nothing."""
+        return self.feedback if self.drops and any(self.denominator) else None
 
     @property
     def coefficients(self) -> dict[str, tuple[int, int]]:

@@ -13,7 +13,7 @@ import pytest
 from tests.commands.invocation import Invocation
 from tests.gen.designs import EXAMPLES, example_design
 from tests.gen.word_lengths.decimated import small
-from tests.verify.around.decimators import Instrument
+from tests.verify.multirate.decimators import Instrument
 from tests.verify.parallel.cores import specified
 from tests.verify.small_specifications import PLAIN
 

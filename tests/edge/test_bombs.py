@@ -290,18 +290,20 @@ def workbook(parts: dict[str, bytes]) -> bytes:
     return file.getvalue()
 
 
-BOOKS: dict[str, bytes] = {
-    "zeros": workbook({"xl/worksheets/sheet1.xml": bytes(100 << 20)}),
-    "tags": workbook({"xl/worksheets/sheet1.xml": b"<a/>" * 2_000_000}),
-    "entities": workbook({"xl/workbook.xml": b'<!DOCTYPE a [<!ENTITY b "bbbb"><!ENTITY c "&b;&b;">]><a>&c;</a>'}),
-    "a text instead": json.dumps([[]] * 1000).encode(),
+BOOKS: dict[str, Callable[[], bytes]] = {
+    "zeros": lambda: workbook({"xl/worksheets/sheet1.xml": bytes(100 << 20)}),
+    "tags": lambda: workbook({"xl/worksheets/sheet1.xml": b"<a/>" * 2_000_000}),
+    "entities": lambda: workbook(
+        {"xl/workbook.xml": b'<!DOCTYPE a [<!ENTITY b "bbbb"><!ENTITY c "&b;&b;">]><a>&c;</a>'}
+    ),
+    "a text instead": lambda: json.dumps([[]] * 1000).encode(),
 }
 
 
 @pytest.mark.parametrize("name", BOOKS)
 def test_workbooks(name: str, tmp_path: Path) -> None:
     path = tmp_path / "bomb.xlsx"
-    path.write_bytes(BOOKS[name])
+    path.write_bytes(BOOKS[name]())
     with little_memory(), pytest.raises(SpecificationError) as told:
         read_measurement_file(path, "2024-03-01")
     one_sentence(told.value, path)

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 from tests.gen.word_lengths.decimated import INSTRUMENT, locomotive, locomotive_text, read, small, tree_of
-from tests.verify.around.decimators import Instrument, designed, written
+from tests.verify.multirate.decimators import Instrument, designed, written
 
 from sosmith.gen.core import design_core
 from sosmith.gen.output.generate import generate

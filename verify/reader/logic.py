@@ -48,7 +48,7 @@ class Stored(NamedTuple):
     writes: tuple[Write, ...]
 
 
-class Held(NamedTuple):
+class RegisterLogic(NamedTuple):
     """A register: what it holds next, and before the first clock, which is None if that is not said."""
 
     next: tuple[int, ...]
@@ -67,7 +67,7 @@ class Logic:
         Inputs that registers and memories are clocked by.
     outputs : dict of str to tuple of int
         Literals of each output.
-    registers : dict of str to Held
+    registers : dict of str to RegisterLogic
     memories : dict of str to Stored
     instances : dict of str to str
         The module of each instance.
@@ -78,7 +78,7 @@ class Logic:
     ports: dict[str, str] = field(default_factory=dict)
     clocks: set[str] = field(default_factory=set)
     outputs: dict[str, tuple[int, ...]] = field(default_factory=dict)
-    registers: dict[str, Held] = field(default_factory=dict)
+    registers: dict[str, RegisterLogic] = field(default_factory=dict)
     memories: dict[str, Stored] = field(default_factory=dict)
     instances: dict[str, str] = field(default_factory=dict)
     given: dict[str, tuple[int, ...]] = field(default_factory=dict)
@@ -141,7 +141,7 @@ class _Reading:
         for _, statements in module.clocked:
             own = {name: held[name] for name in self._loaded(statements)}
             held |= self._executed(statements, HIGH, own, writes)
-        found.registers = {name: Held(tuple(held[name]), first) for name, first in module.registers.items()}
+        found.registers = {name: RegisterLogic(tuple(held[name]), first) for name, first in module.registers.items()}
         for name, depth in module.depths.items():
             first = tuple(module.held[name][place] for place in range(depth))
             found.memories[name] = Stored(module.widths[name], first, tuple(writes[name]))

@@ -14,8 +14,8 @@ from sosmith.verify.reader.gates import HIGH, LOW, Gates, extended
 from sosmith.verify.reader.gates import Word as Literals
 from sosmith.verify.reader.logic import (
     UNKNOWN,
-    Held,
     Logic,
+    RegisterLogic,
     Stored,
     Write,
     compared,
@@ -110,7 +110,7 @@ class _Outside:
         require(len(found) == 1, "the clock of the second reader must be an input")
         return str(found[0])
 
-    def _held(self) -> dict[str, Held]:
+    def _held(self) -> dict[str, RegisterLogic]:
         """Return the registers, whose bits are flip-flops and no other's.
 
         Those of no register, which ``proc`` makes where a memory is written, are taken for undriven.
@@ -130,7 +130,7 @@ class _Outside:
         for bit in next_of.keys() - self._known.keys():
             self._known[bit] = self._gates.variable(("undriven", bit))
         return {
-            name: Held(tuple(self._word([next_of[bit] for bit in bits])), self._first(name))
+            name: RegisterLogic(tuple(self._word([next_of[bit] for bit in bits])), self._first(name))
             for name, bits in bits_of.items()
         }
 

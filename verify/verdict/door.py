@@ -10,12 +10,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from sosmith.verify.around.cic import DecimatorVerdict, check_decimator
-from sosmith.verify.around.parallel_core import check_ahead, check_behind
 from sosmith.verify.c_model.check import check_c_model
 from sosmith.verify.certificate_file import Certificate, ItemEntry
 from sosmith.verify.decimation import at_lower_rate, behind_decimator, calibration_alone, module_in
 from sosmith.verify.graph import RejectedError, require
+from sosmith.verify.multirate.cic import DecimatorVerdict, check_decimator
+from sosmith.verify.multirate.parallel_core import check_ahead, check_behind
 from sosmith.verify.parallel.check import HardwareVerdict, check_hardware
 from sosmith.verify.program.check import ProgramVerdict, check_program
 from sosmith.verify.reader.rtlil.check import check_rtlil

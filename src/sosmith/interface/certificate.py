@@ -16,9 +16,9 @@ from sosmith.interface.second_reader import SECOND_READERS, read_again
 from sosmith.model.errors import SpecificationError
 from sosmith.model.foreign_files import MAX_JSON, read_bytes
 from sosmith.model.text_files import write_files
-from sosmith.verify.around.cic import DecimatorVerdict
 from sosmith.verify.certificate_file import Certificate as Entries
 from sosmith.verify.certificate_file import certificate_text, read_certificate
+from sosmith.verify.multirate.cic import DecimatorVerdict
 from sosmith.verify.parallel.check import HardwareVerdict
 from sosmith.verify.program.check import ProgramVerdict
 from sosmith.verify.rocq.check import RocqVerdict, check_in_rocq, rocq_texts

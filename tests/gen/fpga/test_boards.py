@@ -26,25 +26,25 @@ def test_a_name_that_is_nearly_right_is_suggested() -> None:
 
 
 def test_an_unknown_board_is_refused_with_those_that_exist() -> None:
-    message = (
-        "the board must be one of icebreaker, upduino, ice40_hx8k_b_evn, icestick, ulx3s_12f, ulx3s_25f, ulx3s_45f, "
-        "ulx3s_85f, colorlight_i5, orangecrab_25f, ecp5_evn, tang_nano_9k, tang_nano_20k, arty_a7, cmod_s7, not kc705"
-    )
+    assert [*BOARDS][:2] == ["icebreaker", "upduino"]
+    message = f"the board must be one of {', '.join(BOARDS)}, not kc705"
     with pytest.raises(SpecificationError, match=f"^{re.escape(message)}$"):
         find_board("kc705")
 
 
 def test_pins_for_converters_are_at_a_connector() -> None:
-    checked = []
+    unchecked = set()
     for board in BOARDS.values():
+        if not board.header:
+            continue
         module, _, kind = (board.platform or "").partition(":")
-        connectors = getattr(import_module(module), kind).connectors if board.header else ()
-        if connectors:  # amaranth-boards has none of the Tang Nanos
-            checked.append(board.name)
-            assert {*board.header, *board.audio} <= {
-                pin for connector in connectors for pin in connector.mapping.values()
-            }
-    assert len(checked) == 9
+        connectors = getattr(import_module(module), kind).connectors
+        there = {pin for connector in connectors for pin in connector.mapping.values()}
+        if not there:
+            unchecked.add(board.name)
+        else:
+            assert {*board.header, *board.audio} <= there
+    assert unchecked == {"tang_nano_9k", "tang_nano_20k"}  # amaranth-boards has no connectors of theirs
 
 
 def test_what_a_device_lacks_is_told() -> None:

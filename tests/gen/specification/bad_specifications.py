@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from sosmith.gen.specification.choices import REALIZATIONS
+
 BASE = """\
 name = "demo"
 sample_rate = 100.0
@@ -968,8 +970,7 @@ BAD = [
         "unknown realization",
         CLOCK,
         CLOCK + '\nrealization = "df3"',
-        "hardware.realization must be one of auto, df1, df1_ef1, df1_ef2, df2t, delta, state_space, normal, "
-        "lattice_wdf, not 'df3' (did you mean df1?)",
+        f"hardware.realization must be one of {', '.join(REALIZATIONS)}, not 'df3' (did you mean df1?)",
     ),
     (
         "unknown start",

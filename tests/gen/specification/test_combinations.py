@@ -51,17 +51,32 @@ def test_every_option_and_every_architecture_is_there() -> None:
 
 
 @pytest.mark.sweep(25)
-@pytest.mark.parametrize("pair", combinations(), ids=lambda pair: f"{pair.row}-{pair.option}")
+@pytest.mark.parametrize(
+    "pair", combinations(), ids=lambda pair: "-".join(filter(None, (pair.row, pair.beside, pair.option)))
+)
 def test_what_the_table_says_is_what_happens(pair: Combination) -> None:
     if pair.verdict == "ok":
         made = design_core(asking_for(pair.row, pair.option))
         assert pair.row not in TERMS or made.architecture.name == pair.row
         return
     with pytest.raises(SpecificationError) as refused:
-        asking_for(pair.row, pair.option)
+        asking_for(*filter(None, (pair.row, pair.beside, pair.option)))
     assert ("not yet available: " in str(refused.value)) == (pair.verdict == "not yet")
     assert pair.reason in str(refused.value)
     assert bool(pair.reason) == (pair.verdict in {"no use", "refused"})
+
+
+def test_what_one_architecture_does_not_take_together_is_there() -> None:
+    apart = {(each.row, each.beside, each.option) for each in combinations() if each.beside}
+    assert apart == {(name, *(each.name for each in pair)) for name, terms in TERMS.items() for pair in terms.apart}
+    assert ("parallel", "reload", "multipliers 0") in apart
+
+
+@pytest.mark.parametrize("pair", [each for each in combinations() if each.beside], ids=lambda pair: pair.row)
+def test_what_it_takes_apart_is_ok(pair: Combination) -> None:
+    """Each of the two is taken without the other one."""
+    for option in (pair.beside, pair.option):
+        assert asking_for(pair.row, option).hardware.architecture == pair.row
 
 
 def test_a_pipeline_without_look_ahead_is_no_option() -> None:

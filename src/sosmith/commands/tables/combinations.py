@@ -19,7 +19,7 @@ def table_rows(found: Sequence[Combination]) -> tuple[list[str], list[list[str]]
     """
     options = list(dict.fromkeys(each.option for each in found))
     names = [name for name in dict.fromkeys(each.row for each in found) if name not in options]
-    verdicts = {(each.row, each.option): each.verdict for each in found}
+    verdicts = {(each.row, each.option): each.verdict for each in found if not each.beside}
     rows = [
         [option, *(verdicts[name, option] for name in names), "; ".join(_not_beside(option, found))]
         for option in options
@@ -30,10 +30,14 @@ def table_rows(found: Sequence[Combination]) -> tuple[list[str], list[list[str]]
 def _not_beside(option: str, found: Sequence[Combination]) -> Iterator[str]:
     """List the options that one does not go together with, by the verdict."""
     options = {each.option for each in found}
-    pairs = [each for each in found if each.row in options and option in {each.row, each.option}]
-    for verdict in dict.fromkeys(each.verdict for each in pairs if each.verdict != _OK):
-        others = [each.option if each.row == option else each.row for each in pairs if each.verdict == verdict]
-        yield f"{', '.join(others)} ({verdict})"
+    others: dict[str, list[str]] = {}
+    for each in found:
+        pair = [each.beside or each.row, each.option]
+        if option in pair and options.issuperset(pair) and each.verdict != _OK:
+            other = pair[pair.index(option) - 1]
+            others.setdefault(each.verdict, []).append(f"{other} in {each.row}" if each.beside else other)
+    for verdict, names in others.items():
+        yield f"{', '.join(names)} ({verdict})"
 
 
 def reasons(found: Sequence[Combination]) -> list[str]:
@@ -41,7 +45,8 @@ def reasons(found: Sequence[Combination]) -> list[str]:
     subjects: dict[tuple[str, str], list[str]] = {}
     for each in found:
         if each.reason:
-            subjects.setdefault((each.row, each.reason), []).append(each.option)
+            row = f"{each.row} and {each.beside}" if each.beside else each.row
+            subjects.setdefault((row, each.reason), []).append(each.option)
     return [f"{row} with {' or '.join(options)}: {reason}" for (row, reason), options in subjects.items()]
 
 

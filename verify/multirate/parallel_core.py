@@ -6,7 +6,7 @@ Its ports are connected to those that a core with streams has, in a top that is 
                                   flags -->
 
 and that is proven like any parallel core (`sosmith.verify.parallel.check`). Which bit of a port leaves the core
-where is taken from what is around it, which `sosmith.verify.around.cic` proves: flags that the core behind makes
+where is taken from what is around it, which `sosmith.verify.multirate.cic` proves: flags that the core behind makes
 are then proven to leave at their places. Flags of the inputs come with each result of the decimator, and the core must
 hand on those of the same sample.
 """
@@ -15,13 +15,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from sosmith.verify.around.calibration import CHANNEL, CODE, FLAGS, layout_of
-from sosmith.verify.around.cic import Around, around
-from sosmith.verify.around.passed_flags import origins
-from sosmith.verify.around.seams import AHEAD, BEHIND, CIC, CLOCK, DATA, DEST, ahead_of
 from sosmith.verify.certificate_file import Certificate
 from sosmith.verify.decimation import at_lower_rate, calibration_alone
 from sosmith.verify.graph import require
+from sosmith.verify.multirate.calibration import CHANNEL, CODE, FLAGS, layout_of
+from sosmith.verify.multirate.cic import MultirateTop, multirate_top
+from sosmith.verify.multirate.connections import AHEAD, BEHIND, CIC, CLOCK, DATA, DEST, calibration_connections
+from sosmith.verify.multirate.passed_flags import origins
 from sosmith.verify.parallel.check import FLAGS as LEAVING_FLAGS
 from sosmith.verify.parallel.check import OUTPUT, OUTPUT_DEST, HardwareVerdict, Inside, check_modules
 from sosmith.verify.parallel.control import RESET, SINK, SOURCE
@@ -49,7 +49,7 @@ def check_behind(text: str, certificate: Certificate, channels: int = 1) -> Hard
     RejectedError
         If it computes anything else.
     """
-    found, behind = around(text, certificate, channels), at_lower_rate(certificate)
+    found, behind = multirate_top(text, certificate, channels), at_lower_rate(certificate)
     (port,) = behind.inputs
     whole = -(-port.bits // _BYTE) * _BYTE
     told = found.netlist.widths[found.told]
@@ -62,26 +62,30 @@ def check_behind(text: str, certificate: Certificate, channels: int = 1) -> Hard
     widths = {DATA: whole + told}
     if found.names is not None:
         supplied[found.names.dest] = Bits(DEST)
-        (taken,) = (name for name, source in found.seams.entering.items() if source == found.names.dest)
+        (taken,) = (name for name, source in found.connections.entering.items() if source == found.names.dest)
         widths[DEST] = found.netlist.widths[taken]
-    wires = {name: supplied[source] for name, source in found.seams.entering.items()}
-    wires |= {found.seams.ready: Bits(SINK), found.seams.taken: Bits(_READY), found.seams.valid: Bits(_VALID)}
+    wires = {name: supplied[source] for name, source in found.connections.entering.items()}
+    wires |= {
+        found.connections.ready: Bits(SINK),
+        found.connections.taken: Bits(_READY),
+        found.connections.valid: Bits(_VALID),
+    }
     top = _top(found, f"{certificate.name}_behind", BEHIND, wires, widths, _leaving(found))
     return check_modules({_TOP: top, **found.modules}, behind, channels, Inside(f"{_CORE}.", told))
 
 
 def check_ahead(text: str, certificate: Certificate, channels: int = 1) -> HardwareVerdict:
     """Prove that the parallel calibration before a decimator computes its graph; the rest is as of `check_behind`."""
-    found, alone = around(text, certificate, channels), calibration_alone(certificate)
+    found, alone = multirate_top(text, certificate, channels), calibration_alone(certificate)
     assert alone is not None
     port, count = alone.output, (channels - 1).bit_length()
     name = f"{certificate.name}_ahead"
-    seams = ahead_of(found.netlist, found.modules.get(name), port.bits, count)
-    wires = {entry: Bits(source) for entry, source in seams.entering.items()}
-    wires |= {seams.offered: Bits(SOURCE), seams.taken: Bits(_READY)}
-    wires |= {seams.ready: Bits(SINK), seams.valid: Bits(_VALID)}
+    connections = calibration_connections(found.netlist, found.modules.get(name), port.bits, count)
+    wires = {entry: Bits(source) for entry, source in connections.entering.items()}
+    wires |= {connections.offered: Bits(SOURCE), connections.taken: Bits(_READY)}
+    wires |= {connections.ready: Bits(SINK), connections.valid: Bits(_VALID)}
     bits: dict[str, list[Expression]] = {}
-    for outlet, fields in layout_of(found.netlist, seams, port, count).items():
+    for outlet, fields in layout_of(found.netlist, connections, port, count).items():
         place = 0
         for field in fields:
             bits.setdefault(field.signal, []).extend(Bits(outlet, place + k, 1) for k in range(field.width))
@@ -97,21 +101,21 @@ def check_ahead(text: str, certificate: Certificate, channels: int = 1) -> Hardw
     return check_modules({_TOP: top, **found.modules}, alone, channels, Inside(f"{_CORE}."))
 
 
-def _leaving(found: Around) -> dict[str, list[Expression]]:
+def _leaving(found: MultirateTop) -> dict[str, list[Expression]]:
     """Return the bits of the core behind that leave at each port."""
     logic, left = origins(found.netlist, found.word)
     leaving: dict[str, list[Expression]] = {}
     for name, bits in left.items():
         for bit in bits:
-            made = logic.made[bit]
-            own = bit == 0 or (made.kind.startswith(BEHIND) and not made.operands)
+            source = logic.sources[bit]
+            own = bit == 0 or (source.kind.startswith(BEHIND) and not source.operands)
             require(own, f"{name} must have bits of the core")
-            leaving.setdefault(name, []).append(Bits(made.kind, made.place, 1) if bit else Number(0, 1))
+            leaving.setdefault(name, []).append(Bits(source.kind, source.place, 1) if bit else Number(0, 1))
     return leaving
 
 
 def _top(
-    found: Around,
+    found: MultirateTop,
     box: str,
     prefix: str,
     wires: Mapping[str, Expression],

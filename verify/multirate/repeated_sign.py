@@ -17,9 +17,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from sosmith.verify.around.bit_logic import Bit, BitLogic
 from sosmith.verify.certificate_file import PortEntry
 from sosmith.verify.graph import require
+from sosmith.verify.multirate.bit_logic import Bit, BitLogic
 from sosmith.verify.parallel.netlist import flattened
 from sosmith.verify.reader.syntax import Bits, Choice, Module, Statement
 
@@ -83,10 +83,10 @@ def _same(logic: BitLogic, a: Bit, b: Bit) -> bool:
         a, b = pair = goals.pop()
         if a == b or pair in taken:
             continue
-        made, other = logic.made[a], logic.made[b]
-        if made.kind == "?" and (b < 2 or (other.kind == "?" and made.operands[0] == other.operands[0])):
+        source, other = logic.sources[a], logic.sources[b]
+        if source.kind == "?" and (b < 2 or (other.kind == "?" and source.operands[0] == other.operands[0])):
             sides = [(b,), (b,)] if b < 2 else other.operands[1:]
-            goals += [(x, y) for (x,), (y,) in zip(made.operands[1:], sides, strict=True)]
+            goals += [(x, y) for (x,), (y,) in zip(source.operands[1:], sides, strict=True)]
             continue
         first = b if b < 2 else logic.first(b)
         if first is None or logic.first(a) != first:

@@ -4,7 +4,7 @@ from functools import partial
 
 import pytest
 from tests.formal.prover import broken
-from tests.verify.around.decimators import (
+from tests.verify.multirate.decimators import (
     Instrument,
     accepted,
     check_rejected,
@@ -14,7 +14,7 @@ from tests.verify.around.decimators import (
 )
 
 from sosmith.hdl.decimation import decimator as hardware
-from sosmith.verify.around.cic import check_decimator
+from sosmith.verify.multirate.cic import check_decimator
 
 CASES = [
     Instrument(),

@@ -31,23 +31,23 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
-from sosmith.verify.around.bit_logic import BitLogic
-from sosmith.verify.around.calibration import CHANNEL, CODE, FLAGS, Gate, layout_of
-from sosmith.verify.around.logic import (
+from sosmith.verify.certificate_file import Certificate, DecimationEntry, PortEntry
+from sosmith.verify.graph import RejectedError, require
+from sosmith.verify.multirate.bit_logic import BitLogic
+from sosmith.verify.multirate.calibration import CHANNEL, CODE, FLAGS, Gate, layout_of
+from sosmith.verify.multirate.connections import CIC, DATA, DEST, CoreConnections, calibration_connections, passed_on
+from sosmith.verify.multirate.logic import (
     BIT,
     Field,
-    Held,
     Logic,
     MemoryShape,
     Part,
     Ranges,
+    RegisterShape,
     Signals,
     Written,
     check_parts,
 )
-from sosmith.verify.around.seams import CIC, DATA, DEST, Seams, ahead_of, passed_on
-from sosmith.verify.certificate_file import Certificate, DecimationEntry, PortEntry
-from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.parallel.forms import shifted
 from sosmith.verify.parallel.netlist import Netlist
 from sosmith.verify.program.normal_form import Form, constant, plus
@@ -123,7 +123,7 @@ def _sets(netlist: Netlist, register: str, by: str) -> bool:
         found = left.pop()
         if found not in seen:
             seen.add(found)
-            left += [operand for operands in logic.made[found].operands for operand in operands]
+            left += [operand for operands in logic.sources[found].operands for operand in operands]
     return bit in seen
 
 
@@ -132,7 +132,7 @@ def check_channels(
     box: Module | None,
     certificate: Certificate,
     channels: int,
-    seams: Seams,
+    connections: CoreConnections,
     names: Names,
     leaving: Part,
 ) -> int:
@@ -148,7 +148,7 @@ def check_channels(
     closed, bits = netlist.registers.get("closed"), (channels - 1).bit_length()
     if closed is None:
         raise RejectedError("there must be a register closed")
-    taken = next(name for name, found in seams.entering.items() if found == names.dest)
+    taken = next(name for name, found in connections.entering.items() if found == names.dest)
     whole = -(-bits // 8) * 8
     for port_name, least in ((DEST, whole), ("m_axis_tdest", whole), (taken, bits)):
         found = netlist.widths.get(port_name, 0)
@@ -159,14 +159,14 @@ def check_channels(
         enters = _Enters(DATA, DEST, netlist.widths[DEST], ())
     else:
         port = entry.calibration.output
-        ahead = ahead_of(netlist, box, port.bits, bits)
+        ahead = calibration_connections(netlist, box, port.bits, bits)
         layout = layout_of(netlist, ahead, port, bits)
         enters = _Enters(CODE, CHANNEL, bits, FLAGS)
 
     def valid(now: Logic) -> int:
         return gate.offered(now) if ahead is None else now.bit(ahead.valid)
 
-    cic = ChannelCic(entry, port, channels, seams, names, enters, valid, netlist.widths[taken])
+    cic = ChannelCic(entry, port, channels, connections, names, enters, valid, netlist.widths[taken])
     gate: Gate = Gate(closed.first, closed.width, cic.ready, ahead, netlist.widths)
     return check_parts(netlist, [leaving, cic, gate], Signals({**layout, **cic.layout}, cic.one_hot), cic)
 
@@ -190,7 +190,7 @@ class ChannelCic:
     port : PortEntry
         What it takes.
     channels : int
-    seams : Seams
+    connections : CoreConnections
     names : Names
     enters : _Enters
         Signals that enter it.
@@ -203,7 +203,7 @@ class ChannelCic:
     entry: DecimationEntry
     port: PortEntry
     channels: int
-    seams: Seams
+    connections: CoreConnections
     names: Names
     enters: _Enters
     valid: Callable[[Logic], int]
@@ -216,28 +216,28 @@ class ChannelCic:
         """What enters the core."""
         widths = {CIC + "o_data": self.entry.width - self.entry.dropped, CIC + "o_flags": self._flag_bits}
         widths[self.names.dest] = self.dest_width
-        return {name: widths.get(found, 1) for name, found in self.seams.entering.items()}
+        return {name: widths.get(found, 1) for name, found in self.connections.entering.items()}
 
     @property
-    def registers(self) -> Mapping[str, Held]:
+    def registers(self) -> Mapping[str, RegisterShape]:
         """The states, what is kept of a sample, the adder's, and a result."""
         width, shapes = self.entry.width, self.memories
         found = {
-            "channel": Held(self._channel_bits, 0),
-            "sample": Held(self.port.bits, None),
-            "gathered": Held(self._flag_bits, None),
-            "acc": Held(width, None),
-            "step": Held(self._step_bits, None),
-            "o_valid": Held(1, 0),
-            "o_data": Held(width - self.entry.dropped, None),
-            "o_flags": Held(self._flag_bits, None),
+            "channel": RegisterShape(self._channel_bits, 0),
+            "sample": RegisterShape(self.port.bits, None),
+            "gathered": RegisterShape(self._flag_bits, None),
+            "acc": RegisterShape(width, None),
+            "step": RegisterShape(self._step_bits, None),
+            "o_valid": RegisterShape(1, 0),
+            "o_data": RegisterShape(width - self.entry.dropped, None),
+            "o_flags": RegisterShape(self._flag_bits, None),
         }
         return {
             **{CIC + name: held for name, held in found.items()},
-            **{name: Held(1, int(not place)) for place, name in enumerate(self.names.states)},
-            self.names.control: Held(shapes[_CONTROL].width, None),
-            self.names.state: Held(width, None),
-            self.names.dest: Held(self._channel_bits, None),
+            **{name: RegisterShape(1, int(not place)) for place, name in enumerate(self.names.states)},
+            self.names.control: RegisterShape(shapes[_CONTROL].width, None),
+            self.names.state: RegisterShape(width, None),
+            self.names.dest: RegisterShape(self._channel_bits, None),
         }
 
     @property
@@ -310,8 +310,8 @@ class ChannelCic:
 
     def wanted(self, now: Logic, name: str) -> Form:
         """Return what the text at the top of this file says."""
-        if name in self.seams.entering:
-            return now.word(self.seams.entering[name])
+        if name in self.connections.entering:
+            return now.word(self.connections.entering[name])
         if name in self.names.states:
             return constant(int(self._next(now) == STATES[self.names.states.index(name)]))
         if name == self.names.control:
@@ -362,7 +362,7 @@ class ChannelCic:
 
     def _leaves(self, now: Logic) -> bool:
         """Whether a result comes to the output."""
-        return self._is(now, "gives") and bool(not now.bit(CIC + "o_valid") or now.bit(self.seams.taken))
+        return self._is(now, "gives") and bool(not now.bit(CIC + "o_valid") or now.bit(self.connections.taken))
 
     def _kept(self, now: Logic, kind: str) -> Form | None:
         """Return what a register takes over of a sample, or of a step."""
@@ -389,7 +389,7 @@ class ChannelCic:
     def _result(self, now: Logic, kind: str) -> Form | None:
         """Return what a register of the output takes over."""
         if not self._leaves(now):
-            return {} if kind == "o_valid" and now.bit(self.seams.taken) else None
+            return {} if kind == "o_valid" and now.bit(self.connections.taken) else None
         match kind:
             case "o_data":
                 growth = self.entry.stages * self._phase_bits

@@ -17,9 +17,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from sosmith.verify.around.logic import Field, Held, Logic, Ranges
-from sosmith.verify.around.seams import DATA, OF_INPUT, AheadSeams
 from sosmith.verify.certificate_file import PortEntry
+from sosmith.verify.multirate.connections import DATA, OF_INPUT, CalibrationConnections
+from sosmith.verify.multirate.logic import Field, Logic, Ranges, RegisterShape
 from sosmith.verify.parallel.control import SOURCE
 from sosmith.verify.parallel.netlist import Netlist
 from sosmith.verify.program.normal_form import Form, constant, plus
@@ -34,20 +34,22 @@ CHANNEL = "channel of the calibration"
 """Signal: the channel of a result."""
 
 
-def layout_of(netlist: Netlist, seams: AheadSeams, port: PortEntry, channel_bits: int = 0) -> dict[str, list[Field]]:
+def layout_of(
+    netlist: Netlist, connections: CalibrationConnections, port: PortEntry, channel_bits: int = 0
+) -> dict[str, list[Field]]:
     """Return what the outputs of a calibration with results, flags and channels are made of."""
     left = [Field(flag, 1) for flag in FLAGS]
     layout, low = dict[str, list[Field]](), 0
-    for name in seams.code:
+    for name in connections.code:
         count = min(netlist.widths[name], port.bits - low)
         layout[name] = [Field(CODE, count, low)]
         low += count
-    for name in seams.flags or seams.code:
-        count = netlist.widths[name] if seams.flags else OF_INPUT
+    for name in connections.flags or connections.code:
+        count = netlist.widths[name] if connections.flags else OF_INPUT
         layout[name] = [*layout.get(name, []), *left[:count]]
         left = left[count:]
     if channel_bits:
-        dest = seams.dest or seams.code[0]
+        dest = connections.dest or connections.code[0]
         layout[dest] = [*layout.get(dest, []), Field(CHANNEL, channel_bits)]
     return layout
 
@@ -64,7 +66,7 @@ class Gate:
         Bits of `closed`.
     ready : callable
         Whether the decimator takes what comes.
-    seams : AheadSeams or None
+    connections : CalibrationConnections or None
         Ports of the calibration before it.
     widths : dict of str to int
         Widths of ports of the core.
@@ -73,21 +75,21 @@ class Gate:
     clocks: int | None
     width: int
     ready: Callable[[Logic], int]
-    seams: AheadSeams | None
+    connections: CalibrationConnections | None
     widths: Mapping[str, int]
 
     @property
     def nets(self) -> Mapping[str, int]:
         """Whether a sample is accepted, and what enters the calibration."""
-        if self.seams is None:
+        if self.connections is None:
             return {"s_axis_tready": 1}
-        entering = {name: self.widths[found] for name, found in self.seams.entering.items()}
-        return {"s_axis_tready": 1, self.seams.offered: 1, self.seams.ready: 1, **entering}
+        entering = {name: self.widths[found] for name, found in self.connections.entering.items()}
+        return {"s_axis_tready": 1, self.connections.offered: 1, self.connections.ready: 1, **entering}
 
     @property
-    def registers(self) -> Mapping[str, Held]:
+    def registers(self) -> Mapping[str, RegisterShape]:
         """The counter."""
-        return {"closed": Held(self.width, self.clocks)}
+        return {"closed": RegisterShape(self.width, self.clocks)}
 
     @property
     def ranges(self) -> Mapping[str, Ranges]:
@@ -102,45 +104,47 @@ class Gate:
         """Return what a register or a net must be."""
         if name == "closed":
             return plus(now.word(name), constant(0 if self._is_open(now) else -1))
-        if self.seams is None:
+        if self.connections is None:
             return constant(int(self._is_open(now) and self.ready(now)))
         if name == "s_axis_tready":
-            return constant(int(self._is_open(now) and now.bit(self.seams.taken)))
-        if name == self.seams.offered:
+            return constant(int(self._is_open(now) and now.bit(self.connections.taken)))
+        if name == self.connections.offered:
             return constant(self.offered(now))
-        return constant(self.ready(now)) if name == self.seams.ready else now.word(self.seams.entering[name])
+        return (
+            constant(self.ready(now)) if name == self.connections.ready else now.word(self.connections.entering[name])
+        )
 
     def _is_open(self, now: Logic) -> bool:
         return now.limits("closed") == (0, 0)
 
 
 @dataclass(frozen=True)
-class Ahead:
+class CalibrationPorts:
     """The ports of the calibration, and what lets samples in.
 
     Attributes
     ----------
-    seams : AheadSeams
+    connections : CalibrationConnections
     ready : callable
         Whether the decimator takes a result.
     width : int
         Bits of `s_axis_tdata`.
     """
 
-    seams: AheadSeams
+    connections: CalibrationConnections
     ready: Callable[[Logic], int]
     width: int
 
     @property
     def nets(self) -> Mapping[str, int]:
         """Whether a sample is accepted, and what enters the calibration."""
-        entering = {name: self.width if found == DATA else 1 for name, found in self.seams.entering.items()}
-        return {"s_axis_tready": 1, self.seams.offered: 1, self.seams.ready: 1, **entering}
+        entering = {name: self.width if found == DATA else 1 for name, found in self.connections.entering.items()}
+        return {"s_axis_tready": 1, self.connections.offered: 1, self.connections.ready: 1, **entering}
 
     @property
-    def registers(self) -> Mapping[str, Held]:
+    def registers(self) -> Mapping[str, RegisterShape]:
         """What is done with the first sample."""
-        return {"first": Held(1, 1), "fills": Held(1, 0), "filled": Held(1, 0)}
+        return {"first": RegisterShape(1, 1), "fills": RegisterShape(1, 0), "filled": RegisterShape(1, 0)}
 
     @property
     def ranges(self) -> Mapping[str, Ranges]:
@@ -149,18 +153,18 @@ class Ahead:
 
     def wanted(self, now: Logic, name: str) -> Form:
         """Return what the text at the top of this file says."""
-        if name in self.seams.entering:
-            return now.word(self.seams.entering[name])
-        if name == self.seams.ready:
+        if name in self.connections.entering:
+            return now.word(self.connections.entering[name])
+        if name == self.connections.ready:
             return constant(self.ready(now))
         first, fills, filled = (now.bit(register) for register in ("first", "fills", "filled"))
         flows = not (first or fills or filled)
-        if name == self.seams.offered:
+        if name == self.connections.offered:
             return constant(int((first or flows) and now.bit(SOURCE)))
         if name == "s_axis_tready":
-            return constant(int(filled or (flows and now.bit(self.seams.taken))))
-        ends = fills and now.bit(self.seams.valid) and self.ready(now)
-        begins = first and now.bit(SOURCE) and now.bit(self.seams.taken)
+            return constant(int(filled or (flows and now.bit(self.connections.taken))))
+        ends = fills and now.bit(self.connections.valid) and self.ready(now)
+        begins = first and now.bit(SOURCE) and now.bit(self.connections.taken)
         if name == "filled":
             return constant(int(ends))
         if name == "first":

@@ -3,10 +3,10 @@
 import re
 
 import pytest
-from tests.verify.around.decimators import Case, designed, written
+from tests.verify.multirate.decimators import Case, designed, written
 
-from sosmith.verify.around.cic import check_decimator
 from sosmith.verify.graph import RejectedError
+from sosmith.verify.multirate.cic import check_decimator
 
 WORD = "o_data_30"
 ENTERING = "i_data_24"

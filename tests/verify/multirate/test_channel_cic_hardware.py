@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from tests.formal.prover import broken
-from tests.verify.around.decimators import (
+from tests.verify.multirate.decimators import (
     Case,
     Instrument,
     accepted,
@@ -19,10 +19,10 @@ from sosmith.gen.core import design_core
 from sosmith.gen.output.generate import generate
 from sosmith.gen.specification.specification import from_text
 from sosmith.hdl.decimation import channel_decimator as hardware
-from sosmith.hdl.decimation import decimator as around
+from sosmith.hdl.decimation import decimator as top
 from sosmith.interface.certificate import Certificate as Saved
-from sosmith.verify.around.cic import check_decimator
 from sosmith.verify.graph import RejectedError
+from sosmith.verify.multirate.cic import check_decimator
 
 SMALL = Case(hold=False, architecture="folded", channels=2)
 CASES: list[Case | Instrument] = [
@@ -118,7 +118,7 @@ ROUNDED = Case(signed=False, output_bits=9, cutoff=20, error=0.02, hold=False, a
 )
 def test_hardware_that_is_wrong_is_rejected(right: str, wrong: str, monkeypatch: pytest.MonkeyPatch) -> None:
     written(ROUNDED)  # what is right, before anything is broken
-    monkeypatch.setattr(around, "ChannelDecimator", broken(hardware, right, wrong).ChannelDecimator)
+    monkeypatch.setattr(top, "ChannelDecimator", broken(hardware, right, wrong).ChannelDecimator)
     check_rejected_as_made(ROUNDED)
 
 
@@ -126,7 +126,7 @@ def test_hardware_that_is_wrong_is_rejected(right: str, wrong: str, monkeypatch:
 @pytest.mark.parametrize(("right", "wrong"), [pytest.param(*case, id=subject) for subject, *case in BROKEN_AROUND])
 def test_wires_that_are_wrong_are_rejected(right: str, wrong: str, monkeypatch: pytest.MonkeyPatch) -> None:
     written(SMALL)  # what is right, before anything is broken
-    monkeypatch.setattr(around, "DecimatedCore", broken(around, right, wrong).DecimatedCore)
+    monkeypatch.setattr(top, "DecimatedCore", broken(top, right, wrong).DecimatedCore)
     check_rejected_as_made(SMALL)
 
 

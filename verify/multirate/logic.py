@@ -12,8 +12,8 @@ from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple, Protocol
 
-from sosmith.verify.around.seams import BEHIND
 from sosmith.verify.graph import RejectedError, require
+from sosmith.verify.multirate.connections import BEHIND
 from sosmith.verify.parallel.control import RESET, Case, UndecidedError, about, cases
 from sosmith.verify.parallel.equality import same_word
 from sosmith.verify.parallel.evaluation import Evaluation
@@ -36,7 +36,7 @@ class Field(NamedTuple):
     low: int = 0
 
 
-class Held(NamedTuple):
+class RegisterShape(NamedTuple):
     """A register: its width, and what it holds before the first clock and after a reset; None if that does not count.
 
     Without a width, it may have any.
@@ -79,7 +79,7 @@ class Part(Protocol):
     """What is checked of a part of the hardware."""
 
     @property
-    def registers(self) -> Mapping[str, Held]:
+    def registers(self) -> Mapping[str, RegisterShape]:
         """Its registers."""
 
     @property

@@ -20,8 +20,8 @@ before the first clock leave no sample and no result. That this is a CIC filter 
   taken. So each result finds `o_data` free, and stays until it is taken.
 - The holder takes a word when it is empty or hands out the last of its copies, and hands out R of each.
 
-Above the bits of a result there are zeros, or its sign again (`sosmith.verify.around.repeated_sign`). Flags are
-made by the core behind: here they are passed on (`sosmith.verify.around.passed_flags`).
+Above the bits of a result there are zeros, or its sign again (`sosmith.verify.multirate.repeated_sign`). Flags are
+made by the core behind: here they are passed on (`sosmith.verify.multirate.passed_flags`).
 """
 
 from __future__ import annotations
@@ -32,25 +32,25 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
-from sosmith.verify.around.calibration import CODE, FLAGS, Ahead, layout_of
-from sosmith.verify.around.channel_cic import Names, check_channels, names_of
-from sosmith.verify.around.logic import BIT, Field, Held, Logic, Part, Ranges, Signals, check_parts
-from sosmith.verify.around.passed_flags import check_passed
-from sosmith.verify.around.repeated_sign import check_signs
-from sosmith.verify.around.seams import (
+from sosmith.verify.certificate_file import Certificate, DecimationEntry, PortEntry
+from sosmith.verify.graph import require
+from sosmith.verify.multirate.calibration import CODE, FLAGS, CalibrationPorts, layout_of
+from sosmith.verify.multirate.channel_cic import Names, check_channels, names_of
+from sosmith.verify.multirate.connections import (
     CIC,
     CLOCK,
     DATA,
     HOLDER,
-    Seams,
-    ahead_of,
+    CoreConnections,
+    calibration_connections,
+    core_connections,
     passed_on,
     read_around,
     read_core,
-    seams_of,
 )
-from sosmith.verify.certificate_file import Certificate, DecimationEntry, PortEntry
-from sosmith.verify.graph import require
+from sosmith.verify.multirate.logic import BIT, Field, Logic, Part, Ranges, RegisterShape, Signals, check_parts
+from sosmith.verify.multirate.passed_flags import check_passed
+from sosmith.verify.multirate.repeated_sign import check_signs
 from sosmith.verify.parallel.control import SINK, SOURCE
 from sosmith.verify.parallel.forms import shifted
 from sosmith.verify.parallel.netlist import Netlist
@@ -100,23 +100,23 @@ def check_decimator(text: str, certificate: Certificate, channels: int = 1) -> D
         If a register is loaded with anything else, a port is connected otherwise, or the text has anything that cannot
         be read; the sentence names the first register or port that is wrong.
     """
-    found, output = around(text, certificate, channels), certificate.output
+    found, output = multirate_top(text, certificate, channels), certificate.output
     entry = certificate.decimation
     assert entry is not None
-    netlist, seams, word = found.netlist, found.seams, found.word
-    leaving = _Holder(seams, output, word, entry.factor) if word else _Passing(seams, output)
+    netlist, connections, word = found.netlist, found.connections, found.word
+    leaving = _Holder(connections, output, word, entry.factor) if word else _Passing(connections, output)
     box = found.modules.get(f"{certificate.name}_ahead")
     if found.names is None:
-        registers = _check_one(netlist, box, certificate, seams, leaving)
+        registers = _check_one(netlist, box, certificate, connections, leaving)
     else:
-        registers = check_channels(netlist, box, certificate, channels, seams, found.names, leaving)
-    check_passed(netlist, seams, word, (channels - 1).bit_length())
+        registers = check_channels(netlist, box, certificate, channels, connections, found.names, leaving)
+    check_passed(netlist, connections, word, (channels - 1).bit_length())
     check_signs(found.modules, output, CLOCK)
     return DecimatorVerdict(registers, entry.factor if word else 1, channels)
 
 
-class Around(NamedTuple):
-    """What is around a core: all modules, a netlist without the core, its seams, and what has no names of its own.
+class MultirateTop(NamedTuple):
+    """What is around a core: all modules, a netlist without the core, its connections, and what has no own names.
 
     `told` is the net with the flags of a result of the decimator, and `word` the register that holds results, "" if
     they leave at once.
@@ -124,13 +124,13 @@ class Around(NamedTuple):
 
     modules: dict[str, Module]
     netlist: Netlist
-    seams: Seams
+    connections: CoreConnections
     names: Names | None
     told: str
     word: str
 
 
-def around(text: str, certificate: Certificate, channels: int) -> Around:
+def multirate_top(text: str, certificate: Certificate, channels: int) -> MultirateTop:
     """Find what is around a core; the rest is as of `check_decimator`."""
     entry = certificate.decimation
     assert entry is not None
@@ -141,22 +141,24 @@ def around(text: str, certificate: Certificate, channels: int) -> Around:
         require(held == stated, f"results must {'' if stated else 'not '}be held, as specified")
     names = names_of(netlist) if channels > 1 else None
     told = "o_rail" if entry.calibration is None and names is None else "o_flags"
-    seams = seams_of(netlist, told, held=held, dest=None if names is None else names.dest)
-    return Around(modules, netlist, seams, names, CIC + told, _held_word(netlist) if held else "")
+    connections = core_connections(netlist, told, held=held, dest=None if names is None else names.dest)
+    return MultirateTop(modules, netlist, connections, names, CIC + told, _held_word(netlist) if held else "")
 
 
-def _check_one(netlist: Netlist, box: Module | None, certificate: Certificate, seams: Seams, leaving: Part) -> int:
+def _check_one(
+    netlist: Netlist, box: Module | None, certificate: Certificate, connections: CoreConnections, leaving: Part
+) -> int:
     """Check the decimator of one channel, and what is before it."""
     entry = certificate.decimation
     assert entry is not None
     if entry.calibration is None:
         (port,) = certificate.inputs
-        cic = _Cic(entry, port, seams, _Source(SOURCE, DATA, ()), {"s_axis_tready": 1})
+        cic = _Cic(entry, port, connections, _Source(SOURCE, DATA, ()), {"s_axis_tready": 1})
         return check_parts(netlist, [leaving, cic], Signals({DATA: [Field(DATA, port.bits)]}))
     port = entry.calibration.output
-    ahead = ahead_of(netlist, box, port.bits)
-    cic = _Cic(entry, port, seams, _Source(ahead.valid, CODE, FLAGS), {})
-    parts = [leaving, cic, Ahead(ahead, cic.ready, netlist.widths[DATA])]
+    ahead = calibration_connections(netlist, box, port.bits)
+    cic = _Cic(entry, port, connections, _Source(ahead.valid, CODE, FLAGS), {})
+    parts = [leaving, cic, CalibrationPorts(ahead, cic.ready, netlist.widths[DATA])]
     return check_parts(netlist, parts, Signals(layout_of(netlist, ahead, port)))
 
 
@@ -181,7 +183,7 @@ class _Cic:
 
     entry: DecimationEntry
     port: PortEntry
-    seams: Seams
+    connections: CoreConnections
     source: _Source
     accepting: Mapping[str, int]
 
@@ -190,23 +192,23 @@ class _Cic:
         """Whether a sample is taken, and what enters the core."""
         code = self.entry.width - self.entry.dropped
         widths = {CIC + "o_data": code, CIC + "o_flags": len(self.source.flags)}
-        return {**self.accepting, **{name: widths.get(found, 1) for name, found in self.seams.entering.items()}}
+        return {**self.accepting, **{name: widths.get(found, 1) for name, found in self.connections.entering.items()}}
 
     @property
-    def registers(self) -> Mapping[str, Held]:
+    def registers(self) -> Mapping[str, RegisterShape]:
         """Control, N sums, N combs and differences, and the output."""
         bits, flags, width = self.entry.factor.bit_length() - 1, len(self.source.flags), self.entry.width
-        found = {"phase": Held(bits, 0), "filled": Held(self.entry.stages.bit_length(), 0)}
-        found |= {"filling": Held(1, 1), "waiting": Held(1, 0)}
+        found = {"phase": RegisterShape(bits, 0), "filled": RegisterShape(self.entry.stages.bit_length(), 0)}
+        found |= {"filling": RegisterShape(1, 1), "waiting": RegisterShape(1, 0)}
         for k in range(1, self.entry.stages + 1):
-            found |= dict.fromkeys((f"integrator{k}_control0", f"comb{k}_control0"), Held(1, 0))
+            found |= dict.fromkeys((f"integrator{k}_control0", f"comb{k}_control0"), RegisterShape(1, 0))
             found |= dict.fromkeys(
-                (f"integrator{k}_control1", f"integrator{k}_control2", f"comb{k}_control1"), Held(1, None)
+                (f"integrator{k}_control1", f"integrator{k}_control2", f"comb{k}_control1"), RegisterShape(1, None)
             )
-            found |= dict.fromkeys((f"sum{k}", f"comb{k}", f"difference{k}"), Held(width, None))
-        found |= {"o_valid": Held(1, 0), "o_data": Held(width - self.entry.dropped, None)}
-        told = {"found": Held(flags, 0), "o_flags": Held(flags, None)}
-        found |= told if flags else {"rail": Held(1, 0), "o_rail": Held(1, None)}
+            found |= dict.fromkeys((f"sum{k}", f"comb{k}", f"difference{k}"), RegisterShape(width, None))
+        found |= {"o_valid": RegisterShape(1, 0), "o_data": RegisterShape(width - self.entry.dropped, None)}
+        told = {"found": RegisterShape(flags, 0), "o_flags": RegisterShape(flags, None)}
+        found |= told if flags else {"rail": RegisterShape(1, 0), "o_rail": RegisterShape(1, None)}
         return {CIC + name: held for name, held in found.items()}
 
     @property
@@ -230,8 +232,8 @@ class _Cic:
         """Return what the text at the top of this file says."""
         if name in self.accepting:
             return constant(self.ready(now))
-        if name in self.seams.entering:
-            return now.word(self.seams.entering[name])
+        if name in self.connections.entering:
+            return now.word(self.connections.entering[name])
         parts = _NAME.fullmatch(name.removeprefix(CIC))
         assert parts is not None  # as it is for all names in `first`
         kind, k, what = parts.groups()
@@ -253,7 +255,7 @@ class _Cic:
                 return constant(0)
             case "waiting" if self._accepted(now) and self._completes(now):
                 return constant(1)
-            case "waiting" if self._bit(now, "o_valid") and now.bit(self.seams.taken):
+            case "waiting" if self._bit(now, "o_valid") and now.bit(self.connections.taken):
                 return constant(0)
             case "rail" | "found" if self._accepted(now):
                 return constant(0 if self._completes(now) else self._gathered(now))
@@ -261,7 +263,7 @@ class _Cic:
                 return constant(self._gathered(now))
             case "o_valid" if self._leaves(now):
                 return constant(1)
-            case "o_valid" if now.bit(self.seams.taken):
+            case "o_valid" if now.bit(self.connections.taken):
                 return constant(0)
         return None
 
@@ -346,24 +348,24 @@ class _Cic:
         return self._combed(now, self.entry.stages, 0) and self._combed(now, self.entry.stages, 1)
 
 
-def _leaving(seams: Seams, port: PortEntry) -> Mapping[str, int]:
-    return {seams.ready: 1, "m_axis_tvalid": 1, "m_axis_tdata": -(-port.bits // 8) * 8}
+def _leaving(connections: CoreConnections, port: PortEntry) -> Mapping[str, int]:
+    return {connections.ready: 1, "m_axis_tvalid": 1, "m_axis_tdata": -(-port.bits // 8) * 8}
 
 
 @dataclass(frozen=True)
 class _Passing:
     """What leaves the core leaves at once."""
 
-    seams: Seams
+    connections: CoreConnections
     port: PortEntry
 
     @property
     def nets(self) -> Mapping[str, int]:
         """Whether a result is taken, whether there is one, and the result."""
-        return _leaving(self.seams, self.port)
+        return _leaving(self.connections, self.port)
 
     @property
-    def registers(self) -> Mapping[str, Held]:
+    def registers(self) -> Mapping[str, RegisterShape]:
         """There is no register."""
         return {}
 
@@ -376,14 +378,14 @@ class _Passing:
         """Return what is on the other side."""
         if name == "m_axis_tdata":
             return now.result(now.net(name), self.port.bits)
-        return now.word(SINK if name == self.seams.ready else self.seams.valid)
+        return now.word(SINK if name == self.connections.ready else self.connections.valid)
 
 
 @dataclass(frozen=True)
 class _Holder:
     """What hands out each result, held in the register `word`, `copies` times."""
 
-    seams: Seams
+    connections: CoreConnections
     port: PortEntry
     word: str
     copies: int
@@ -391,13 +393,17 @@ class _Holder:
     @property
     def nets(self) -> Mapping[str, int]:
         """Whether a result is taken, whether there is one, and the result."""
-        return _leaving(self.seams, self.port)
+        return _leaving(self.connections, self.port)
 
     @property
-    def registers(self) -> Mapping[str, Held]:
+    def registers(self) -> Mapping[str, RegisterShape]:
         """A word with its valid bit, and a counter."""
         count = self.copies.bit_length() - 1
-        return {HOLDER + "o_valid": Held(1, 0), HOLDER + "left": Held(count, None), self.word: Held(None, None)}
+        return {
+            HOLDER + "o_valid": RegisterShape(1, 0),
+            HOLDER + "left": RegisterShape(count, None),
+            self.word: RegisterShape(None, None),
+        }
 
     @property
     def ranges(self) -> Mapping[str, Ranges]:
@@ -419,4 +425,4 @@ class _Holder:
             return plus(now.word(left), constant(-1)) if name == left and now.bit(SINK) else now.word(name)
         if name == self.word:  # with the flags above
             return now.result(now.after(name), self.port.bits)
-        return constant(self.copies - 1) if name == left else now.word(self.seams.valid)
+        return constant(self.copies - 1) if name == left else now.word(self.connections.valid)

@@ -19,7 +19,7 @@ Bit = int
 """Number of what a bit is; 0 and 1 are the constants."""
 
 
-class Made(NamedTuple):
+class BitSource(NamedTuple):
     """What a bit is: bit `place` of what `kind`, the name of a net or an operator, makes of the operands' bits."""
 
     kind: str
@@ -32,23 +32,23 @@ class BitLogic:
 
     def __init__(self, netlist: Netlist) -> None:
         self._netlist = netlist
-        self.made: list[Made] = []
-        self._numbers: dict[Made, Bit] = {}
+        self.sources: list[BitSource] = []
+        self._numbers: dict[BitSource, Bit] = {}
         for value in (0, 1):
-            self._bit(Made("", value))
+            self._bit(BitSource("", value))
         self._driven: dict[tuple[str, int], tuple[Bit, ...]] = {}
         self._open: set[tuple[str, int]] = set()
 
     def first(self, bit: Bit) -> int | None:
         """Return what a bit of a register is before the first clock; None if that is not said, or it is no such bit."""
-        kind, place, operands = self.made[bit]
+        kind, place, operands = self.sources[bit]
         register = None if operands else self._netlist.registers.get(kind)
         return None if register is None or register.first is None else register.first >> place & 1
 
     def after(self, bit: Bit) -> Bit:
         """Return what a bit of a register takes over at a clock."""
-        register = self._netlist.registers[self.made[bit].kind]
-        return self._loaded(register.statements, self.net(register.name))[self.made[bit].place]
+        register = self._netlist.registers[self.sources[bit].kind]
+        return self._loaded(register.statements, self.net(register.name))[self.sources[bit].place]
 
     def net(self, name: str, low: int = 0, width: int | None = None) -> tuple[Bit, ...]:
         """Return bits of a net, the lowest first; what nothing drives is a bit of its own.
@@ -59,7 +59,7 @@ class BitLogic:
             If it depends on itself.
         """
         end = self._netlist.widths[name] if width is None else low + width
-        bits = {place: self._bit(Made(name, place)) for place in range(low, end)}
+        bits = {place: self._bit(BitSource(name, place)) for place in range(low, end)}
         for index, driver in enumerate(self._netlist.drivers.get(name, [])):
             first, last = max(low, driver.low), min(end, driver.low + driver.width)
             if first < last:
@@ -77,11 +77,11 @@ class BitLogic:
             self._driven[key] = bits[driver.start : end]
         return self._driven[key]
 
-    def _bit(self, made: Made) -> Bit:
-        if made not in self._numbers:
-            self._numbers[made] = len(self.made)
-            self.made.append(made)
-        return self._numbers[made]
+    def _bit(self, source: BitSource) -> Bit:
+        if source not in self._numbers:
+            self._numbers[source] = len(self.sources)
+            self.sources.append(source)
+        return self._numbers[source]
 
     def _loaded(self, statements: Sequence[Statement], held: tuple[Bit, ...]) -> tuple[Bit, ...]:
         """Return what a register holds after statements."""
@@ -140,14 +140,14 @@ class BitLogic:
         return (*bits, *[bits[-1] if signed else 0] * (width - len(bits)))
 
     def _opaque(self, kind: str, operands: Sequence[tuple[Bit, ...]], width: int) -> tuple[Bit, ...]:
-        return tuple(self._bit(Made(kind, place, tuple(operands))) for place in range(width))
+        return tuple(self._bit(BitSource(kind, place, tuple(operands))) for place in range(width))
 
     def _any(self, bits: tuple[Bit, ...]) -> Bit:
         return bits[0] if len(bits) == 1 else self._opaque("|", [bits], 1)[0]
 
     def _chosen(self, select: Bit, yes: tuple[Bit, ...], no: tuple[Bit, ...]) -> tuple[Bit, ...]:
         def one(a: Bit, b: Bit) -> Bit:
-            return a if a == b else self._bit(Made("?", 0, ((select,), (a,), (b,))))
+            return a if a == b else self._bit(BitSource("?", 0, ((select,), (a,), (b,))))
 
         if select < 2:
             return yes if select else no

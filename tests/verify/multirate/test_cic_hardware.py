@@ -4,7 +4,7 @@ import re
 
 import pytest
 from tests.formal.prover import broken
-from tests.verify.around.decimators import (
+from tests.verify.multirate.decimators import (
     Case,
     accepted,
     check_rejected,
@@ -14,8 +14,8 @@ from tests.verify.around.decimators import (
 )
 
 from sosmith.hdl.decimation import decimator as hardware
-from sosmith.verify.around.cic import check_decimator
 from sosmith.verify.graph import RejectedError
+from sosmith.verify.multirate.cic import check_decimator
 
 CASES = [
     (Case(), 2),

@@ -11,9 +11,9 @@ from tests.verify.parallel.cores import specified
 
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
-from sosmith.verify.around.cic import check_decimator
 from sosmith.verify.certificate_file import Certificate
 from sosmith.verify.graph import RejectedError
+from sosmith.verify.multirate.cic import check_decimator
 
 
 class Case(NamedTuple):

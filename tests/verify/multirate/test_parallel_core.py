@@ -5,7 +5,7 @@ from types import ModuleType
 
 import pytest
 from tests.formal.prover import broken, broken_beneath
-from tests.verify.around.decimators import Case, Instrument, designed, written
+from tests.verify.multirate.decimators import Case, Instrument, designed, written
 from tests.verify.parallel.edits import random_edits, swept
 from tests.verify.parallel.simulated import outputs
 
@@ -13,9 +13,9 @@ from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.hdl.cores import parallel as hardware
 from sosmith.hdl.decimation import decimator
 from sosmith.hdl.shell import pipeline, shell
-from sosmith.verify.around.cic import check_decimator
-from sosmith.verify.around.parallel_core import check_ahead, check_behind
 from sosmith.verify.graph import RejectedError
+from sosmith.verify.multirate.cic import check_decimator
+from sosmith.verify.multirate.parallel_core import check_ahead, check_behind
 
 PLAIN, HELD, SEVERAL = Case(hold=False), Case(output_bits=11), Case(channels=3, hold=False, output_bits=11)
 INSTRUMENT = Instrument("parallel", signed=True)

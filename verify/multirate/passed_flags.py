@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from itertools import pairwise
 
-from sosmith.verify.around.bit_logic import Bit, BitLogic
-from sosmith.verify.around.seams import BEHIND, Seams
 from sosmith.verify.graph import require
+from sosmith.verify.multirate.bit_logic import Bit, BitLogic
+from sosmith.verify.multirate.connections import BEHIND, CoreConnections
 from sosmith.verify.parallel.netlist import Netlist
 
 _LEAVING = _, _FLAGS, _DEST = "m_axis_tdata", "m_axis_tuser", "m_axis_tdest"
@@ -19,14 +19,14 @@ _LEAST, _MOST = 3, 8
 _PLACES = {"rail": 0, "outside": 1, "judged": 0, "m_axis_tuser": 0}
 
 
-def check_passed(netlist: Netlist, seams: Seams, word: str, channel_bits: int = 0) -> None:
+def check_passed(netlist: Netlist, connections: CoreConnections, word: str, channel_bits: int = 0) -> None:
     """Check what leaves, at once or through the register that holds results.
 
     Parameters
     ----------
     netlist : Netlist
         Everything but the core itself.
-    seams : Seams
+    connections : CoreConnections
         Its ports.
     word : str
         The register; "" if results leave at once.
@@ -47,27 +47,31 @@ def check_passed(netlist: Netlist, seams: Seams, word: str, channel_bits: int = 
         f"{_FLAGS} must have {_LEAST} or more flags, each once, and zeros above",
     )
     for place, bit in enumerate(flags[:count]):
-        name = logic.made[bit].kind
-        own = name.startswith(BEHIND) and not logic.made[bit].operands and name not in {seams.taken, seams.valid}
+        name = logic.sources[bit].kind
+        own = (
+            name.startswith(BEHIND)
+            and not logic.sources[bit].operands
+            and name not in {connections.taken, connections.valid}
+        )
         first = _PLACES.get(name.removeprefix(BEHIND))
-        right = own and (first is None or place == first + logic.made[bit].place)
+        right = own and (first is None or place == first + logic.sources[bit].place)
         require(right, f"bit {place} of {_FLAGS} must be its flag as the core gives it, not another value")
     dest = left.get(_DEST, [])
     channel = dest[:channel_bits]
     require(not any(dest[channel_bits:]), f"{_DEST} must be the channel, and zeros above")
     for bit, above in pairwise(flags[:count] + channel):
-        one, other = logic.made[bit], logic.made[above]
+        one, other = logic.sources[bit], logic.sources[above]
         require(one.kind != other.kind or one.place + 1 == other.place, f"{_FLAGS} must have the flags in their order")
     if channel:
-        names = {logic.made[bit].kind for bit in channel}
-        apart = logic.made[flags[0]].kind not in names
-        own = names == {BEHIND + "channel"} and logic.made[channel[0]].place == 0 if apart else len(names) == 1
+        names = {logic.sources[bit].kind for bit in channel}
+        apart = logic.sources[flags[0]].kind not in names
+        own = names == {BEHIND + "channel"} and logic.sources[channel[0]].place == 0 if apart else len(names) == 1
         require(own, f"{_DEST} must be the channel as the core gives it, not another value")
     others = {bit for name, bits in left.items() if name != _FLAGS for bit in bits}
     require(others.isdisjoint(flags[:count]), f"{_FLAGS} must have no bit that leaves elsewhere")
     passed = others | {*flags}
     for name in sorted(netlist.widths):
-        if name.startswith(BEHIND) and name not in netlist.inlets | {seams.taken, seams.valid}:
+        if name.startswith(BEHIND) and name not in netlist.inlets | {connections.taken, connections.valid}:
             lost = [place for place, bit in enumerate(logic.net(name)) if bit not in passed]
             require(not lost, f"bit {lost[0] if lost else 0} of {name} must leave the core")
 
@@ -83,7 +87,7 @@ def origins(netlist: Netlist, word: str) -> tuple[BitLogic, dict[str, list[Bit]]
     logic = BitLogic(netlist)
     left = {name: [_origin(logic, bit, word) for bit in logic.net(name)] for name in _LEAVING if name in netlist.ports}
     if word:
-        taken = {logic.made[logic.after(bit)].operands[0] for name in left for bit in logic.net(name) if bit}
+        taken = {logic.sources[logic.after(bit)].operands[0] for name in left for bit in logic.net(name) if bit}
         require(len(taken) == 1, f"{word} must take over all of a result at once")
     return logic, left
 
@@ -92,8 +96,8 @@ def _origin(logic: BitLogic, bit: Bit, word: str) -> Bit:
     """Return what a bit is, or what the register takes over there; 0 is 0 always."""
     if not word or not bit:
         return bit
-    own = logic.made[bit].kind == word and not logic.made[bit].operands
-    require(own, f"what leaves must be 0 or a bit of {word}, not one of {logic.made[bit].kind or bit}")
-    kind, _, operands = logic.made[logic.after(bit)]
+    own = logic.sources[bit].kind == word and not logic.sources[bit].operands
+    require(own, f"what leaves must be 0 or a bit of {word}, not one of {logic.sources[bit].kind or bit}")
+    kind, _, operands = logic.sources[logic.after(bit)]
     require(kind == "?" and operands[2] == (bit,), f"{word} must take over results, or hold one")
     return operands[1][0]

@@ -3,11 +3,11 @@
 import re
 
 import pytest
-from tests.verify.around.decimators import Case, designed, written
+from tests.verify.multirate.decimators import Case, designed, written
 
-from sosmith.verify.around.cic import check_decimator
 from sosmith.verify.decimation import module_in
 from sosmith.verify.graph import RejectedError
+from sosmith.verify.multirate.cic import check_decimator
 
 SIGNED = Case(output_bits=11)
 FOLDED = Case(output_bits=12, hold=False, architecture="folded")

@@ -26,7 +26,7 @@ CLOCK, DATA, DEST = "aclk", "s_axis_tdata", "s_axis_tdest"
 
 
 @dataclass(frozen=True)
-class Seams:
+class CoreConnections:
     """Ports of the core behind.
 
     Attributes
@@ -46,7 +46,7 @@ class Seams:
 
 
 @dataclass(frozen=True)
-class AheadSeams:
+class CalibrationConnections:
     """Ports of the calibration before the decimator.
 
     Attributes
@@ -80,7 +80,7 @@ _OFFERED, _TAKEN = ("s_axis_tvalid", "i_valid"), ("s_axis_tready", "advance")
 _READY, _VALID = ("m_axis_tready", "o_ready"), ("m_axis_tvalid",)
 
 
-def seams_of(netlist: Netlist, told: str, *, held: bool, dest: str | None = None) -> Seams:
+def core_connections(netlist: Netlist, told: str, *, held: bool, dest: str | None = None) -> CoreConnections:
     """Find the ports of the core behind.
 
     A result of the decimator has its flags in the net `told`, and its channel in the register `dest`, if there are any.
@@ -100,10 +100,12 @@ def seams_of(netlist: Netlist, told: str, *, held: bool, dest: str | None = None
         require(found.startswith(BEHIND), f"{name} must be an output of the core")
         own = _one_of(netlist, BEHIND, wanted)
         require(found == own, f"{name} must be {own}, not {found}")
-    return Seams(entering, taken, ready, valid)
+    return CoreConnections(entering, taken, ready, valid)
 
 
-def ahead_of(netlist: Netlist, box: Module | None, bits: int, channel_bits: int = 0) -> AheadSeams:
+def calibration_connections(
+    netlist: Netlist, box: Module | None, bits: int, channel_bits: int = 0
+) -> CalibrationConnections:
     """Find the ports of the calibration, the module `box`, whose results and their channels have so many bits.
 
     Raises
@@ -129,7 +131,7 @@ def ahead_of(netlist: Netlist, box: Module | None, bits: int, channel_bits: int 
     whole = (bits + OF_INPUT + channel_bits, 0, 0), (bits, OF_INPUT, channel_bits)
     named = " and ".join(code)
     require(beside in whole[len(code) > 1 :], f"{named} must have {bits} bits, and {OF_INPUT} flags beside it")
-    return AheadSeams(entering, offered, taken, ready, valid, code, flags, dest)
+    return CalibrationConnections(entering, offered, taken, ready, valid, code, flags, dest)
 
 
 def _digits(box: Module, outlets: Sequence[str], bits: int) -> tuple[str, ...]:
