@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from amaranth.hdl import Cat, Const, Module, Value
+from amaranth.hdl import Cat, Const, Module, Signal, Value
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
@@ -171,4 +171,6 @@ def _worn(
         limits = [data[:bits], data[bits:]]
         if datapath.output.signed:
             limits = [limit.as_signed() for limit in limits]
-    return Cat(*(code >= limit for limit in limits)), corrected, failed
+    reached = [Signal(name=f"reached_{name}") for name in ("warning", "limit")]
+    m.d.comb += [net.eq(code >= limit) for net, limit in zip(reached, limits, strict=True)]
+    return Cat(reached), corrected, failed

@@ -8,6 +8,7 @@ They are read off the text that Yosys writes, in which such nets have names with
     assign \$3  = valid & \$2 ;       valid_and_not_ready
     assign \$4 [31:0] = added;        added_wide                the bits that are left of a sum, and more
     assign ready[0] = \slice$5 ;      ready_0                   a bit of a register
+    assign busy_next = \$7  ? ..       busy_next_part            what only helps to make another one
     \$6 , \i0$21                      n6, i0_21                 whatever has no short name
 
 Names say what the text says beside them; two tools that read one text read the same hardware, whatever they are.
@@ -32,7 +33,8 @@ _ASSIGN = re.compile(r"^  assign (?P<target>.*?) = (?P<value>.*);$", re.MULTILIN
 _LOAD = re.compile(
     rf"if \(!?(?P<condition>{_NET})\)\s+(?:if \(.*\)\s+)*(?P<register>{_NET})[^\n]*? <= (?P<value>[^\n]*);"
 )
-_VALUE = re.compile(rf"(?P<register>{_NET}) ?(?:\[[\d:]+\])? <= (?P<value>{_NET});")
+_VALUE = re.compile(rf"(?P<register>{_NET}) ?(?:\[[\d:]+\])? <= (?P<value>{_NET})(?:\[[\d:]+\])?;")
+_PORT = re.compile(rf"^    \.(?P<port>\w+)\((?P<net>{_NET})\)", re.MULTILINE)
 _NUMBER = re.compile(r"\d+'(?P<base>[hdb])(?P<digits>[0-9a-f]+)")
 _UNARY = {"~": "not", "!": "not", "&": "all", "|": "any", "^": "odd"}
 _BINARY = {
@@ -73,10 +75,14 @@ class _Naming:
     def __init__(self, text: str) -> None:
         self._roles = _roles(text)
         self._values: dict[str, str] = {}
+        self._users: dict[str, str] = {}
         for target, value in _ASSIGN.findall(text):
             name = _made_up(target)
             if name is not None:
                 self._values[name] = value
+            part = _PART.fullmatch(target) or _PART.fullmatch(f"{target} ")
+            for other in ESCAPED.findall(f"{value} ") if part else ():
+                self._users.setdefault(other, part["name"] if part else "")
         self._known: dict[str, str | None] = {}
 
     def name(self, escaped: str) -> str:
@@ -84,7 +90,22 @@ class _Naming:
         made_up = _MADE_UP.fullmatch(escaped)
         if made_up is None:
             return _plain(escaped)
-        return self._meaning(escaped) or f"n{made_up['number']}"
+        return self._meaning(escaped) or self._share(escaped) or f"n{made_up['number']}"
+
+    def _share(self, escaped: str) -> str | None:
+        """Return a name for a net that only helps to make another one, after that."""
+        seen = {escaped}
+        while escaped in self._users:
+            user = self._users[escaped]
+            made_up = _made_up(user)
+            word = _plain(user) if made_up is None else self._meaning(made_up)
+            if word is not None:
+                return f"{word}_part" if len(word) <= _LONGEST else None
+            if made_up is None or made_up in seen:
+                return None
+            seen.add(made_up)
+            escaped = made_up
+        return None
 
     def _meaning(self, escaped: str, depth: int = 0) -> str | None:
         """Return what a net is for, or computes of nets with names; None if that takes too many words."""
@@ -171,6 +192,10 @@ def _roles(text: str) -> dict[str, str]:
             note(part["name"], value, "wide")
         else:
             note(value, part["name"], "_".join(filter(None, (part["high"], part["low"]))) or "net")
+    for port in _PORT.finditer(text):
+        made_up = _made_up(port["net"])
+        if made_up is not None:
+            found.setdefault(made_up, port["port"])
     for load in _LOAD.finditer(text):
         held = load["value"]
         role = "load" if not _NUMBER.fullmatch(held) else "set" if re.search(r"'[hdb].*[1-9a-f]", held) else "reset"

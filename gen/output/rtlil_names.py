@@ -10,12 +10,13 @@ r"""One name for each net of an RTLIL text: no second ones, and for a port witho
       connect \o_status \status [1:0]        is left out: Yosys would take whichever name comes first in the alphabet
 
 A port has no name of its own where a part of a word comes from somewhere else than the rest. Ports of a module are
-named after those of the modules above it.
+named after those of the modules above it, or else after what drives or takes them inside.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from functools import partial
 
 _MODULE = re.compile(r"^module \\(?P<name>\S+)\n.*?^end\n", re.MULTILINE | re.DOTALL)
@@ -29,6 +30,10 @@ _WIRE = re.compile(
     r"^  wire width (?P<width>\d+)(?: (?:input|output|inout) \d+)? +(?:signed +)?\\(?P<name>\S+)$", re.MULTILINE
 )
 
+_DRIVEN = re.compile(
+    r"^connect \\(?P<port>port\$\d+\$\d+) \\(?P<net>\S+) \[(?P<high>\d+)(?::(?P<low>\d+))?\]$", re.MULTILINE
+)
+_INSIDE = re.compile(r"^    connect \\(?P<net>\S+) \\(?P<port>port\$\d+\$\d+) \[", re.MULTILINE)
 _UNKEPT = re.compile(
     r"(?:^  attribute \\init .*\n)?(?<!^  attribute \\keep 1\n)^  wire width \d+ (?:signed )?\\(?P<name>\S+)\n\n?",
     re.MULTILINE,
@@ -71,7 +76,12 @@ def with_named_ports(text: str) -> str:
             inside = cell["module"]
             if inside not in modules:
                 continue
-            names = _named(cell["ports"], widths, {wire["name"] for wire in _WIRE.finditer(modules[inside])})
+            taken = {wire["name"] for wire in _WIRE.finditer(modules[inside])}
+            ends = (_PORT.finditer(cell["ports"]), _DRIVEN.finditer(modules[inside]), _INSIDE.finditer(modules[inside]))
+            names: dict[str, str] = {}
+            for k, found in enumerate(ends):
+                new = _named(found, {} if k else widths, taken)
+                names = new | names
             if names:
                 renamed = partial(_renamed, names)
                 modules[inside] = re.sub(r"(?<=\\)\S+", renamed, modules[inside])
@@ -96,14 +106,15 @@ def _from_below(modules: dict[str, str]) -> list[str]:
     return list(order)
 
 
-def _named(ports: str, widths: dict[str, int], taken: set[str]) -> dict[str, str]:
+def _named(ports: Iterator[re.Match[str]], widths: dict[str, int], taken: set[str]) -> dict[str, str]:
     """Return names for ports that have none; a port of some bits of a net has their numbers in its name."""
     names: dict[str, str] = {}
-    for port in _PORT.finditer(ports):
-        high, low = int(port["high"]), int(port["low"] or port["high"])
-        whole = high - low + 1 == widths.get(port["net"])
-        name = port["net"] if whole else f"{port['net']}_{high}" if high == low else f"{port['net']}_{high}_{low}"
-        if "$" not in name and name not in taken:
+    for port in ports:
+        name, bits = port["net"], port.groupdict()
+        high, low = bits.get("high"), bits.get("low")
+        if high is not None and int(high) - int(low or high) + 1 != widths.get(name):
+            name = "_".join(filter(None, (name, high, low)))
+        if "$" not in name and name not in taken and port["port"] not in names:
             taken.add(name)
             names[port["port"]] = name
     return names

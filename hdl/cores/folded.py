@@ -128,6 +128,8 @@ class _Control:
         Channel of the sample in work, or of the word that is cleared.
     dropped : Signal
         Whether a sample of a channel that does not exist is accepted.
+    leaves : Signal
+        Whether the result leaves.
     """
 
     def __init__(self, channel_bits: int) -> None:
@@ -137,6 +139,7 @@ class _Control:
         self.busy = Signal(name="busy")
         self.channel = Signal(channel_bits, name="channel")
         self.dropped = Signal(name="dropped")
+        self.leaves = Signal(name="leaves")
 
 
 class _Position(NamedTuple):
@@ -249,11 +252,11 @@ class FoldedCore(Shell):
     def _sequence(self, m: Module, control: _Control, guard: FaultGuard | None, reload: _Reload | None) -> _Position:
         """Find samples, and count through the program for each."""
         clearing, busy = control.clearing, control.busy
-        leaves = self.m_axis_tvalid & self.m_axis_tready
+        m.d.comb += control.leaves.eq(self.m_axis_tvalid & self.m_axis_tready)
         if self._overlaps:
             waits = busy | clearing
         else:
-            waits = (busy & ~leaves) | clearing if guard is None else busy | clearing | guard.broken
+            waits = (busy & ~control.leaves) | clearing if guard is None else busy | clearing | guard.broken
         swaps = None if reload is None or not self.restarts else reload.port
         if swaps is not None:
             waits = waits | swaps.pending
@@ -314,11 +317,11 @@ class FoldedCore(Shell):
 
     def _accept(self, m: Module, control: _Control, waits: Value) -> None:
         """Start on a sample if its channel exists, otherwise drop it."""
-        found = self.s_axis_tvalid & ~waits
         if self.channels == 1:
-            m.d.comb += control.start.eq(found)
+            m.d.comb += control.start.eq(self.s_axis_tvalid & ~waits)
             return
-        exists = self.s_axis_tdest < self.channels
+        found, exists = Signal(name="found"), Signal(name="channel_exists")
+        m.d.comb += [found.eq(self.s_axis_tvalid & ~waits), exists.eq(self.s_axis_tdest < self.channels)]
         m.d.comb += [control.start.eq(found & exists), self.m_axis_tdest.eq(control.channel)]
         m.d.sync += control.dropped.eq(found & ~exists & ~control.dropped)
         with m.If(control.start):
@@ -340,11 +343,14 @@ class FoldedCore(Shell):
         fetching = Signal()
         fetches = Signal()
         m.d.comb += fetches.eq(fetching | control.start if early else fetching)
-        leaves: Value = self.m_axis_tvalid & self.m_axis_tready
+        is_last_instruction = Signal()
+        m.d.comb += is_last_instruction.eq(counter == count - 1)
+        leaves: Value = control.leaves
         if self._overlaps:
-            held = (counter == self.program.result_start) & self.m_axis_tvalid & ~self.m_axis_tready
+            held = Signal(name="waits_for_sink")
+            m.d.comb += held.eq((counter == self.program.result_start) & self.m_axis_tvalid & ~self.m_axis_tready)
             m.d.comb += fetches.eq(control.start | (fetching & ~held))
-            leaves = fetches & (counter == count - 1)
+            leaves = fetches & is_last_instruction
         is_last = control.channel == self.channels - 1
         with m.If(control.clearing):
             m.d.sync += [counter.eq(counter + 1), control.channel.eq(counter[bits:])]
@@ -352,7 +358,7 @@ class FoldedCore(Shell):
                 m.d.sync += [control.clearing.eq(0), counter.eq(0)]
         with m.Elif(fetches & control.advance):
             m.d.sync += [counter.eq(counter + 1), fetching.eq(1)]
-            with m.If(counter == count - 1):
+            with m.If(is_last_instruction):
                 m.d.sync += [fetching.eq(0), counter.eq(0)]
         with m.If(control.start):
             m.d.sync += [control.busy.eq(1), fetching.eq(1)]
@@ -544,9 +550,12 @@ class FoldedCore(Shell):
         (added, read), advance, clearing = values, control.advance, control.clearing
         moved = self._moved(m, self._reading(pipeline), read)
         addressing, present, last = pipeline[-3 if self.serial else -4], pipeline[-2], pipeline[-1]
-        moves = present.valid & present.has(*EARLY_WRITES)
-        stores = last.valid & last.has(*LATE_WRITES)
-        finishes = last.valid & last.has(*FINISHES)
+        moves, stores, finishes = (Signal(name=name) for name in ("moves", "stores", "finishes"))
+        m.d.comb += [
+            moves.eq(present.valid & present.has(*EARLY_WRITES)),
+            stores.eq(last.valid & last.has(*LATE_WRITES)),
+            finishes.eq(last.valid & last.has(*FINISHES)),
+        ]
         address: Value = Cat(addressing.address, control.channel)
         where: Value = Cat(Mux(moves, present.target, last.target), control.channel)
         sign = self._word - 1
@@ -631,7 +640,7 @@ class FoldedCore(Shell):
                 m.d.sync += part.eq(added)
         with m.If(ends):
             m.d.sync += self.m_axis_tvalid.eq(1)
-        with m.If(self.m_axis_tvalid & self.m_axis_tready):
+        with m.If(control.leaves):
             m.d.sync += self.m_axis_tvalid.eq(0)
         rail = Signal(reset_less=True)
         outside = Signal(reset_less=True)
@@ -672,8 +681,7 @@ class FoldedCore(Shell):
             self.m_axis_tdata.eq(extended(code, len(self.m_axis_tdata))),
             self.m_axis_tuser.eq(flags if guard is None else with_fault(flags, guard.fault | found.failed)),
         ]
-        leaves = self.m_axis_tvalid & self.m_axis_tready
-        return _told(m, "limits", leaves & found.corrected, leaves & found.failed)
+        return _told(m, "limits", control.leaves & found.corrected, control.leaves & found.failed)
 
     def _settling(self, m: Module, advance: Signal, last: PipelinedInstruction, added: Signal) -> Value:
         """Return whether the program has judged that the sample comes before the filter has settled."""
@@ -705,8 +713,9 @@ class FoldedCore(Shell):
         shifted = Signal(signed(2 * self._word), reset_less=True)
         left = Signal(signed(self._word), reset_less=True)
         done = Signal()
-        multiple = Mux(left[0], shifted, 0)
+        multiple = Signal(signed(2 * self._word))
         m.d.comb += [
+            multiple.eq(Mux(left[0], shifted, 0)),
             done.eq((left == -1) | ~left[1:].any()),
             advance.eq(~multiplies | done),
             added.eq(Mux(left == -1, total - multiple, total + multiple)),
@@ -767,5 +776,6 @@ class FoldedCore(Shell):
             m.d.comb += [net.eq(outside) for net, outside in zip((below, above), limits(last, value), strict=True)]
             m.d.comb += saturated.eq(below | above)
             code = Mux(below, Const(last.low), Mux(above, Const(last.high), value))
-        cut = code[: output.bits]
-        return (cut.as_signed() if output.signed else cut), saturated
+        limited = Signal(signed(output.bits) if output.signed else output.bits)
+        m.d.comb += limited.eq(code)
+        return limited, saturated

@@ -199,8 +199,8 @@ class Probed(FoldedCore):
 
     def memory(self, name: str) -> Any:
         """Words of the memory of this name, which a testbench can read and set."""
-        function = self._built.submodules["program_memory" if name == "instructions" else "word_memory"]
-        return function.submodules[name].data
+        place = {"instructions": "program_memory", "wear_limits": "result"}.get(name, "word_memory")
+        return self._built.submodules[place].submodules[name].data
 
     def reads_a_word(self, ctx: Any) -> bool:
         """Whether the memory of words is addressed where there is one: behind the last, simulators find an X."""

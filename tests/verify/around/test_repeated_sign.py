@@ -40,22 +40,6 @@ def test_every_bit_is_proven(case: Case, pattern: str, wrong: str, bits: set[int
     assert found == bits
 
 
-def test_a_comparison_of_signed_words_is_another_one() -> None:
-    """One of two comparisons that make a sign and what repeats it, of the same words, takes them as signed."""
-    text, (_, certificate) = written(FOLDED), designed(FOLDED)
-    for line in ("assign all_given0_12_11 = & given0[12:11];", "assign all_given0_12_11_2 = & given0[12:11];"):
-        assert text.count(line) == 1
-        text = text.replace(line, line.replace("& given0[12:11]", "given0[12:11] < given0[13]"))
-    with pytest.raises(RejectedError, match=r"^bit 13 "):
-        check_decimator(text, certificate)
-    text = text.replace(
-        "all_given0_12_11_2 = given0[12:11] < given0[13]",
-        "all_given0_12_11_2 = $signed(given0[12:11]) < $signed(given0[13])",
-    )
-    with pytest.raises(RejectedError, match=r"^bit 12 "):
-        check_decimator(text, certificate)
-
-
 def test_no_comment_hides_a_module() -> None:
     """What a tool reads counts, not what looks like it in a comment."""
     text, (_, certificate) = written(FOLDED), designed(FOLDED)
