@@ -33,7 +33,14 @@ _WIRE = re.compile(
 _DRIVEN = re.compile(
     r"^connect \\(?P<port>port\$\d+\$\d+) \\(?P<net>\S+) \[(?P<high>\d+)(?::(?P<low>\d+))?\]$", re.MULTILINE
 )
-_INSIDE = re.compile(r"^    connect \\(?P<net>\S+) \\(?P<port>port\$\d+\$\d+) \[", re.MULTILINE)
+_INSIDE = re.compile(
+    r"^    connect \\(?P<net>\S+) (?P<wire>\$\d+ \[[\d:]+\])$(?=.*^connect \\(?P<port>port\$\d+\$\d+) (?P=wire)$)",
+    re.MULTILINE | re.DOTALL,
+)
+_PLAIN = re.compile(
+    r"^(?P<said>  attribute .*\n)?(?P<wire>  wire width [1-9]\d* (?:signed )?\\[A-Za-z_]\w*\n)", re.MULTILINE
+)
+"""Wires with names of their own, and the attribute of those that have one, as registers do."""
 _UNKEPT = re.compile(
     r"(?:^  attribute \\init .*\n)?(?<!^  attribute \\keep 1\n)^  wire width \d+ (?:signed )?\\(?P<name>\S+)\n\n?",
     re.MULTILINE,
@@ -65,6 +72,11 @@ def _with_first_names(module: str) -> str:
     for lines in (_UNKEPT, _SECOND):
         module = lines.sub(lambda found: "" if found["name"] in left else found[0], module)
     return re.sub(r"(?<=\\)\S+", lambda found: better.get(found[0], found[0]), module) if better else module
+
+
+def with_kept_names(text: str) -> str:
+    """Let synthesis keep the wires in an RTLIL text that have names: those that are no ports and no registers."""
+    return _PLAIN.sub(lambda found: found[0] if found["said"] else f"  attribute \\keep 1\n{found['wire']}", text)
 
 
 def with_named_ports(text: str) -> str:

@@ -14,7 +14,7 @@ from sosmith.gen.output.amaranth_yosys import run_script
 from sosmith.gen.output.core_facts import core_facts
 from sosmith.gen.output.header import with_comments
 from sosmith.gen.output.net_names import plain_names
-from sosmith.gen.output.rtlil_names import with_named_ports, without_second_names
+from sosmith.gen.output.rtlil_names import with_kept_names, with_named_ports, without_second_names
 from sosmith.model.errors import ToolError
 
 # `proc` without `-nomux` leaves no combinational processes, which Icarus would not evaluate at time 0.
@@ -40,6 +40,12 @@ _INITIAL = re.compile(r"  initial begin\n(?P<words>(?: {4}(?P<name>\S+ ?)\[\d+\]
 _WORD = re.compile(r"\[(\d+)\] = (\S+);")
 _LOOP = 8
 """Equal words, one after the other, that are written as a loop."""
+
+
+def core_rtlil(design: CoreDesign) -> str:
+    """RTLIL text of a design's core."""
+    text = to_rtlil(design.architecture.component(), design.datapath.name)
+    return with_kept_names(text) if design.spec.hardware.keep else text
 
 
 def to_rtlil(core: Component, name: str) -> str:
@@ -78,7 +84,7 @@ def converted(rtlil_text: str) -> str:
 
 def core_verilog(design: CoreDesign) -> str:
     """SystemVerilog text of a design's core, as `sosmith.gen.output.generate.generate` writes it."""
-    text = to_verilog(to_rtlil(design.architecture.component(), design.datapath.name))
+    text = to_verilog(core_rtlil(design))
     return with_comments(text, design, core_facts(design))
 
 

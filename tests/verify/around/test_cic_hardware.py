@@ -76,7 +76,7 @@ def test_sentences() -> None:
         check_rejected(CASES[0][0], text.replace(right, wrong), sentence)
 
     rejected(
-        "sum2 <= sum2_plus_sum1[11:0];",
+        "sum2 <= sum2_next[11:0];",
         "sum2 <= sum1;",
         "decimator.sum2 must be what a decimator has there after a clock with decimator.integrator1_control0 = 1, "
         "aresetn = 1, not another value",
@@ -99,9 +99,7 @@ def test_sentences() -> None:
     wide = text.replace("reg [1:0] phase = 2'h0;", "reg [2:0] phase = 3'h0;").replace("= & phase;", "= & phase[1:0];")
     wide = re.sub(r"phase <= (n\d+)\[1:0\]", r"phase <= \1[2:0]", wide)
     check_rejected(CASES[0][0], wide, "decimator.phase must have 2 bits, not 3")
-    rejected(
-        "sum2 <= sum2_plus_sum1[11:0];", "sum2 <= sum3;", "sum3 must be declared in plain_decimator before it is used"
-    )
+    rejected("sum2 <= sum2_next[11:0];", "sum2 <= sum3;", "sum3 must be declared in plain_decimator before it is used")
     other = designed(CASES[0][0]._replace(hold=False))[1]
     with pytest.raises(RejectedError, match=r"^results must not be held, as specified$"):
         check_decimator(text, other)
