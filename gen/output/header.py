@@ -55,7 +55,11 @@ def _described(stage: str, module: str, facts: CoreFacts) -> str:
             line = f"{row.node}: {row.format}, {row.low:.6g} to {row.high:.6g} {row.unit}".rstrip()
             module, found = re.subn(_declaration(row.node), rf"  // {line}\n\g<0>", module, count=1, flags=re.MULTILINE)
             above += [line] * (not found)
-    return "".join(f"// {line}\n" for line in above or [stage]) + module
+    depth = max(map(int, re.findall(r"^  reg valid(\d+) ", module, re.MULTILINE)), default=0)
+    above.append(
+        f"{stage}: {depth} {'clock' if depth == 1 else 'clocks'} from a sample to its result, one sample a clock"
+    )
+    return "".join(f"// {line}\n" for line in above) + module
 
 
 def _declaration(net: str) -> str:
