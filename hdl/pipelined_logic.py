@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping, Sequence
 
 from amaranth.hdl import Cat, Const, Module, Mux, Shape, Signal, Value
+from amaranth.lib.wiring import Component
 
 from sosmith.hdl.adders import multiples
 from sosmith.hdl.constant_banks import Pair, chosen
@@ -141,14 +142,35 @@ def banks_in_use(valid: Sequence[Value], banks: Sequence[Value]) -> Value:
 
 
 def unique_names(graph: Graph) -> list[str]:
-    """Return a signal name for each node: its own, with its index added if that is missing or taken."""
+    """Return a signal name for each node: its own, with its index added if that is missing or taken.
+
+    A node without a name that another one only takes bits off, and that is no state, is the exact value of that.
+    """
+    labels = [node.name for node in graph.nodes]
+    for index, node in reversed(list(enumerate(graph.nodes))):
+        if node.op in _CUTS and labels[index]:
+            operand = node.operands[0]
+            if not labels[operand] and graph.nodes[operand].op is not Op.DELAY:
+                labels[operand] = f"{labels[index].removesuffix('_exact')}_exact"
     seen: set[str] = set()
     names = []
-    for index, node in enumerate(graph.nodes):
-        name = node.name if node.name and node.name not in seen else f"{node.name or node.op.value}_{index}"
+    for index, (node, label) in enumerate(zip(graph.nodes, labels, strict=True)):
+        name = label if label and label not in seen else f"{label or node.op.value}_{index}"
         seen.add(name)
         names.append(name)
     return names
+
+
+_CUTS = frozenset({Op.BOUND, Op.FLOOR, Op.TRUNCATE, Op.CLAMP})
+"""Operations that take bits off their operand."""
+
+
+def name_ports(stage: Component, graph: Graph) -> list[str]:
+    """Give the inputs of a stage the names of their nodes, which its module shows; return those of its outputs."""
+    names = unique_names(graph)
+    for k, index in enumerate(graph.inputs):
+        getattr(stage, f"i{k}").name = names[index]
+    return [names[index] for index in graph.outputs]
 
 
 def logic(graph: Graph, node: Node, operands: list[Value], factor: Value | None = None) -> Value:

@@ -19,12 +19,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from amaranth.hdl import Cat, Const, Module, Value
+from amaranth.hdl import Cat, Const, Module, Signal, Value
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from sosmith.hdl.axi_stream import codes_of
 from sosmith.hdl.check_bits import CheckBits
+from sosmith.hdl.memory_ports import read_port
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.status import Flag
 from sosmith.model.port import Port
@@ -164,10 +165,12 @@ def _worn(
         check = CheckBits(2 * bits, protect)
         init = [check.word((warning & mask) | (critical & mask) << bits) for warning, critical in datapath.wear]
         m.submodules.wear_limits = memory = Memory(shape=check.width, depth=len(init), init=init)
-        port = memory.read_port()
+        port = read_port(memory, "wear_limits")
         m.d.comb += [port.addr.eq(channel), port.en.eq(enable)]
         data, corrected, failed = check.read(m, port.data, "limits")
         limits = [data[:bits], data[bits:]]
         if datapath.output.signed:
             limits = [limit.as_signed() for limit in limits]
-    return Cat(*(code >= limit for limit in limits)), corrected, failed
+    reached = [Signal(name=f"reached_{name}") for name in ("warning", "limit")]
+    m.d.comb += [net.eq(code >= limit) for net, limit in zip(reached, limits, strict=True)]
+    return Cat(reached), corrected, failed

@@ -285,9 +285,10 @@ class ItemEntry(_Part):
 
     `ahead` is the architecture of the calibration before a decimator, `samples` the number of samples of a beat, `hold`
     whether a result of a decimator leaves as often as samples enter, and `reload` whether constants can be loaded.
-    `flags` are the bits of ``tuser`` by their names. `calibrated` is the lowest and the highest code of each input that
-    is not outside the calibration, empty if none is; `wear` the lowest codes of the output at which the wear is a
-    warning and critical, one pair for all channels or one for each, empty if wear is not judged.
+    `keep` says whether the nets that have names stay through synthesis. `flags` are the bits of ``tuser`` by their
+    names. `calibrated` is the lowest and the highest code of each input that is not outside the calibration, empty if
+    none is; `wear` the lowest codes of the output at which the wear is a warning and critical, one pair for all
+    channels or one for each, empty if wear is not judged.
     """
 
     core: Literal["instrument", "filter", "calibration"]
@@ -299,6 +300,7 @@ class ItemEntry(_Part):
     hold: Annotated[bool, Field(strict=True)]
     protect: Literal["none", "detect", "correct"]
     reload: Annotated[bool, Field(strict=True)]
+    keep: Annotated[bool, Field(strict=True)] = False
     flags: dict[Text, Annotated[int, Field(strict=True, ge=0, lt=64)]]
     calibrated: Annotated[tuple[_Codes, ...], Field(max_length=2)] = ()
     wear: Annotated[tuple[_Codes, ...], Field(max_length=1 << 12)] = ()

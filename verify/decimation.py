@@ -18,7 +18,6 @@ whose weights are positive and add up to one makes it greater. The peak gain of 
 
 from __future__ import annotations
 
-import re
 from fractions import Fraction
 
 from flint import arb, ctx, fmpq, fmpz_poly
@@ -33,6 +32,7 @@ from sosmith.verify.certificate_file import (
     SectionEntry,
 )
 from sosmith.verify.graph import require
+from sosmith.verify.reader.inlined import inlined
 from sosmith.verify.reader.source import read_source
 
 _PRECISION = 256
@@ -126,10 +126,9 @@ def module_in(text: str, top: str, name: str) -> str:
     RejectedError
         If the text has no such module, or anything that cannot be read.
     """
-    text = read_source(text, top).text
-    found = re.findall(rf"^module {re.escape(name)}\(.*?^endmodule$", text, re.MULTILINE | re.DOTALL)
-    require(len(found) == 1, f"the core must have one module {name}, not {len(found)}")
-    return str(found[0])
+    source = read_source(text, top)
+    require(name in source.modules, f"the core must have one module {name}, not 0")
+    return inlined(source, name).text
 
 
 def rounding(certificate: Certificate) -> Fraction:

@@ -177,6 +177,7 @@ def _item(design: CoreDesign) -> ItemEntry:
         hold=found.hold,
         protect=found.protect,
         reload=found.reload,
+        keep=design.spec.hardware.keep,
         flags=dict(interface.outputs.flags),
         calibrated=() if datapath.calibrated == everything else datapath.calibrated,
         wear=datapath.wear,

@@ -10,7 +10,7 @@ from sosmith.gen.output.certificate import about, certificate
 from sosmith.gen.output.core_facts import CoreFacts, core_facts
 from sosmith.gen.output.header import with_comments
 from sosmith.gen.output.manifest import manifest
-from sosmith.gen.output.verilog import to_rtlil, to_verilog
+from sosmith.gen.output.verilog import core_rtlil, to_verilog
 from sosmith.gen.reload.register_map import c_registers, systemrdl
 from sosmith.gen.reload.register_writes import bank_size
 from sosmith.model.dataflow.c_model import c_header, c_source
@@ -64,7 +64,7 @@ def generated(
     """Return the texts that `generate` writes, by the names of the files; parameters and errors as there."""
     name, datapath = design.spec.name, design.datapath
     progress("RTLIL")
-    rtlil_text = to_rtlil(design.architecture.component(), datapath.name)
+    rtlil_text = core_rtlil(design)
     progress("SystemVerilog")
     known = facts or core_facts(design)
     first = {

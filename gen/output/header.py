@@ -9,6 +9,8 @@
 
     // section0: y[n] = ...         the same above the module of a stage, in the parallel architecture
     module name_section0(...)
+      // product_A1: Q13.22, ..     format and range of a node, above its net; above the module if it has none
+      wire [35:0] product_A1;
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ from textwrap import wrap
 
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.output.core_facts import CoreFacts, SectionFacts
+from sosmith.gen.output.module_lines import module_lines
 from sosmith.gen.output.pins import pins
 from sosmith.gen.quantity import frequency
 from sosmith.gen.version import __version__
@@ -31,14 +34,37 @@ _LINE = 112
 
 def with_comments(text: str, design: CoreDesign, facts: CoreFacts) -> str:
     """Put the header before the SystemVerilog of a core, and a comment before each of its stages."""
-    names = {stage.name: _stage_lines(stage.name, facts) for stage in design.datapath.stages}
+    stages = {stage.name for stage in design.datapath.stages}
+    others = module_lines(design)
 
     def described(found: re.Match[str]) -> str:
-        lines = names.get(found["stage"], [])
-        return "".join(f"// {line}\n" for line in lines) + found[0]
+        part = found["part"]
+        if part in stages:
+            return _described(part, found[0], facts)
+        return "".join(f"// {line}\n" for line in others.get(part.removeprefix("behind_"), ())) + found[0]
 
-    stages = re.sub(rf"^module {re.escape(facts.name)}_(?P<stage>\w+)\(", described, text, flags=re.MULTILINE)
-    return _header(design, facts) + stages
+    module = re.compile(rf"^module {re.escape(facts.name)}_(?P<part>\w+)\(.*?^endmodule$", re.MULTILINE | re.DOTALL)
+    return _header(design, facts) + module.sub(described, text)
+
+
+def _described(stage: str, module: str, facts: CoreFacts) -> str:
+    """Put what a stage computes above its module, and the formats of its nodes above their nets."""
+    above = [line for section in _sections(stage, facts) for line in _section_lines(section)]
+    for row in facts.formats:
+        if row.stage == stage:
+            line = f"{row.node}: {row.format}, {row.low:.6g} to {row.high:.6g} {row.unit}".rstrip()
+            module, found = re.subn(_declaration(row.node), rf"  // {line}\n\g<0>", module, count=1, flags=re.MULTILINE)
+            above += [line] * (not found)
+    depth = max(map(int, re.findall(r"^  reg valid(\d+) ", module, re.MULTILINE)), default=0)
+    above.append(
+        f"{stage}: {depth} {'clock' if depth == 1 else 'clocks'} from a sample to its result, one sample a clock"
+    )
+    return "".join(f"// {line}\n" for line in above) + module
+
+
+def _declaration(net: str) -> str:
+    """Return a pattern for the declaration of a net, with the attributes before it."""
+    return rf"^(?:  \(\*.*\n)*  (?:input|output|wire|reg) (?:\[\d+:0\] )?{re.escape(net)}(?=;| =)"
 
 
 def _header(design: CoreDesign, facts: CoreFacts) -> str:
@@ -97,12 +123,8 @@ def _timing(design: CoreDesign, facts: CoreFacts) -> Sequence[str]:
     )
 
 
-def _stage_lines(name: str, facts: CoreFacts) -> list[str]:
-    sections = [section for section in facts.sections if section.name.split()[0] == name]
-    lines = [line for section in sections for line in _section_lines(section)]
-    rows = [row for row in facts.formats if row.stage == name]
-    lines += [f"{row.node}: {row.format}, {row.low:.6g} to {row.high:.6g} {row.unit}".rstrip() for row in rows]
-    return lines or [name]
+def _sections(stage: str, facts: CoreFacts) -> list[SectionFacts]:
+    return [section for section in facts.sections if section.name.split()[0] == stage]
 
 
 def _section_lines(section: SectionFacts) -> list[str]:

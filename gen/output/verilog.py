@@ -13,6 +13,8 @@ from sosmith.gen.core import CoreDesign
 from sosmith.gen.output.amaranth_yosys import run_script
 from sosmith.gen.output.core_facts import core_facts
 from sosmith.gen.output.header import with_comments
+from sosmith.gen.output.net_names import plain_names
+from sosmith.gen.output.rtlil_names import with_kept_names, with_named_ports, without_second_names
 from sosmith.model.errors import ToolError
 
 # `proc` without `-nomux` leaves no combinational processes, which Icarus would not evaluate at time 0.
@@ -30,13 +32,6 @@ write_verilog -sv -norename
 """
 
 _MODULE = re.compile(r"^module .*?^endmodule$", re.MULTILINE | re.DOTALL)
-_ESCAPED = re.compile(r"\\([A-Za-z0-9_$.:]*\$[A-Za-z0-9_$.:]*) ")
-"""Names with ``$``, which need a backslash before and a space behind: Yosys makes them up for what has no name,
-Amaranth for a second signal of the same name."""
-
-_MADE_UP = re.compile(r"\$(?:.*:)?(?P<kind>[A-Za-z_]*)\$?(?P<number>\d+)(?:_Y)?")
-_KINDS = {"": "n", "procmux": "choice", "make_patterns_logic": "enable", "combine_resets": "resets", "Not": "inverse"}
-
 _MARKS = re.compile(r"^ *\(\* (?:init|enum_\w+) = .* \*\)\n", re.MULTILINE)
 """Attributes that are left out: first values of nets that are no registers, which one tool obeys and others do not, and
 names of the values of registers."""
@@ -47,11 +42,18 @@ _LOOP = 8
 """Equal words, one after the other, that are written as a loop."""
 
 
+def core_rtlil(design: CoreDesign) -> str:
+    """RTLIL text of a design's core."""
+    text = to_rtlil(design.architecture.component(), design.datapath.name)
+    return with_kept_names(text) if design.spec.hardware.keep else text
+
+
 def to_rtlil(core: Component, name: str) -> str:
     """RTLIL text of `core` with the top module `name`."""
     text = str(rtlil.convert(core, name=name, emit_src=False))
     # Plain module names: an escaped identifier such as `\\top.section0 ` is legal Verilog and still trips tools.
-    return re.sub(r"^( *(?:module|cell) \\)(\S+)", lambda m: m[1] + m[2].replace(".", "_"), text, flags=re.MULTILINE)
+    text = re.sub(r"^( *(?:module|cell) \\)(\S+)", lambda m: m[1] + m[2].replace(".", "_"), text, flags=re.MULTILINE)
+    return with_named_ports(without_second_names(text))
 
 
 def to_verilog(rtlil_text: str) -> str:
@@ -62,7 +64,7 @@ def to_verilog(rtlil_text: str) -> str:
     ToolError
         If Yosys fails.
     """
-    return _MODULE.sub(_with_plain_names, converted(rtlil_text))
+    return _MODULE.sub(lambda module: plain_names(module[0]), converted(rtlil_text))
 
 
 @lru_cache(maxsize=64)  # files, boards, packages and proofs of one core ask for the same text
@@ -82,24 +84,8 @@ def converted(rtlil_text: str) -> str:
 
 def core_verilog(design: CoreDesign) -> str:
     """SystemVerilog text of a design's core, as `sosmith.gen.output.generate.generate` writes it."""
-    text = to_verilog(to_rtlil(design.architecture.component(), design.datapath.name))
+    text = to_verilog(core_rtlil(design))
     return with_comments(text, design, core_facts(design))
-
-
-def _with_plain_names(module: re.Match[str]) -> str:
-    """Give the signals of a module names that need no escape, each one of its own."""
-    text = module[0]
-    taken = set(re.findall(r"\w+", text))
-    names: dict[str, str] = {}
-    for escaped in dict.fromkeys(_ESCAPED.findall(text)):
-        made_up = _MADE_UP.fullmatch(escaped)
-        kind = made_up and _KINDS.get(made_up["kind"], made_up["kind"])
-        name = f"{kind}{made_up['number']}" if made_up else re.sub(r"\W+", "_", escaped).strip("_")
-        while name in taken:
-            name += "_"
-        taken.add(name)
-        names[escaped] = name
-    return _ESCAPED.sub(lambda found: names[found[1]], text)
 
 
 def _with_loops(block: re.Match[str]) -> str:

@@ -223,6 +223,7 @@ class HardwareTable(Table):
     multipliers: Annotated[int | None, PlainValidator(read_multipliers)] = None
     pipeline: Annotated[str, PlainValidator(choice(PIPELINES))] = "auto"
     samples_per_clock: Annotated[int, PlainValidator(read_samples_per_clock)] = 1
+    keep: Annotated[bool, PlainValidator(flag)] = False
 
 
 class Document(Table):

@@ -123,6 +123,8 @@ class HardwareSpec:
         "plain", "look-ahead", or "auto" for look-ahead only where clock and sample rate ask for it.
     samples_per_clock : int
         Samples in a beat of the streams, one of `sosmith.gen.specification.choices.SAMPLES_PER_CLOCK`.
+    keep : bool
+        Whether nets with names stay through synthesis, for a logic analyser.
     """
 
     realization: str
@@ -134,6 +136,7 @@ class HardwareSpec:
     multipliers: int | None = None
     pipeline: str = "auto"
     samples_per_clock: int = 1
+    keep: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -282,6 +285,7 @@ def _specification(path: Path, tree: dict[str, Any], document: Document) -> Spec
             multipliers=hardware.multipliers,
             pipeline=hardware.pipeline,
             samples_per_clock=hardware.samples_per_clock,
+            keep=hardware.keep,
         ),
         converters=converters(inputs, document.converter),
         dac=dac(inputs, output_port, document.converter),

@@ -71,6 +71,7 @@ from amaranth.lib.memory import Memory
 from sosmith.hdl.axi_stream import extended
 from sosmith.hdl.check_bits import CheckBits
 from sosmith.hdl.instruction import PipelinedInstruction
+from sosmith.hdl.memory_ports import read_port, write_port
 from sosmith.hdl.pipelined_logic import limits
 from sosmith.hdl.plan.folded_clocks import FOLDED_DEPTH, SERIAL_DEPTH, memory_depth, overlaps
 from sosmith.hdl.plan.instructions import address_bits, encoded, instruction_bits
@@ -93,6 +94,9 @@ from sosmith.model.dataflow.program import (
     Opcode,
     Program,
 )
+
+FUNCTIONS = ("sequencer", "program_memory", "word_memory", "multiply_accumulate", "result")
+"""Modules of a core, in the order in which an instruction meets them."""
 
 _NO_COLLISIONS = {"no_rw_check": 1}
 """Attribute of memories: no word is used that is read at the clock at which it is written.
@@ -122,6 +126,10 @@ class _Control:
         Whether one is in work.
     channel : Signal
         Channel of the sample in work, or of the word that is cleared.
+    dropped : Signal
+        Whether a sample of a channel that does not exist is accepted.
+    leaves : Signal
+        Whether the result leaves.
     """
 
     def __init__(self, channel_bits: int) -> None:
@@ -130,6 +138,8 @@ class _Control:
         self.start = Signal(name="start")
         self.busy = Signal(name="busy")
         self.channel = Signal(channel_bits, name="channel")
+        self.dropped = Signal(name="dropped")
+        self.leaves = Signal(name="leaves")
 
 
 class _Position(NamedTuple):
@@ -137,6 +147,13 @@ class _Position(NamedTuple):
 
     counter: Signal
     fetches: Signal
+
+
+def _told(m: Module, memory: str, corrected: Value, failed: Value) -> tuple[Value, Value]:
+    """Return whether a wrong bit was corrected, and whether one could not be, as nets that say in which memory."""
+    found = Signal(name=f"{memory}_corrected"), Signal(name=f"{memory}_failed")
+    m.d.comb += [net.eq(value) for net, value in zip(found, (corrected, failed), strict=True)]
+    return found
 
 
 class _Reload(NamedTuple):
@@ -211,45 +228,66 @@ class FoldedCore(Shell):
         )
 
     def fill(self, m: Module) -> None:
-        """Build control, pipeline and memories."""
+        """Build control, pipeline and memories, each a module of its own."""
+        functions = {name: Module() for name in FUNCTIONS}
+        for name, function in functions.items():
+            m.submodules[name] = function
         control = _Control(channel_bits(self.channels))
-        advance, clearing, busy = control.advance, control.clearing, control.busy
-        dropped = Signal()
         guard = self._guard(m, control)
-        leaves = self.m_axis_tvalid & self.m_axis_tready
-        if self._overlaps:
-            waits = busy | clearing
-        else:
-            waits = (busy & ~leaves) | clearing if guard is None else busy | clearing | guard.broken
-        pending = Signal()
-        if self.restarts:
-            waits = waits | pending
-        self._accept(m, control, waits, dropped)
-        position = self._count(m, control, early=guard is None)
-        reload = self._reload(m, control)
-        pipeline, fetched = self._fetch(m, control, position, reload, guard)
+        reload = self._reload(m, functions["sequencer"], control)
+        position = self._sequence(functions["sequencer"], control, guard, reload)
+        pipeline, fetched = self._fetch(functions["program_memory"], control, position, reload, guard)
         read = Signal(signed(self._word))
         added = Signal(signed(self.program.accumulator_bits))
-        moved = self._accumulate(m, advance, pipeline, (read, added))
-        remembered = self._remember(m, control, (added, read, moved), pipeline, guard)
-        ends = advance & pipeline[-1].valid & (self._gives_last(pipeline) if self._overlaps else ~pipeline[-2].valid)
-        taken = Signal()
-        begins = taken if self._overlaps else control.start
-        limits = self._give(m, control, (begins, ends), added, pipeline, guard)
-        if guard is None:
-            reading = self._reading(pipeline)
-            last_digit = reading.is_for(sum(location.digits for location in self.program.inputs) - 1)
-            m.d.sync += taken.eq(advance & reading.valid & reading.has(Opcode.TAKE) & last_digit)
-        else:
-            m.d.sync += taken.eq(ends)
-            self._restart(m, control, guard.restart)
+        self._accumulate(functions["multiply_accumulate"], control.advance, pipeline, (read, added))
+        remembered = self._remember(functions["word_memory"], control, (added, read), pipeline, guard)
+        ends = self._ends(functions["program_memory"], control.advance, pipeline)
+        begins = self._accepts(functions["sequencer"], control, pipeline, None if guard is None else ends)
+        limits = self._give(functions["result"], control, (begins, ends), added, pipeline, guard)
+        if guard is not None:
             memories = (fetched, remembered, limits)
             corrected, failed = (Cat(found).any() for found in zip(*memories, strict=True))
             self.report(m, guard, None if reload is None else reload.port, corrected, failed)
-        if reload is not None and self.restarts:
-            m.d.comb += pending.eq(reload.port.pending)
-            self._restart(m, control, reload.port.pending & reload.port.may_swap)
-        m.d.comb += self.s_axis_tready.eq(taken | dropped)
+
+    def _sequence(self, m: Module, control: _Control, guard: FaultGuard | None, reload: _Reload | None) -> _Position:
+        """Find samples, and count through the program for each."""
+        clearing, busy = control.clearing, control.busy
+        m.d.comb += control.leaves.eq(self.m_axis_tvalid & self.m_axis_tready)
+        if self._overlaps:
+            waits = busy | clearing
+        else:
+            waits = (busy & ~control.leaves) | clearing if guard is None else busy | clearing | guard.broken
+        swaps = None if reload is None or not self.restarts else reload.port
+        if swaps is not None:
+            waits = waits | swaps.pending
+        self._accept(m, control, waits)
+        position = self._count(m, control, early=guard is None)
+        if guard is not None:
+            self._restart(m, control, guard.restart)
+        if swaps is not None:
+            self._restart(m, control, swaps.pending & swaps.may_swap)
+        return position
+
+    def _ends(self, m: Module, advance: Signal, pipeline: list[PipelinedInstruction]) -> Signal:
+        """Return whether the last instruction of a sample is in the last pipeline stage."""
+        ends = Signal()
+        last = self._gives_last(pipeline) if self._overlaps else ~pipeline[-2].valid
+        m.d.comb += ends.eq(advance & pipeline[-1].valid & last)
+        return ends
+
+    def _accepts(
+        self, m: Module, control: _Control, pipeline: list[PipelinedInstruction], ends: Signal | None
+    ) -> Signal:
+        """Accept a sample, as it `ends` or once it has been read; return when its flags are to be taken."""
+        taken = Signal()
+        if ends is None:
+            reading = self._reading(pipeline)
+            last_digit = reading.is_for(sum(location.digits for location in self.program.inputs) - 1)
+            m.d.sync += taken.eq(control.advance & reading.valid & reading.has(Opcode.TAKE) & last_digit)
+        else:
+            m.d.sync += taken.eq(ends)
+        m.d.comb += self.s_axis_tready.eq(taken | control.dropped)
+        return taken if self._overlaps else control.start
 
     def _guard(self, m: Module, control: _Control) -> FaultGuard | None:
         """Return the guard of the memories; None without protection."""
@@ -277,15 +315,15 @@ class FoldedCore(Shell):
         """Width of a word."""
         return self.program.digit_bits + 1
 
-    def _accept(self, m: Module, control: _Control, waits: Value, dropped: Signal) -> None:
+    def _accept(self, m: Module, control: _Control, waits: Value) -> None:
         """Start on a sample if its channel exists, otherwise drop it."""
-        found = self.s_axis_tvalid & ~waits
         if self.channels == 1:
-            m.d.comb += control.start.eq(found)
+            m.d.comb += control.start.eq(self.s_axis_tvalid & ~waits)
             return
-        exists = self.s_axis_tdest < self.channels
+        found, exists = Signal(name="found"), Signal(name="channel_exists")
+        m.d.comb += [found.eq(self.s_axis_tvalid & ~waits), exists.eq(self.s_axis_tdest < self.channels)]
         m.d.comb += [control.start.eq(found & exists), self.m_axis_tdest.eq(control.channel)]
-        m.d.sync += dropped.eq(found & ~exists & ~dropped)
+        m.d.sync += control.dropped.eq(found & ~exists & ~control.dropped)
         with m.If(control.start):
             m.d.sync += control.channel.eq(self.s_axis_tdest)
 
@@ -305,11 +343,14 @@ class FoldedCore(Shell):
         fetching = Signal()
         fetches = Signal()
         m.d.comb += fetches.eq(fetching | control.start if early else fetching)
-        leaves: Value = self.m_axis_tvalid & self.m_axis_tready
+        is_last_instruction = Signal()
+        m.d.comb += is_last_instruction.eq(counter == count - 1)
+        leaves: Value = control.leaves
         if self._overlaps:
-            held = (counter == self.program.result_start) & self.m_axis_tvalid & ~self.m_axis_tready
+            held = Signal(name="waits_for_sink")
+            m.d.comb += held.eq((counter == self.program.result_start) & self.m_axis_tvalid & ~self.m_axis_tready)
             m.d.comb += fetches.eq(control.start | (fetching & ~held))
-            leaves = fetches & (counter == count - 1)
+            leaves = fetches & is_last_instruction
         is_last = control.channel == self.channels - 1
         with m.If(control.clearing):
             m.d.sync += [counter.eq(counter + 1), control.channel.eq(counter[bits:])]
@@ -317,7 +358,7 @@ class FoldedCore(Shell):
                 m.d.sync += [control.clearing.eq(0), counter.eq(0)]
         with m.Elif(fetches & control.advance):
             m.d.sync += [counter.eq(counter + 1), fetching.eq(1)]
-            with m.If(counter == count - 1):
+            with m.If(is_last_instruction):
                 m.d.sync += [fetching.eq(0), counter.eq(0)]
         with m.If(control.start):
             m.d.sync += [control.busy.eq(1), fetching.eq(1)]
@@ -325,7 +366,7 @@ class FoldedCore(Shell):
             m.d.sync += control.busy.eq(0)
         return _Position(counter, fetches)
 
-    def _reload(self, m: Module, control: _Control) -> _Reload | None:
+    def _reload(self, m: Module, sequencer: Module, control: _Control) -> _Reload | None:
         """Return the reload port, and the bank that the sample in work uses."""
         if self.fingerprint is None:
             return None
@@ -334,9 +375,9 @@ class FoldedCore(Shell):
         self.join_port(m, port)
         kept = Signal(reset_less=True)
         bank = Signal()
-        with m.If(control.start):
-            m.d.sync += kept.eq(port.bank)
-        m.d.comb += [
+        with sequencer.If(control.start):
+            sequencer.d.sync += kept.eq(port.bank)
+        sequencer.d.comb += [
             bank.eq(Mux(control.start, port.bank, kept)),
             port.may_swap.eq(~control.busy & ~control.clearing if self.restarts else 1),
             port.shadow_free.eq(~control.busy | (kept == port.bank)),
@@ -367,7 +408,7 @@ class FoldedCore(Shell):
         m.submodules.instructions = program = Memory(
             shape=check.width, depth=len(codes), init=[check.word(code) for code in codes], attrs=_NO_COLLISIONS
         )
-        fetch = program.read_port()
+        fetch = read_port(program, "instructions")
         index, bank = self._program_address(m, position.counter, count, reload, guard)
         m.d.comb += [fetch.addr.eq(Cat(index, bank)), fetch.en.eq(advance)]
         found = check.read(m, fetch.data, "instruction1")
@@ -381,17 +422,17 @@ class FoldedCore(Shell):
             # A word that is read while it is written would be undefined.
             rewrites = looks & found.corrected & (fetched != fetch.addr)
         self._write_program(m, program, check, reload, (rewrites, fetched, found.data))
-        pipeline = [PipelinedInstruction(found.data, valid, self.program)]
+        pipeline = [PipelinedInstruction(m, "instruction1", found.data, valid, self.program)]
         with m.If(advance):
             m.d.sync += valid.eq(position.fetches)
             for k in range(2, SERIAL_DEPTH + 1 if self.serial else FOLDED_DEPTH + 1):
                 code = Signal(len(found.data), name=f"instruction{k}", reset_less=True)
                 valid = Signal(name=f"valid{k}")
                 m.d.sync += [code.eq(pipeline[-1].code), valid.eq(pipeline[-1].valid)]
-                pipeline.append(PipelinedInstruction(code, valid, self.program))
+                pipeline.append(PipelinedInstruction(m, f"instruction{k}", code, valid, self.program))
             with m.If(control.clearing):  # in place of a target, the address of the word to clear
-                m.d.sync += pipeline[-1].target.eq(position.counter[: address_bits(self.program)])
-        return pipeline, (looks & found.corrected, looks & found.failed)
+                m.d.sync += pipeline[-1].fields.target.eq(position.counter[: address_bits(self.program)])
+        return pipeline, _told(m, "program", looks & found.corrected, looks & found.failed)
 
     def _program_address(
         self,
@@ -425,7 +466,7 @@ class FoldedCore(Shell):
         rewrites, fetched, corrected = rewrite
         if reload is None and self.protect != "correct":
             return
-        write = program.write_port()
+        write = write_port(program, "instructions")
         enable, address, data = rewrites, fetched, check.written(corrected)
         if reload is not None:
             port = reload.port
@@ -441,8 +482,8 @@ class FoldedCore(Shell):
 
     def _accumulate(
         self, m: Module, advance: Signal, pipeline: list[PipelinedInstruction], values: tuple[Signal, Signal]
-    ) -> Value:
-        """Multiply in the last pipeline stage but one, add up in the last; return the word that MOVE and TAKE write."""
+    ) -> None:
+        """Multiply in the last pipeline stage but one, add up in the last."""
         reading, last = self._reading(pipeline), pipeline[-1]
         read, added = values
         chosen = Signal(signed(self._word))
@@ -456,24 +497,22 @@ class FoldedCore(Shell):
                 m.d.sync += operand.eq(read)
         if self.serial:
             self._multiply_serially(m, (total, added), (read, chosen), (advance, last.valid))
-            return self._moved(reading, read)
+            return
         # Nothing else reads these registers, so that they can be those inside the multiplier block.
         data, factor = (Signal(signed(self._word), name=name, reset_less=True) for name in ("data", "factor"))
         product = Signal(signed(2 * self._word), reset_less=True)
-        moved = Signal(self._word)  # 0 from a reset on, when words are cleared
         m.d.comb += [advance.eq(1), added.eq(total + product)]
-        m.d.sync += [
-            data.eq(read),
-            factor.eq(chosen),
-            product.eq(data * factor),
-            moved.eq(self._moved(reading, read)),
-        ]
-        return moved
+        m.d.sync += [data.eq(read), factor.eq(chosen), product.eq(data * factor)]
 
-    def _moved(self, instruction: PipelinedInstruction, read: Value) -> Value:
+    def _moved(self, m: Module, instruction: PipelinedInstruction, read: Value) -> Value:
         """Return the word that MOVE and TAKE write, and 0 for all others."""
         word = Mux(instruction.has(Opcode.TAKE), self._input_digit(instruction), read)
-        return Mux(instruction.valid & instruction.has(*EARLY_WRITES), word, 0)
+        found = Mux(instruction.valid & instruction.has(*EARLY_WRITES), word, 0)
+        if self.serial:
+            return found
+        moved = Signal(self._word)  # 0 from a reset on, when words are cleared
+        m.d.sync += moved.eq(found)
+        return moved
 
     def _total(self, m: Module, added: Signal, advance: Signal, last: PipelinedInstruction) -> Value:
         """Return what is left of the sum before the last instruction.
@@ -500,7 +539,7 @@ class FoldedCore(Shell):
         self,
         m: Module,
         control: _Control,
-        values: tuple[Signal, Signal, Value],
+        values: tuple[Signal, Signal],
         pipeline: list[PipelinedInstruction],
         guard: FaultGuard | None,
     ) -> tuple[Value, Value]:
@@ -508,11 +547,15 @@ class FoldedCore(Shell):
 
         Return whether a wrong bit was corrected at this clock, and whether one was found that could not be.
         """
-        (added, read, moved), advance, clearing = values, control.advance, control.clearing
+        (added, read), advance, clearing = values, control.advance, control.clearing
+        moved = self._moved(m, self._reading(pipeline), read)
         addressing, present, last = pipeline[-3 if self.serial else -4], pipeline[-2], pipeline[-1]
-        moves = present.valid & present.has(*EARLY_WRITES)
-        stores = last.valid & last.has(*LATE_WRITES)
-        finishes = last.valid & last.has(*FINISHES)
+        moves, stores, finishes = (Signal(name=name) for name in ("moves", "stores", "finishes"))
+        m.d.comb += [
+            moves.eq(present.valid & present.has(*EARLY_WRITES)),
+            stores.eq(last.valid & last.has(*LATE_WRITES)),
+            finishes.eq(last.valid & last.has(*FINISHES)),
+        ]
         address: Value = Cat(addressing.address, control.channel)
         where: Value = Cat(Mux(moves, present.target, last.target), control.channel)
         sign = self._word - 1
@@ -537,7 +580,7 @@ class FoldedCore(Shell):
         m.d.comb += word.eq(self._memory(m, check, read=(address, advance), write=(where, check.written(what), enable)))
         if guard is not None:
             m.d.comb += read.eq(found.data)
-        return looks & found.corrected, looks & found.failed
+        return _told(m, "words", looks & found.corrected, looks & found.failed)
 
     def _is_word(self, address: Value) -> Value:
         """Whether there is a word at an address to scrub."""
@@ -563,8 +606,8 @@ class FoldedCore(Shell):
             one = check.word(1) >> low & ((1 << (high - low)) - 1)
             init = [one if address % words == self.program.one else 0 for address in range(depth)]
             m.submodules[f"words{low}"] = ram = Memory(shape=high - low, depth=depth, init=init, attrs=_NO_COLLISIONS)
-            reader = ram.read_port()
-            writer = ram.write_port()
+            reader = read_port(ram, f"words{low}")
+            writer = write_port(ram, f"words{low}")
             m.d.comb += [
                 reader.addr.eq(read[0]),
                 reader.en.eq(read[1]),
@@ -597,7 +640,7 @@ class FoldedCore(Shell):
                 m.d.sync += part.eq(added)
         with m.If(ends):
             m.d.sync += self.m_axis_tvalid.eq(1)
-        with m.If(self.m_axis_tvalid & self.m_axis_tready):
+        with m.If(control.leaves):
             m.d.sync += self.m_axis_tvalid.eq(0)
         rail = Signal(reset_less=True)
         outside = Signal(reset_less=True)
@@ -619,7 +662,7 @@ class FoldedCore(Shell):
             with m.If(ends):
                 m.d.sync += judged.eq(now)
             judged, settling = judged[:2], judged[2:]
-        code, saturated = self._limited(given)
+        code, saturated = self._limited(m, given)
         # Without protection the limits are read again and again; with it just once, so that an upset changes no flag
         # of a result that waits for the sink.
         found = status_of_result(
@@ -638,8 +681,7 @@ class FoldedCore(Shell):
             self.m_axis_tdata.eq(extended(code, len(self.m_axis_tdata))),
             self.m_axis_tuser.eq(flags if guard is None else with_fault(flags, guard.fault | found.failed)),
         ]
-        leaves = self.m_axis_tvalid & self.m_axis_tready
-        return leaves & found.corrected, leaves & found.failed
+        return _told(m, "limits", control.leaves & found.corrected, control.leaves & found.failed)
 
     def _settling(self, m: Module, advance: Signal, last: PipelinedInstruction, added: Signal) -> Value:
         """Return whether the program has judged that the sample comes before the filter has settled."""
@@ -671,8 +713,9 @@ class FoldedCore(Shell):
         shifted = Signal(signed(2 * self._word), reset_less=True)
         left = Signal(signed(self._word), reset_less=True)
         done = Signal()
-        multiple = Mux(left[0], shifted, 0)
+        multiple = Signal(signed(2 * self._word))
         m.d.comb += [
+            multiple.eq(Mux(left[0], shifted, 0)),
             done.eq((left == -1) | ~left[1:].any()),
             advance.eq(~multiplies | done),
             added.eq(Mux(left == -1, total - multiple, total + multiple)),
@@ -720,17 +763,19 @@ class FoldedCore(Shell):
         rest = self._result_bits - self.program.digit_bits * (self.program.output.parts - 1)
         return max(1, min(rest, self.program.accumulator_bits))
 
-    def _limited(self, given: list[Signal]) -> tuple[Value, Value]:
+    def _limited(self, m: Module, given: list[Signal]) -> tuple[Value, Value]:
         """Return the output code from its parts, limited to the port's range, and whether it had to be limited."""
         output = self.datapath.output
         value = Cat(*given)[: self._result_bits].as_signed()
         graph = self.datapath.stages[-1].graph
         last = graph.nodes[graph.outputs[0]]
-        below: Value = Const(0, 1)
-        above: Value = Const(0, 1)
         code: Value = value
+        saturated = Signal(name="output_saturated")
         if last.op is Op.CLAMP:
-            below, above = limits(last, value)
+            below, above = Signal(name="below"), Signal(name="above")
+            m.d.comb += [net.eq(outside) for net, outside in zip((below, above), limits(last, value), strict=True)]
+            m.d.comb += saturated.eq(below | above)
             code = Mux(below, Const(last.low), Mux(above, Const(last.high), value))
-        cut = code[: output.bits]
-        return (cut.as_signed() if output.signed else cut), below | above
+        limited = Signal(signed(output.bits) if output.signed else output.bits)
+        m.d.comb += limited.eq(code)
+        return limited, saturated

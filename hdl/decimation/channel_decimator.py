@@ -31,6 +31,7 @@ from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from sosmith.hdl.axi_stream import codes_of, extended
+from sosmith.hdl.memory_ports import read_port, write_port
 from sosmith.hdl.plan.streams import channel_bits, dest_width, width
 from sosmith.hdl.status import RAIL_ALONE, at_rail
 from sosmith.model.dataflow.decimator import Decimator
@@ -90,6 +91,11 @@ class ChannelDecimator(wiring.Component):
         gathered = Signal(len(self.o_flags), reset_less=True)
         acc = Signal(made.width, reset_less=True)
         step = Signal(range(2 * made.stages))
+        clearing = Signal(init=1)
+        idle = Signal()
+        takes = Signal()
+        gives = Signal()
+        m.d.comb += self.i_ready.eq(idle)
         (code,) = codes_of([made.input], self.i_data)
         kept = self._control(m, channel, sample, gathered)
         adds = Signal()
@@ -98,8 +104,7 @@ class ChannelDecimator(wiring.Component):
         with m.If(self.o_ready):
             m.d.sync += self.o_valid.eq(0)
         # One of these is 1 at each clock.
-        clearing, idle, takes, gives = Signal(init=1), Signal(), Signal(), Signal()
-        m.d.comb += [self.i_ready.eq(idle), kept.clears.eq(clearing), kept.reads.eq(idle)]
+        m.d.comb += [kept.clears.eq(clearing), kept.reads.eq(idle)]
         with m.If(clearing):
             m.d.sync += channel.eq(channel + 1)
             with m.If(channel == self.channels - 1):
@@ -142,7 +147,7 @@ class ChannelDecimator(wiring.Component):
         made, count = self.decimator, len(self.o_flags)
         phases = made.factor.bit_length() - 1
         m.submodules.control = memory = Memory(shape=1 + phases + count + len(sample), depth=self.channels, init=[])
-        read, write = memory.read_port(), memory.write_port()
+        read, write = read_port(memory, "control"), write_port(memory, "control")
         kept = _Kept(
             started=Signal(name="started"),
             first=Signal(len(sample), name="first"),
@@ -175,7 +180,7 @@ class ChannelDecimator(wiring.Component):
         made, (step, adds) = self.decimator, control
         steps = len(step)
         m.submodules.states = memory = Memory(shape=made.width, depth=self.channels << steps, init=[])
-        read, write = memory.read_port(), memory.write_port()
+        read, write = read_port(memory, "states"), write_port(memory, "states")
         combing = Signal()
         state = Signal(made.width)
         total = Signal(made.width)

@@ -14,7 +14,7 @@ Latency: that of the stages; `delayed` takes as many clocks as it is told.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 from amaranth.hdl import Const, Module, Signal, Value
 from amaranth.lib import wiring
@@ -46,8 +46,20 @@ class Sample(NamedTuple):
     scrub: Value = NEVER
 
 
+class NamedStage(Protocol):
+    """A component with the name of its stage, and those of the nodes at its outputs ``o0``, ``o1``, .."""
+
+    name: str
+    outputs: list[str]
+
+    @property
+    def signature(self) -> wiring.Signature:
+        """Its ports."""
+        ...
+
+
 def through(
-    m: Module, stages: Sequence[wiring.Component], sample: Sample, codes: Sequence[Value]
+    m: Module, stages: Sequence[NamedStage], sample: Sample, codes: Sequence[Value]
 ) -> tuple[Sample, list[Value]]:
     """Connect stages one behind the other.
 
@@ -74,9 +86,16 @@ def through(
         }
         m.d.comb += [getattr(stage, f"i{k}").eq(code) for k, code in enumerate(codes)]
         m.d.comb += [getattr(stage, f"i_{name}").eq(value) for name, value in beside.items()]
-        sample = sample._replace(**{name: getattr(stage, f"o_{name}") for name in beside})
-        codes = [getattr(stage, f"o{k}") for k in range(len(members)) if f"o{k}" in members]
+        sample = sample._replace(**{name: _named(m, stage, getattr(stage, f"o_{name}"), name) for name in beside})
+        codes = [_named(m, stage, getattr(stage, f"o{k}"), name) for k, name in enumerate(stage.outputs)]
     return sample, codes
+
+
+def _named(m: Module, stage: NamedStage, output: Value, name: str) -> Signal:
+    """Return what leaves a stage as a net with a name of its own: that of the stage, and what it is."""
+    net = Signal(output.shape(), name=f"{stage.name}_{name}")
+    m.d.comb += net.eq(output)
+    return net
 
 
 def delayed(m: Module, advance: Value, value: Value, clocks: int, name: str) -> Value:

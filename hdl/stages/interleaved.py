@@ -56,7 +56,8 @@ from amaranth.lib.wiring import In, Out
 
 from sosmith.hdl.check_bits import CheckBits, Read
 from sosmith.hdl.constant_banks import NO_CONSTANTS, Pair
-from sosmith.hdl.pipelined_logic import PipelinedLogic, banks_in_use, limits, shape_of
+from sosmith.hdl.memory_ports import read_port, write_port
+from sosmith.hdl.pipelined_logic import PipelinedLogic, banks_in_use, limits, name_ports, shape_of
 from sosmith.hdl.plan.interleaving import schedule
 from sosmith.hdl.plan.streams import channel_bits
 from sosmith.model.dataflow.datapath import Stage
@@ -125,6 +126,7 @@ class InterleavedStage(wiring.Component):
         protect: str = "none",
         adders: Collection[int] = (),
     ) -> None:
+        self.name = stage.name
         self.stage = stage
         self.adders = adders
         self.protect = protect
@@ -140,6 +142,7 @@ class InterleavedStage(wiring.Component):
         if protect != "none":
             members |= {"i_scrub": In(1), "o_scrub": Out(1), "i_fault": In(1), "o_fault": Out(1), "corrected": Out(1)}
         super().__init__({**members, "o_valid": Out(1), "o_channel": Out(bits), "o_saturated": Out(1)})
+        self.outputs = name_ports(self, graph)
 
     def elaborate(self, platform: object) -> Module:
         """Build the logic."""
@@ -169,8 +172,8 @@ class InterleavedStage(wiring.Component):
                 init=[0] * self.channels,
                 attrs=_BLOCK_RAM if plan.reading > 1 else {},
             )
-            read = memory.read_port()
-            write = memory.write_port()
+            read = read_port(memory, f"{names[index]}_memory")
+            write = write_port(memory, f"{names[index]}_memory")
             word = read.data
             if plan.reading > 1:
                 word = Signal(read.data.shape(), name=f"{names[index]}_read", reset_less=True)

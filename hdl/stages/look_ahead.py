@@ -28,7 +28,8 @@ from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from sosmith.hdl.constant_banks import NO_CONSTANTS
-from sosmith.hdl.pipelined_logic import PipelinedLogic, limits, shape_of
+from sosmith.hdl.memory_ports import read_port, write_port
+from sosmith.hdl.pipelined_logic import PipelinedLogic, limits, name_ports, shape_of
 from sosmith.hdl.plan.look_ahead import TurnPlan
 from sosmith.model.dataflow.graph import Op
 
@@ -71,6 +72,7 @@ class LookAheadStage(wiring.Component):
         limited = sum(graph.nodes[i].op is Op.CLAMP for i in graph.outputs)
         members |= {"i_valid": In(1), "advance": In(1), "o_valid": Out(1), "o_saturated": Out(max(1, limited))}
         super().__init__(members)
+        self.outputs = name_ports(self, graph)
 
     def elaborate(self, platform: object) -> Module:
         """Build the logic."""
@@ -135,8 +137,9 @@ class LookAheadStage(wiring.Component):
         for i in sorted(plan.loops):
             node, own, written = graph.nodes[i], plan.pipeline_stages[i], plan.writes[i]
             memory = Memory(shape=shape_of(node), depth=plan.turns, init=[])
-            m.submodules[f"{logic.names[i]}_memory"] = memory
-            read, write = memory.read_port(), memory.write_port()
+            name = f"{logic.names[i]}_memory"
+            m.submodules[name] = memory
+            read, write = read_port(memory, name), write_port(memory, name)
             following = logic.at(node.operands[0], written)
             m.d.comb += [
                 read.addr.eq(turns[own - 1]),

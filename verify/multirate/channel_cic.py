@@ -25,7 +25,6 @@ The states of step k + 1 are read while step k writes its own; the control word 
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -33,7 +32,6 @@ from typing import NamedTuple
 
 from sosmith.verify.certificate_file import Certificate, DecimationEntry, PortEntry
 from sosmith.verify.graph import RejectedError, require
-from sosmith.verify.multirate.bit_logic import BitLogic
 from sosmith.verify.multirate.calibration import CHANNEL, CODE, FLAGS, Gate, layout_of
 from sosmith.verify.multirate.connections import CIC, DATA, DEST, CoreConnections, calibration_connections, passed_on
 from sosmith.verify.multirate.logic import (
@@ -63,7 +61,7 @@ _CONTROL, _STATES = CIC + "control", CIC + "states"
 
 @dataclass(frozen=True)
 class Names:
-    """Registers of the decimator that have no names of their own.
+    """Registers of the decimator.
 
     Attributes
     ----------
@@ -82,7 +80,7 @@ class Names:
 
 
 def names_of(netlist: Netlist) -> Names:
-    """Find the registers of the decimator that have no names of their own.
+    """Find the registers of the decimator.
 
     Raises
     ------
@@ -93,16 +91,14 @@ def names_of(netlist: Netlist) -> Names:
     for register in netlist.registers.values():
         for memory in _memories(register.statements):
             read.setdefault(memory, []).append(register.name)
-    bits = [name for name in netlist.registers if re.fullmatch(re.escape(CIC) + r"signal\d+", name)]
-    first = [name for name in bits if netlist.registers[name].first]
+    states = tuple(CIC + name for name in ("clears", "i_ready", "takes", "adds", "gives"))
+    missing = [name for name in states if name not in netlist.registers]
+    require(not missing, f"the decimator must have a register {', '.join(missing)}")
     dest = set(passed_on(netlist, Bits(CIC + "o_dest")))
-    counts = [len(bits), len(first), len(dest), *map(len, read.values())]
-    require(counts == [3, 1, 1, 1, 1], f"the decimator must have 3 states and 3 other registers, not {counts}")
-    takes, gives = (name for name in bits if name not in first)
-    if _sets(netlist, CIC + "o_valid", takes):
-        takes, gives = gives, takes
+    counts = [len(dest), *map(len, read.values())]
+    require(counts == [1, 1, 1], f"the decimator must have 3 registers beside its state, not {counts}")
     (control,), (state,) = read[_CONTROL], read[_STATES]
-    return Names((first[0], CIC + "reads", takes, CIC + "adds", gives), control, state, dest.pop())
+    return Names(states, control, state, dest.pop())
 
 
 def _memories(statements: Sequence[Statement]) -> Iterator[str]:
@@ -112,19 +108,6 @@ def _memories(statements: Sequence[Statement]) -> Iterator[str]:
             yield from _memories((*statement.yes, *statement.no))
         elif isinstance(statement.value, Word):
             yield statement.value.name
-
-
-def _sets(netlist: Netlist, register: str, by: str) -> bool:
-    """Whether what a register takes over depends on a bit."""
-    logic = BitLogic(netlist)
-    (after,), (bit,) = ([logic.after(found) for found in logic.net(register)], logic.net(by))
-    seen, left = set[int](), [after]
-    while left:
-        found = left.pop()
-        if found not in seen:
-            seen.add(found)
-            left += [operand for operands in logic.sources[found].operands for operand in operands]
-    return bit in seen
 
 
 def check_channels(

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.parallel.control import RESET
 from sosmith.verify.parallel.netlist import Netlist, flattened
+from sosmith.verify.reader.inlined import inlined
 from sosmith.verify.reader.source import read_source
 from sosmith.verify.reader.syntax import Bits, Expression, Joined, Module, Number
 
@@ -199,7 +200,9 @@ def read_core(text: str, name: str) -> dict[str, Module]:
     RejectedError
         If there is no such module, or the text has anything that cannot be read.
     """
-    return read_source(text, name).modules
+    source = read_source(text, name)
+    inner = {f"{name}_behind", f"{name}_ahead"} & source.modules.keys()
+    return {**source.modules, **{inside: inlined(source, inside).modules[inside] for inside in sorted(inner)}}
 
 
 def read_around(modules: Mapping[str, Module], name: str) -> Netlist:

@@ -25,6 +25,7 @@ from typing import NamedTuple
 
 from sosmith.verify.graph import require
 from sosmith.verify.program.logic import Bit, Logic
+from sosmith.verify.reader.inlined import inlined
 from sosmith.verify.reader.source import read_source
 from sosmith.verify.reader.syntax import Module
 
@@ -158,6 +159,7 @@ def read_program(text: str, top: str | None = None) -> ProgramText:
         If the text has no program, one that can be loaded at run time, or one that cannot be decoded.
     """
     source = read_source(text, top)
+    source = inlined(source, next(iter(source.modules)))
     require("s_axil_" not in source.text, "the program must be fixed to be checked, not loadable at run time")
     require(len(source.modules) == 1, f"a program must be in the only module, not in one of {len(source.modules)}")
     (module,) = source.modules.values()

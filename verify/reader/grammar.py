@@ -35,7 +35,7 @@ from sosmith.verify.reader.syntax import (
     Statement,
     Word,
 )
-from sosmith.verify.reader.tokens import UNCHECKED, Tokens
+from sosmith.verify.reader.tokens import KEPT, UNCHECKED, Tokens
 
 _NUMBER = re.compile(r"(\d+)'(?:h([0-9a-f]+)|d(\d+)|b([01]+))")
 _UNKNOWN = re.compile(r"(\d+)'[hb]x+")
@@ -188,6 +188,9 @@ class Reader:
                 tokens.expect(":", "0", "]")
             else:
                 module.registers[name] = self._number().value if tokens.take("=") else None
+        if KEPT in marks:
+            require(name not in module.ports, f"{name} must be no port to be kept")
+            module.kept.add(name)
         self._named(name, kind)
         tokens.expect(";")
         self._line(2, declares=True)

@@ -85,6 +85,8 @@ class Module:
         What each register holds before the first clock; None if that is not said.
     depths : dict of str to int
         Number of words of each memory.
+    kept : set of str
+        Nets that stay through synthesis.
     unchecked : set of str
         Memories that may read anything at the clock at which that word is written.
     held : dict of str to dict of int to int
@@ -101,6 +103,7 @@ class Module:
     widths: dict[str, int] = field(default_factory=dict)
     registers: dict[str, int | None] = field(default_factory=dict)
     depths: dict[str, int] = field(default_factory=dict)
+    kept: set[str] = field(default_factory=set)
     unchecked: set[str] = field(default_factory=set)
     held: dict[str, dict[int, int]] = field(default_factory=dict)
     assigns: list[tuple[Expression, Expression]] = field(default_factory=list)
@@ -114,6 +117,7 @@ class Module:
             widths=dict(self.widths),
             registers=dict(self.registers),
             depths=dict(self.depths),
+            kept=set(self.kept),
             unchecked=set(self.unchecked),
             held={name: dict(words) for name, words in self.held.items()},
             assigns=list(self.assigns),

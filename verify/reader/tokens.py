@@ -32,6 +32,7 @@ _ATTRIBUTES = {
 is written may be anything: `Tokens.marks` says where it stands, and whoever follows the memory has to show that nobody
 looks at such a word."""
 UNCHECKED = "no_rw_check = 32'd1"
+KEPT = "keep = 32'd1"
 
 _TOKEN = re.compile(
     r"[A-Za-z_]\w*|\$signed|[1-9]\d*'h[0-9a-fx]+|[1-9]\d*'d\d+|[1-9]\d*'b[01x]+|\d+|<=|>=|==|!=|<<|>>|[-+*/&|^~!<>=?:;,.(){}\[\]@]"

@@ -37,6 +37,7 @@ from sosmith.verify.parallel.netlist import Netlist, flattened
 from sosmith.verify.program.normal_form import Form, constant, plus
 from sosmith.verify.program.text import ProgramText, read_program
 from sosmith.verify.progress import Progress
+from sosmith.verify.reader.inlined import inlined
 from sosmith.verify.reader.source import read_source
 from sosmith.verify.unit.contexts import Contexts
 from sosmith.verify.unit.control import DEST, FOLDED, SERIAL, Control, Event, Machine
@@ -82,9 +83,10 @@ def check_unit(text: str, certificate: Certificate, *, serial: bool, top: str | 
     RejectedError
         If it does anything else, or the text has anything that cannot be checked.
     """
-    modules = read_source(text, top or certificate.name).modules
+    name = top or certificate.name
+    modules = inlined(read_source(text, name), name).modules
     netlist = flattened(modules, CLOCK)
-    program = read_program(text, top or certificate.name)
+    program = read_program(text, name)
     stages = SERIAL if serial else FOLDED
     control = Control(netlist, program, stages, _existing(netlist, program.channels))
     split = [name for name in _SPLIT if name in netlist.drivers]

@@ -74,7 +74,8 @@ class Output:
             self._check_memory(self._worn)
 
     def _has(self, name: str) -> bool:
-        return name in self._netlist.widths
+        """Whether there is a register, whole or in parts: a net of this name may be what is left of one that is 0."""
+        return name in self._netlist.registers or name in self._netlist.fields.values()
 
     # Kinds.
 
@@ -139,8 +140,8 @@ class Output:
             forms = Forms()
             now = forms.variable(name, 0, (1 << width) - 1)
             held = {name: now, ADDED: _signed(forms, ADDED, self._program.accumulator_bits)}
-            others = (_RAIL, _OUTSIDE, _SETTLING)
-            held = {other: self._held(forms, other) for other in others if other != name} | held
+            others = [other for other in (_RAIL, _OUTSIDE, _SETTLING) if other != name and self._has(other)]
+            held = {other: self._held(forms, other) for other in others} | held
             logic = self._contexts.logic(forms, values, held, fields=self._fields(forms))
             found = self._contexts.after(name, logic, forms, now)
             right = same_word(forms, found, self._wanted(forms, name, kind, now, held[ADDED]), width)
@@ -238,10 +239,10 @@ class Output:
 
     def _flags(self, forms: Forms) -> dict[str, Form]:
         """Return what the registers hold that the flags of a result are in."""
-        own = {name: forms.variable(name, 0, 1) for name in (_RAIL, _OUTSIDE, _SETTLING)}
+        own = {name: forms.variable(name, 0, 1) for name in (_RAIL, _OUTSIDE, _SETTLING) if self._has(name)}
         if not self.copies:
             return own
-        bits = [forms.variable(name, 0, 1) if self._has(name) else {} for name in own]
+        bits = [self._held(forms, name) for name in (_RAIL, _OUTSIDE, _SETTLING)]
         width = self._netlist.widths[_JUDGED]
         total: Form = {}
         for place, bit in enumerate(bits[:width]):

@@ -19,6 +19,7 @@ from sosmith.verify.multirate.parallel_core import check_ahead, check_behind
 from sosmith.verify.parallel.check import HardwareVerdict, check_hardware
 from sosmith.verify.program.check import ProgramVerdict, check_program
 from sosmith.verify.reader.rtlil.check import check_rtlil
+from sosmith.verify.reader.rtlil.kept import check_kept
 from sosmith.verify.reader.source import read_source
 from sosmith.verify.specified.calibration_fit import Refit, check_fit
 from sosmith.verify.specified.stated_specification import Agreement, check_specification
@@ -181,6 +182,7 @@ def _files_proven(
     model = check_c_model(source, header, certificate, item)
     progress("RTLIL", 0, 0)
     rtlil = check_rtlil(ascii_text(il, contents[il]), modules)
+    check_kept(ascii_text(il, contents[il]), modules, asked=item.keep)
     return replace(proofs, unheld=tuple(manifest.open), model=model, rtlil=rtlil), decimator
 
 

@@ -16,7 +16,8 @@ from tests.gen.output.converter_board import SPEC
 import sosmith
 from sosmith.gen.architectures.registry import ARCHITECTURES
 from sosmith.gen.output.board_top import board_top
-from sosmith.gen.output.verilog import _MODULE, _with_plain_names, converted, to_rtlil, to_verilog
+from sosmith.gen.output.net_names import plain_names
+from sosmith.gen.output.verilog import converted, to_rtlil, to_verilog
 from sosmith.verify.graph import RejectedError
 from sosmith.verify.reader.source import read_modules
 
@@ -62,7 +63,7 @@ def test_names_need_no_escape_and_stay_apart(architecture: str, options: dict[st
     text = to_rtlil(design.component(), "top")
     assert not _NAMELESS.findall(text)
     escaped = converted(text)
-    plain = _MODULE.sub(_with_plain_names, escaped)
+    plain = to_verilog(text)
     assert "$" in "".join(re.findall(r"\\\S+", escaped))
     assert "\\" not in plain
     assert stay_apart(escaped, plain)
@@ -84,12 +85,12 @@ def test_signals_without_a_name_are_found() -> None:
 
 
 def test_a_made_up_name_gives_way() -> None:
-    text = "module top(a);\n  wire \\$1 ;\n  wire n1;\n  wire \\n$1 ;\n  assign \\$1  = n1 & \\n$1 [0];\nendmodule"
-    assert _MODULE.sub(_with_plain_names, text).splitlines()[1:-1] == [
-        "  wire n1_;",
+    text = "module top(a);\n  wire \\$1 ;\n  wire n1;\n  wire \\n$1 ;\n  assign { \\$1 , a } = n1 + \\n$1 ;\nendmodule"
+    assert plain_names(text).splitlines()[1:-1] == [
+        "  wire n1_2;",
         "  wire n1;",
         "  wire n_1;",
-        "  assign n1_ = n1 & n_1[0];",
+        "  assign { n1_2, a } = n1 + n_1;",
     ]
 
 

@@ -76,21 +76,21 @@ def test_sentences() -> None:
         check_rejected(CASES[0][0], text.replace(right, wrong), sentence)
 
     rejected(
-        "sum2 <= n38[11:0];",
+        "sum2 <= sum2_next[11:0];",
         "sum2 <= sum1;",
         "decimator.sum2 must be what a decimator has there after a clock with decimator.integrator1_control0 = 1, "
         "aresetn = 1, not another value",
     )
     rejected("reg waiting = 1'h0;", "reg waiting = 1'h1;", "decimator.waiting must be 0 before the first clock, not 1")
     rejected(
-        "assign i_ready = n2 & n4;",
-        "assign i_ready = n2;",
+        "assign i_ready = not_filling_3 & not_waiting_and_completes;",
+        "assign i_ready = not_filling_3;",
         "s_axis_tready must be what a decimator has there with decimator.filling = 0, decimator.phase = 0, "
         "decimator.waiting = 1, not another value",
     )
     rejected(
-        ".o_ready(o_ready),\n    .o_valid(o_valid)\n  );",
-        ".o_ready(s_axis_tvalid),\n    .o_valid(o_valid)\n  );",
+        ".o_ready(o_ready),\n    .o_valid(s_axis_tvalid_20)\n  );",
+        ".o_ready(s_axis_tvalid),\n    .o_valid(s_axis_tvalid_20)\n  );",
         "decimator.o_ready must be an output of the core",
     )
     narrow = text.replace("reg [11:0] sum1 = 12'h000;", "reg [10:0] sum1 = 11'h000;")
@@ -99,7 +99,7 @@ def test_sentences() -> None:
     wide = text.replace("reg [1:0] phase = 2'h0;", "reg [2:0] phase = 3'h0;").replace("= & phase;", "= & phase[1:0];")
     wide = re.sub(r"phase <= (n\d+)\[1:0\]", r"phase <= \1[2:0]", wide)
     check_rejected(CASES[0][0], wide, "decimator.phase must have 2 bits, not 3")
-    rejected("sum2 <= n38[11:0];", "sum2 <= sum3;", "sum3 must be declared in plain_decimator before it is used")
+    rejected("sum2 <= sum2_next[11:0];", "sum2 <= sum3;", "sum3 must be declared in plain_decimator before it is used")
     other = designed(CASES[0][0]._replace(hold=False))[1]
     with pytest.raises(RejectedError, match=r"^results must not be held, as specified$"):
         check_decimator(text, other)

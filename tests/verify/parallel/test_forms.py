@@ -111,7 +111,7 @@ def test_a_missing_extension_is_another_word() -> None:
         (r"8'h80", "8'hx0", r"the SystemVerilog must have a number with its width after .*, not \"8'hx0\""),
         (r"8'h80", "8'h180", r"the number 8'h180 must fit 8 bits"),
         (r"reg \[7:0\] x1", "reg signed [7:0] x1", r"the SystemVerilog must have a name after .*, not 'signed'"),
-        (r" x1 <= i0;", " x1[6:0] <= i0;", r"a process must load one register, not x1, x1\[6:0\]"),
+        (r" x1 <= x;", " x1[6:0] <= x;", r"a process must load one register, not x1, x1\[6:0\]"),
         (r"valid1 <= i_valid", "valid1 = i_valid", r"the SystemVerilog must have <= after .*, not '='"),
     ],
 )  # fmt: skip

@@ -64,7 +64,7 @@ def test_outputs_of_no_whole_bytes(bits: int, realization: str, lanes: int) -> N
 def test_a_port_narrower_than_a_limited_sum() -> None:
     """Each word of the buffer is loaded for itself, and one of them with zeros only."""
     core = small(STEADY_INSTRUMENT, lanes=2)
-    assert len(re.findall(r"reg \[\d+:0\] slice\d+", core.text)) > 1
+    assert len(re.findall(r"reg \[\d+:0\] o_(?:data|next)_(?:parts|\d+_\d+)\w*", core.text)) > 1
     accept(core)
 
 
@@ -120,8 +120,8 @@ def test_the_number_of_lanes_is_held_against_the_ports() -> None:
 
 WIDE_BREAKS = {
     "a sign of another bit": (
-        r"(o_next <= .*)port_(\d+)_0\[11\], port_\2_0\[11\], port_\2_0 ",
-        r"\1port_\2_0[11], port_\2_0[10], port_\2_0 ",
+        r"(o_next <= .*)(output_stage_code_\d)\[11\], \2\[11\], \2 ",
+        r"\1\2[11], \2[10], \2 ",
         rf"(sample \d of m_axis_tdata must be {NODE}output_stage in lane \d, not another value"
         r"|\S*o_data\S* must take over the same from the pipeline and from the second place)",
     ),
@@ -142,12 +142,12 @@ WIDE_BREAKS = {
         r"status\d+\[0\] must .*",
     ),
     "a stale beat in one lane": (
-        r"if \(n2\) o_data <= choice(\d+);",
-        r"if (n2) o_data <= { choice\1[37:16], o_data[15:0] };",
+        r"if \(o_valid_load\) o_data <= o_data_next;",
+        r"if (o_valid_load) o_data <= { o_data_next[37:16], o_data[15:0] };",
         r"output_buffer\.o_data\S* must .*",
     ),
     "lanes swapped in the second place": (
-        r"(o_next <= \{.*), (port_\d+_0\[11\].*), (port_\d+_0\[11\].*) \};",
+        r"(o_next <= \{.*), (output_stage_code_1\[11\].*), (output_stage_code_0\[11\].*) \};",
         r"\1, \3, \2 };",
         r"output_buffer\.o_data\S* must take over the same from the pipeline and from the second place",
     ),
@@ -165,9 +165,11 @@ def test_each_kind_of_break_between_bytes_is_named(kind: str) -> None:
 
 def test_a_second_sample_moves_whether_another_one_comes_or_not() -> None:
     core = small(with_output(12), lanes=2)
-    same = re.sub(r"if \(n2\) (o_data <= choice\d+;)", r"if (n2) if (i_valid) \1 else \1", core.text)
+    same = re.sub(
+        r"if \(o_valid_load\) (o_data <= o_data_next;)", r"if (o_valid_load) if (i_valid) \1 else \1", core.text
+    )
     assert rejection(core, same) == ""
-    waits = re.sub(r"if \(n2\) (o_data <= choice\d+;)", r"if (n2) if (i_valid) \1", core.text)
+    waits = re.sub(r"if \(o_valid_load\) (o_data <= o_data_next;)", r"if (o_valid_load) if (i_valid) \1", core.text)
     sentence = r"output_buffer\.o_data\S* must take over the second sample when the first leaves"
     assert re.fullmatch(sentence, rejection(core, waits)), rejection(core, waits)
 

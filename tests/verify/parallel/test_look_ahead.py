@@ -36,17 +36,17 @@ def test_starts_and_a_calibration(spec: str, lanes: int) -> None:
 
 BREAKS = {
     "a turn too long": (
-        r"(choice\d+ = n\d+ \? 2'h)0 :",
+        r"(turn_next = turn_is_3 \? 2'h)0 :",
         r"\g<1>1 :",
         r"section0\.turn must be 0 after a clock with aresetn = 1, section0\.turn = 3, .*",
     ),
     "a turn too short": (
-        r"(assign n\d+ = turn == 2'h)3",
+        r"(assign turn_is_3 = turn == 2'h)3",
         r"\g<1>2",
         r"section0\.turn must be 3 after a clock with aresetn = 1, section0\.turn = 2, .*",
     ),
     "never warm": (
-        r"(else if \(enable\d+\) warm <= 1'h)1",
+        r"(else if \(warm_set\) warm <= 1'h)1",
         r"\g<1>0",
         r"section0\.warm must be 1 after a clock with aresetn = 1, section0\.turn = 3, .*",
     ),
@@ -61,7 +61,7 @@ BREAKS = {
         r"section0\.turn must not depend on data whether something is loaded",
     ),
     "a turn that counts clocks": (
-        r"else if \(n5\) turn",
+        r"else if \(turn_load\) turn",
         "else if (advance) turn",
         r"section0\.turn must be loaded by one valid bit, not by none",
     ),
@@ -77,25 +77,25 @@ BREAKS = {
         "not of 2",
     ),
     "a word of another turn": (
-        r"(_0_ <= y_4_memory\[)signature__addr_\]",
+        r"(y_4_memory_read <= y_4_memory\[)turn5\]",
         r"\1turn4]",
         rf"section0\.y_register must be {NODE}section0, but section0\.y_register must take over a word of one sample, "
         "not of 2",
     ),
     "written a turn early": (
         r"y_4_memory\[turn6\] <=",
-        "y_4_memory[signature__addr_] <=",
+        "y_4_memory[turn5] <=",
         rf"section0\.y_4_memory must hold {NODE}section0 and be written for the turn of the sample",
     ),
     "another word written": (
-        r"(y_4_memory\[turn6\] <= subtract_\d+)\[23:11\]",
+        r"(y_4_memory\[turn6\] <= v)\[23:11\]",
         r"\1[22:10]",
         rf"section0\.y_4_memory must hold {NODE}section0 and take over {NODE}section0 of 0 samples ago, not another "
         "value",
     ),
     "written while the pipeline stands": (
-        r"assign write__en = advance & valid6",
-        "assign write__en = valid6",
+        r"assign y_4_memory_write_enable = advance & valid6",
+        "assign y_4_memory_write_enable = valid6",
         rf"section0\.y_4_memory must hold {NODE}section0, which stays while no sample leaves position 6",
     ),
     "too few words": (

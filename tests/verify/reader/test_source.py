@@ -31,7 +31,8 @@ def test_what_is_read_is_printed_as_it_was_written(kind: str) -> None:
 
 
 LAST = "endmodule\n"
-WIRE = "  wire n1;\n"
+NET = "not_s_axis_tdata_15"
+WIRE = f"  wire {NET};\n"
 ANOTHER = "module other(a);\n  input a;\nendmodule\n"
 
 
@@ -56,7 +57,7 @@ def forged(edit: str) -> tuple[str, str]:
             re.sub(r"^(  reg .*)$", "  (* keep = 32'd1 *)\n\\1", text, count=1, flags=re.MULTILINE),
             r"line \d+ must be an attribute that changes no value, not .*",
         ),
-        "a carriage return": (text.replace(WIRE, f"  // a\r  assign n1 = 1'h0;\n{WIRE}"), r".* printable ASCII .*"),
+        "a carriage return": (text.replace(WIRE, f"  // a\r  assign {NET} = 1'h0;\n{WIRE}"), r".* printable ASCII .*"),
         "a tab": (text.replace(WIRE, f"\t{WIRE}"), r".* printable ASCII .*"),
         "a no-break space": (text.replace(WIRE, f"\xa0{WIRE}"), r".* printable ASCII .*"),
         "translate_off": (text.replace(WIRE, f"  // synopsys translate_off\n{WIRE}"), r"line \d+ must be a comment .*"),
@@ -64,13 +65,16 @@ def forged(edit: str) -> tuple[str, str]:
         "verilator": (text.replace(WIRE, f"  // verilator lint_off WIDTH\n{WIRE}"), r"line \d+ must be a comment .*"),
         "a pragma": (text.replace(WIRE, f"  // pragma protect begin\n{WIRE}"), r"line \d+ must be a comment .*"),
         "a line that goes on": (text.replace(WIRE, f"  // a \\\n{WIRE}"), r"line \d+ must be a comment .*"),
-        "a comment behind words": (text.replace(WIRE, "  wire n1; // a\n"), r".* plain subset, not have '// a'"),
+        "a comment behind words": (text.replace(WIRE, f"  wire {NET}; // a\n"), r".* plain subset, not have '// a'"),
         "a comment over lines": (text.replace(WIRE, f"/*\n*/\n{WIRE}"), r".* plain subset, not have '/\*'"),
         "a directive": (text[:first] + "`define n1 n2\n" + text[first:], r".* plain subset, not have .*"),
         "an escaped name": (text.replace(WIRE, "  wire \\n1 ;\n"), r".* plain subset, not have .*"),
         "the name of an x": (text.replace(WIRE, f"  wire \\?0 ;\n{WIRE}"), r".* plain subset, not have .*"),
-        "a net twice": (text.replace(WIRE, f"{WIRE}{WIRE}"), r"n1 must be declared once .*"),
-        "a net and a register": (text.replace(WIRE, f"{WIRE}  reg n1 = 1'h0;\n"), r"n1 must be declared once .*"),
+        "a net twice": (text.replace(WIRE, f"{WIRE}{WIRE}"), rf"{NET} must be declared once .*"),
+        "a net and a register": (
+            text.replace(WIRE, f"{WIRE}  reg {NET} = 1'h0;\n"),
+            rf"{NET} must be declared once .*",
+        ),
         "a word of the language": (text.replace(WIRE, f"  wire logic;\n{WIRE}"), r".* must have a name after .*"),
         "two drivers": (
             text.replace(LAST, f"  assign rst = 1'h0;\n{LAST}", 1),

@@ -50,8 +50,8 @@ def test_every_realization(spec: str, realization: str, architecture: str, chann
 
 FOLDED_BREAKS = {
     "a narrower adder": (
-        r"assign \{ n23\[32:27\], added \} = \$signed\((.*)\) \+ \$signed\(product\);",
-        r"assign { n23[32:27], added } = $signed(\1) + $signed(product[24:0]);",
+        r"assign \{ added_wide\[32:27\], added \} = \$signed\((.*)\) \+ \$signed\(product\);",
+        r"assign { added_wide[32:27], added } = $signed(\1) + $signed(product[24:0]);",
         "added must be the sum before and the product, not another value",
     ),
     "no sign of the product": (
@@ -70,43 +70,43 @@ FOLDED_BREAKS = {
         "added must be the sum before and the product, not another value",
     ),
     "a write that is missing": (
-        r"assign n52 = n45 \| n51;",
-        r"assign n52 = n51;",
+        r"assign moves_or_stores = moves \| stores;",
+        r"assign moves_or_stores = stores;",
         "words0 must be written 1 times at instruction 4",
     ),
     "a write at one clock too many": (
-        r"assign n51 = valid5 & n50;",
-        r"assign n51 = n50;",
+        r"assign stores = valid5 & instruction5_stores;",
+        r"assign stores = instruction5_stores;",
         "valid1 must be 0 while words are cleared",
     ),
     "a write at one place of the program": (
-        r"assign n51 = valid5 & n50;",
-        r"assign n51 = counter[3] & n33;",
+        r"assign stores = valid5 & instruction5_stores;",
+        r"assign stores = valid5 & instruction5_finishes;",
         r"words0 must be written \d times at instruction \d+",
     ),
     "another word": (
-        r"(assign writer__addr = n27 \? instruction4)\[11:8\]",
+        r"(assign instruction4_target = instruction4)\[11:8\]",
         r"\1[7:4]",
         r"words0 must be written at \d+ at instruction \d+, not \d+",
     ),
     "another word read": (
-        r"words0\[instruction2\[7:4\]\];",
-        r"words0[instruction3[7:4]];",
+        r"assign instruction2_address = instruction2\[7:4\];",
+        r"assign instruction2_address = instruction3[7:4];",
         r"words0 must be read at \d+ at instruction \d+, not \d+",
     ),
     "a counter that skips": (
-        r"assign n71 = counter \+ 1'h1;",
-        r"assign n71 = counter + 2'h2;",
-        r"fetch__data must be .*|_0_ must be instruction 1 .* at instruction 2",
+        r"assign counter_plus_1_2 = counter \+ 1'h1;",
+        r"assign counter_plus_1_2 = counter + 2'h2;",
+        r"instructions_read_data must be .*|instructions_read must be instruction 1 .* at instruction 2",
     ),
     "a counter that begins elsewhere": (
-        r"(assign choice67 = counter\[4\] \? )5'h00",
+        r"(assign counter_\w+ = counter\[4\] \? )5'h00",
         r"\g<1>5'h01",
-        r"_0_ must be instruction 0 .* at instruction 1",
+        r"instructions_read must be instruction 0 .* at instruction 1",
     ),
     "a program that is too short": (
-        r"assign n7(\d) = counter == 5'h19;",
-        r"assign n7\1 = counter == 5'h18;",
+        r"assign is_last_instruction = counter == 5'h19;",
+        r"assign is_last_instruction = counter == 5'h18;",
         r"the unit must not wait at instruction 25 while something is added up|.*instruction 25.*",
     ),
     "a limit": (
@@ -115,13 +115,13 @@ FOLDED_BREAKS = {
         "m_axis_tdata must be the result, not another value",
     ),
     "a limit at another bit": (
-        r"assign n58 = \| given0\[8:7\];",
-        r"assign n58 = | given0[8:6];",
+        r"assign any_given0_8_7 = \| given0\[8:7\];",
+        r"assign any_given0_8_7 = | given0[8:6];",
         "m_axis_tdata must be the result, not another value",
     ),
     "a flag of the limit": (
-        r"assign n66 = \| given0\[8:7\];",
-        r"assign n66 = | given0[8:6];",
+        r"assign output_saturated = below \| above;",
+        r"assign output_saturated = above;",
         "bit 2 of m_axis_tuser must be output_saturated, not another value",
     ),
     "a rail": (
@@ -130,27 +130,27 @@ FOLDED_BREAKS = {
         "rail must be inputs after a clock, not another value",
     ),
     "a rail of another sample": (
-        r"if \(s_axis_tready\) rail <=",
-        r"if (start) rail <=",
-        "rail must be keep after a clock, not another value",
+        r"if \(taken\) rail <=",
+        r"if (valid5) rail <=",
+        r"rail must be (?:keep|inputs) after a clock, not another value",
     ),
     "a flag that is not kept": (
-        r"if \(n121\) judged <= \{ 1'h0, rail \};",
+        r"if \(ends\) judged <= \{ 1'h0, rail \};",
         r"judged <= { 1'h0, rail };",
         "judged must be keep after a clock, not another value",
     ),
     "a stall that goes on": (
-        r"assign n8 = ~ n7;",
-        r"assign n8 = 1'h1;",
+        r"assign not_waits_for_sink = ~ waits_for_sink;",
+        r"assign not_waits_for_sink = 1'h1;",
         r"a result must not be overwritten at instruction \d+ before it leaves",
     ),
     "a result that does not wait": (
-        r"assign n108 = m_axis_tvalid & m_axis_tready;",
-        r"assign n108 = m_axis_tvalid;",
+        r"assign leaves = m_axis_tvalid & m_axis_tready;",
+        r"assign leaves = m_axis_tvalid;",
         r"m_axis_tvalid must be 1 at instruction \d+",
     ),
     "a result that is not kept": (
-        r"if \(n101\) given0 <= added\[9:0\];",
+        r"if \(given0_load\) given0 <= added\[9:0\];",
         r"if (valid5) given0 <= added[9:0];",
         "given0 must be keep after a clock, not another value",
     ),
@@ -160,52 +160,52 @@ FOLDED_BREAKS = {
         "given0 must be added after a clock, not another value",
     ),
     "a sample accepted early": (
-        r"s_axis_tready <= n128;",
-        r"s_axis_tready <= start;",
+        r"else taken <= taken_next;",
+        r"else taken <= start;",
         r"a sample must not be accepted before its digits are taken, as it is at instruction \d+",
     ),
     "a sample never taken": (
-        r"assign start = s_axis_tvalid & n2;",
+        r"assign start = s_axis_tvalid & not_busy_or_clearing;",
         r"assign start = 1'h0;",
         "a sample must be taken and its result leave within some number of clocks",
     ),
     "a sample never accepted": (
-        r"s_axis_tready <= n128;",
-        r"s_axis_tready <= 1'h0;",
+        r"else taken <= taken_next;",
+        r"else taken <= 1'h0;",
         r"a sample must be begun at instruction 0 only if there is one that has not been begun",
     ),
     "a start without a sample": (
-        r"assign start = s_axis_tvalid & n2;",
-        r"assign start = n2;",
+        r"assign start = s_axis_tvalid & not_busy_or_clearing;",
+        r"assign start = not_busy_or_clearing;",
         r"a sample must be begun at instruction 0 only if there is one that has not been begun",
     ),
     "words that are not cleared": (
-        r"(assign choice67 = counter)\[4\]",
+        r"(assign counter_\w+ = counter)\[4\](?= \?)",
         r"\1[3]",
         r"words0\[\d+\] must be \d after a reset, not None",
     ),
     "a word that is not 1": (
-        r"assign n40 = & instruction5\[11:8\];",
-        r"assign n40 = & instruction5[11:9];",
+        r"assign all_instruction5_target = & instruction5_target;",
+        r"assign all_instruction5_target = & instruction5_target[3:1];",
         r"words0\[14\] must be 0 after a reset, not 1",
     ),
     "a valid bit without its reset": (
-        r"if \(!aresetn\) valid3 <= 1'h0;\n *else valid3 <= valid2;",
+        r"if \(rst\) valid3 <= 1'h0;\n *else valid3 <= valid2;",
         r"valid3 <= valid2;",
         r"valid3 must be 0 while words are cleared",
     ),
     "an operand that is not kept": (
-        r"if \(n86\) operand <= read;",
+        r"if \(\w+\) operand <= read;",
         r"operand <= read;",
         "operand must be keep after a clock, not another value",
     ),
     "a word beside the one read": (
-        r"assign read = _1_;",
-        r"assign read = { _1_[15:1], _1_[1] };",
+        r"assign read = words0_read;",
+        r"assign read = { words0_read[15:1], words0_read[1] };",
         "read must be the word read, not another value",
     ),
     "a digit moved": (
-        r"(assign n96 = n94 \? \{ .*)s_axis_tdata( \})",
+        r"(assign \w+ = instruction3_is_take \? \{ .*)s_axis_tdata( \})",
         r"\g<1>s_axis_tdata[6:0], s_axis_tdata[7]\2",
         r"instruction 0 \(take, .*\) must take a digit of an input, not bits of several",
     ),
@@ -213,43 +213,43 @@ FOLDED_BREAKS = {
 
 SERIAL_BREAKS = {
     "an end too early": (
-        r"assign n20 = \| left\[15:1\];",
-        r"assign n20 = | left[15:2];",
+        r"assign any_left_15_1 = \| left\[15:1\];",
+        r"assign any_left_15_1 = | left[15:2];",
         "done must be 0 while there are digits left",
     ),
     "no end at a sign": (
-        r"assign done = n19 \| n21;",
-        r"assign done = n21;",
+        r"assign done = left_is_65535 \| not_any_left_15_1;",
+        r"assign done = not_any_left_15_1;",
         "done must be 1 while nothing but a sign is left",
     ),
     "no subtraction": (
-        r"\} = n23 \? n25 : n27;",
-        r"} = n27;",
+        r"\} = left_is_65535_2 \? (\w+) : (\w+);",
+        r"} = \2;",
         "added must be the sum before and the product, not another value",
     ),
     "no shift": (
-        r"(assign n147 = advance \? .* : )\{ shifted\[30:0\], 1'h0 \};",
+        r"(assign \w+ = advance \? .* : )\{ shifted\[30:0\], 1'h0 \};",
         r"\1shifted;",
         "shifted must be shift after a clock, not another value",
     ),
     "a sign lost": (
-        r"(assign n148 = advance \? chosen : )\{ left\[15\], left\[15:1\] \};",
+        r"(assign \w+ = advance \? chosen : )\{ left\[15\], left\[15:1\] \};",
         r"\1{ left[15], 1'h0, left[14:1] };",
         "left must be shift after a clock, not another value",
     ),
     "a stage that does not wait": (
-        r"if \(advance\) instruction2 <= fetch__data;",
-        r"instruction2 <= fetch__data;",
+        r"if \(advance\) instruction2 <= instructions_read_data;",
+        r"instruction2 <= instructions_read_data;",
         r"instruction2 must be instruction \d+ .* at instruction \d+",
     ),
     "a word that does not wait": (
-        r"if \(advance\) begin\n( *_1_ <= words0.*)\n *end",
-        r"if (valid1) begin\n\1\n    end",
+        r"if \(advance\) begin\n( *words0_read <= words0.*)\n *end",
+        r"if (valid2) begin\n\1\n    end",
         r"words0 must be read just when the pipeline moves, at instruction \d+",
     ),
     "a result in the middle": (
-        r"if \(n114\) given0",
-        r"if (n112) given0",
+        r"if \(given0_load\) given0",
+        r"if (valid3) given0",
         "given0 must be keep after a clock, not another value",
     ),
 }
@@ -280,18 +280,18 @@ FLAG_BREAKS = {
     ),
     "limits of another channel": (
         r"wear_limits\[channel\]",
-        "wear_limits[s_axis_tdest[1:0]]",
+        "wear_limits[limited[1:0]]",
         "wear_limits must be read .*",
     ),
-    "wear that is above its limit": (r"(assign m_axis_tuser\[3\] = .*) >= ", r"\1 > ", "bit 3 of m_axis_tuser must .*"),
-    "no wear": (r"(assign m_axis_tuser\[4\] = ).*;", r"\g<1>1'h0;", "bit 4 of m_axis_tuser must be wear_critical, .*"),
+    "wear that is above its limit": (r"(assign reached_warning = .*) >= ", r"\1 > ", "bit 3 of m_axis_tuser must .*"),
+    "no wear": (r"(assign reached_limit = ).*;", r"\g<1>1'h0;", "bit 4 of m_axis_tuser must be wear_critical, .*"),
     "another channel": (
         r"(assign m_axis_tdest = )\{ 6'h00, channel \};",
         r"\1s_axis_tdest;",
         "m_axis_tdest must be .*",
     ),
     "a channel that does not stay": (
-        r"else if \(enable\d+\) channel <=",
+        r"else if \(channel_load\) channel <=",
         "else channel <=",
         "bits of x must not be used",
     ),
@@ -300,7 +300,7 @@ FLAG_BREAKS = {
         "start ? s_axis_tdest[2:1]",
         "channel must be that of .*",
     ),
-    "words of another channel": (r"words0\[\{ channel, ", "words0[{ s_axis_tdest[1:0], ", "words0 must be used for .*"),
+    "words of another channel": (r"words0\[\{ channel, ", "words0[{ s_axis_tdata[1:0], ", "words0 must be used for .*"),
     "a channel too many": (
         r"s_axis_tdest < 2'h3",
         "s_axis_tdest <= 2'h3",
@@ -318,11 +318,11 @@ def test_a_flag_that_the_program_judges_is_that_of_its_sample() -> None:
     """It is followed through all states: taken over a clock early, it would be that of the sample before."""
     core = unit(PLAIN)
     text, count = re.subn(
-        r"if \(n\d+\) judged <= \{ settling, ", "if (m_axis_tvalid) judged <= { settling, ", core.text
+        r"if \(ends\) judged <= \{ settling, ", "if (m_axis_tvalid) judged <= { settling, ", core.text
     )
     assert count == 1
     assert core.rejection(text) == "judged must be copy after a clock, not another value"
-    text, count = re.subn(r"(if \(n\d+\)) settling <= added\[\d+\];", r"\1 settling <= added[3];", core.text)
+    text, count = re.subn(r"(if \(\w+\)) settling <= added\[\d+\];", r"\1 settling <= added[3];", core.text)
     assert count == 1
     assert core.rejection(text) == "settling must be judge after a clock, not another value"
 

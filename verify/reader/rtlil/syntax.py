@@ -35,11 +35,12 @@ _WIDEST = 1 << 16
 
 
 class Wire(NamedTuple):
-    """A net: its width, its direction if it is a port, and what it holds before the first clock if that is said."""
+    """A net: its width, its direction if it is a port, what it holds before the first clock, and whether it is kept."""
 
     width: int
     direction: str
     first: str | None
+    kept: bool = False
 
 
 @dataclass
@@ -152,7 +153,7 @@ class _Reader:
         if kind == "wire":
             name, width = _plain(match[3]), int(match[1])
             require(name not in module.wires and width <= _WIDEST, f"{name} of the RTLIL must be a net once")
-            module.wires[name] = Wire(width, match[2] or "", said.get("init"))
+            module.wires[name] = Wire(width, match[2] or "", said.get("init"), "keep" in said)
         elif kind == "memory":
             name = _plain(match[3])
             require(name not in module.memories, f"{name} of the RTLIL must be a memory once")
