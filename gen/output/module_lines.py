@@ -10,8 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from sosmith.gen.architectures.shared_unit import SharedUnit
 from sosmith.gen.core import CoreDesign
-from sosmith.model.dataflow.program import Location, Program
+from sosmith.model.dataflow.program import Location
 
 _SHELL = {
     "output_buffer": ("output_buffer: two results for a sink that waits; advance says that there is room.",),
@@ -24,19 +25,19 @@ _SHELL = {
 
 def module_lines(design: CoreDesign) -> Mapping[str, Sequence[str]]:
     """Return the lines for each module, by its name without those of the core and of what is behind a decimator."""
-    program = design.architecture.program
-    return _SHELL if program is None else _SHELL | _unit_lines(program, design)
+    unit = design.architecture
+    return _SHELL | _unit_lines(unit, design) if isinstance(unit, SharedUnit) else _SHELL
 
 
-def _unit_lines(program: Program, design: CoreDesign) -> dict[str, Sequence[str]]:
+def _unit_lines(unit: SharedUnit, design: CoreDesign) -> dict[str, Sequence[str]]:
     """Return the lines for the modules of a unit that runs a program."""
+    program, serial, channels = unit.program, unit.bit_serial, design.spec.channels
     count, word, digit, total = (
         len(program.instructions),
         program.digit_bits + 1,
         program.digit_bits,
         program.accumulator_bits,
     )
-    serial, channels = design.architecture.name == "serial", design.spec.channels
     last = 3 if serial else 5
     each = f" for each of {channels} channels" if channels > 1 else ""
     return {

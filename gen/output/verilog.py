@@ -13,8 +13,8 @@ from sosmith.gen.core import CoreDesign
 from sosmith.gen.output.amaranth_yosys import run_script
 from sosmith.gen.output.core_facts import core_facts
 from sosmith.gen.output.header import with_comments
-from sosmith.gen.output.net_names import plain_names
-from sosmith.gen.output.rtlil_names import with_kept_names, with_named_ports, without_second_names
+from sosmith.gen.output.naming.net_names import plain_names
+from sosmith.gen.output.naming.rtlil_names import with_kept_names, with_named_ports, without_second_names
 from sosmith.model.errors import ToolError
 
 # `proc` without `-nomux` leaves no combinational processes, which Icarus would not evaluate at time 0.

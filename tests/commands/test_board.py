@@ -116,3 +116,14 @@ def test_kinds_of_damage_that_do_not_exist(tmp_path: Path) -> None:
     (tmp_path / "spec.toml").write_text(FILTER, encoding="utf-8")
     expected = "a fault must be one of flip, drop, insert, not lose"
     BOARD.refused(expected, str(tmp_path / "spec.toml"), "--virtual", "--fault", "9", "--fault-kinds", "lose")
+
+
+def test_what_plays_nothing_is_refused(tmp_path: Path) -> None:
+    spec = tmp_path / "spec.toml"
+    spec.write_text(CONVERTED, encoding="utf-8")
+    heard = str(tmp_path / "heard.wav")
+    BOARD.refused("--heard must come with a table [converter.output] in SPEC", str(spec), "--virtual", "--heard", heard)
+    BOARD.refused(
+        "--clock must be left out with --board, which has its own",
+        *(str(spec), "--virtual", "--board", "ulx3s-25f", "--clock", "1e6"),
+    )

@@ -64,3 +64,15 @@ def test_the_pins_of_a_pmod_are_in_its_order() -> None:
     pmod = Wiring(selects=13, audio=True, lines_in=1, lines_out=1)
     spi = pmod.spi_pins(BOARDS["icebreaker"])["cs_n"]
     assert not set(spi) & {pin for pins in pmod.audio_pins(BOARDS["icebreaker"]).values() for pin in pins}
+
+
+def test_dacs_have_what_is_left_of_a_header() -> None:
+    wiring = Wiring(selects=2, audio=True, lines_in=1, dac_selects=1)
+    board = BOARDS["icebreaker"]
+    others = wiring.audio_pins(board) | wiring.spi_pins(board)
+    taken = {pin for pins in others.values() for pin in pins}
+    dacs = wiring.dac_pins(board)
+    assert dacs == {"dac_sck": ("18",), "dac_mosi": ("20",), "dac_cs_n": ("23",)}
+    assert not taken & {pin for pins in dacs.values() for pin in pins}
+    with pytest.raises(SpecificationError, match=r"^DACs must be at most 6 on the Tang Nano 9K, not 10$"):
+        Wiring(selects=1, dac_selects=10).dac_pins(BOARDS["tang_nano_9k"])

@@ -16,7 +16,7 @@ from tests.gen.output.converter_board import SPEC
 import sosmith
 from sosmith.gen.architectures.registry import ARCHITECTURES
 from sosmith.gen.output.board_top import board_top
-from sosmith.gen.output.net_names import plain_names
+from sosmith.gen.output.naming.net_names import plain_names
 from sosmith.gen.output.verilog import converted, to_rtlil, to_verilog
 from sosmith.verify.graph import RejectedError
 from sosmith.verify.reader.source import read_modules

@@ -111,10 +111,10 @@ def test_what_does_something_else_is_refused(old: str, new: Any, what: str, text
         (r"connect \\EN 1'1", r"connect \\EN 1'0"),
         (rf"{DATA}0", r"\g<1>1"),
         (r"connect \\EN \{ \S+", r"connect \\EN { \\busy"),
-        (r"(connect \\EN \{ \\writer__en \[0\].*)", r"connect \\EN 16'1111111111111111"),
+        (r"(connect \\EN \{ \\words0_write_enable \[0\].*)", r"connect \\EN 16'1111111111111111"),
         (r"attribute \\no_rw_check 1\n", ""),
         (r"memory width (\d+) size (\d+)", r"memory width \1 size 9\2"),
-        (r"connect \\ADDR \\writer__addr", r"connect \\ADDR \\reader__addr"),
+        (r"connect \\ADDR \\words0_write_address", r"connect \\ADDR \\instruction2_address"),
     ],
 )  # fmt: skip
 def test_other_memories_are_refused(old: str, new: str, texts: Callable[[str], Texts]) -> None:
@@ -164,10 +164,11 @@ def test_sentences(texts: Callable[[str], Texts]) -> None:
     ):
         folded.check(folded.rtlil + "module \\other\nend\n")
     changed = re.sub(rf"{DATA}0", r"\g<1>1", folded.rtlil, count=1)
-    sentence = r"^the memory \w+ of plain must be the same in the RTLIL as in the SystemVerilog$"
+    sentence = r"^the memory \w+ of plain_\w+ must be the same in the RTLIL as in the SystemVerilog$"
     with pytest.raises(RejectedError, match=sentence):
         folded.check(changed)
-    assert set(read_rtlil(folded.rtlil)) == {"plain"}
+    parts = ("sequencer", "program_memory", "word_memory", "multiply_accumulate", "result")
+    assert set(read_rtlil(folded.rtlil)) == {"plain", *(f"plain_{part}" for part in parts)}
 
 
 @pytest.mark.parametrize(

@@ -33,10 +33,8 @@ _WIRE = re.compile(
 _DRIVEN = re.compile(
     r"^connect \\(?P<port>port\$\d+\$\d+) \\(?P<net>\S+) \[(?P<high>\d+)(?::(?P<low>\d+))?\]$", re.MULTILINE
 )
-_INSIDE = re.compile(
-    r"^    connect \\(?P<net>\S+) (?P<wire>\$\d+ \[[\d:]+\])$(?=.*^connect \\(?P<port>port\$\d+\$\d+) (?P=wire)$)",
-    re.MULTILINE | re.DOTALL,
-)
+_OUT = re.compile(r"^connect \\(?P<port>port\$\d+\$\d+) (?P<wire>\$\d+ \[[\d:]+\])$", re.MULTILINE)
+_INSIDE = re.compile(r"^    connect \\(?P<net>\S+) (?P<wire>\$\d+ \[[\d:]+\])$", re.MULTILINE)
 _PLAIN = re.compile(
     r"^(?P<said>  attribute .*\n)?(?P<wire>  wire width [1-9]\d* (?:signed )?\\[A-Za-z_]\w*\n)", re.MULTILINE
 )
@@ -89,11 +87,10 @@ def with_named_ports(text: str) -> str:
             if inside not in modules:
                 continue
             taken = {wire["name"] for wire in _WIRE.finditer(modules[inside])}
-            ends = (_PORT.finditer(cell["ports"]), _DRIVEN.finditer(modules[inside]), _INSIDE.finditer(modules[inside]))
-            names: dict[str, str] = {}
-            for k, found in enumerate(ends):
-                new = _named(found, {} if k else widths, taken)
-                names = new | names
+            names = _named(_PORT.finditer(cell["ports"]), widths, taken)
+            names = _named(_DRIVEN.finditer(modules[inside]), {}, taken) | names
+            if "\\port$" in modules[inside]:
+                names = _passed_on(modules[inside], taken) | names
             if names:
                 renamed = partial(_renamed, names)
                 modules[inside] = re.sub(r"(?<=\\)\S+", renamed, modules[inside])
@@ -122,11 +119,22 @@ def _named(ports: Iterator[re.Match[str]], widths: dict[str, int], taken: set[st
     """Return names for ports that have none; a port of some bits of a net has their numbers in its name."""
     names: dict[str, str] = {}
     for port in ports:
-        name, bits = port["net"], port.groupdict()
-        high, low = bits.get("high"), bits.get("low")
-        if high is not None and int(high) - int(low or high) + 1 != widths.get(name):
+        name, high, low = port["net"], port["high"], port["low"]
+        if int(high) - int(low or high) + 1 != widths.get(name):
             name = "_".join(filter(None, (name, high, low)))
         if "$" not in name and name not in taken and port["port"] not in names:
+            taken.add(name)
+            names[port["port"]] = name
+    return names
+
+
+def _passed_on(module: str, taken: set[str]) -> dict[str, str]:
+    """Return names for ports that are those of modules inside, which no net with a name lies between."""
+    inside = {found["wire"]: found["net"] for found in _INSIDE.finditer(module)}
+    names: dict[str, str] = {}
+    for port in _OUT.finditer(module):
+        name = inside.get(port["wire"], "$")
+        if "$" not in name and name not in taken:
             taken.add(name)
             names[port["port"]] = name
     return names

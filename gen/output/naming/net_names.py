@@ -33,7 +33,10 @@ _ASSIGN = re.compile(r"^  assign (?P<target>.*?) = (?P<value>.*);$", re.MULTILIN
 _LOAD = re.compile(
     rf"if \(!?(?P<condition>{_NET})\)\s+(?:if \(.*\)\s+)*(?P<register>{_NET})[^\n]*? <= (?P<value>[^\n]*);"
 )
-_VALUE = re.compile(rf"(?P<register>{_NET}) ?(?:\[[\d:]+\])? <= (?P<value>{_NET})(?:\[[\d:]+\])?;")
+_VALUE = re.compile(
+    rf"^ +(?:(?:else |if \(.*?\) )+)?(?P<register>{_NET}) ?(?:\[[\d:]+\])? <= (?P<value>{_NET})(?:\[[\d:]+\])?;",
+    re.MULTILINE,
+)
 _PORT = re.compile(rf"^    \.(?P<port>\w+)\((?P<net>{_NET})\)", re.MULTILINE)
 _NUMBER = re.compile(r"\d+'(?P<base>[hdb])(?P<digits>[0-9a-f]+)")
 _UNARY = {"~": "not", "!": "not", "&": "all", "|": "any", "^": "odd"}

@@ -1,0 +1,1 @@
+"""Names of nets, ports and modules in the texts of a core."""
