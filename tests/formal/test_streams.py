@@ -167,7 +167,7 @@ def test_a_broken_core_is_found_out(right: str, wrong: str, tmp_path: Path) -> N
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [
-        ("self.s_axis_tready.eq(taken | dropped)", "self.s_axis_tready.eq(1)"),  # taken while at work
+        ("self.s_axis_tready.eq(taken | control.dropped)", "self.s_axis_tready.eq(1)"),  # taken while at work
         ("busy.eq(1)", "busy.eq(0)"),  # the next one begun before the result is taken
         ("else ~pipeline[-2].valid", "else 1"),  # handed out before it is complete
     ],

@@ -252,7 +252,7 @@ def test_a_first_sample_that_is_not_held_is_rejected() -> None:
     edits = {
         "started <= 1'h1": "started <= 1'h0",
         "if (rst) first <= 8'h00": "if (0) first <= 8'h00",
-        "held_passed1 <= i1": "held_passed1 <= i0[7:0]",
+        "held_passed1 <= held;": "held_passed1 <= x[7:0];",
     }
     for before, after in edits.items():
         assert before in core.text
