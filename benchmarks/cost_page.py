@@ -25,6 +25,8 @@ from benchmarks.cost_cores import (
     recorded,
     targets_in,
 )
+from benchmarks.cost_estimate_record import recorded as estimated
+from benchmarks.cost_estimate_record import section
 from benchmarks.cost_goals import (
     AUDIO,
     EIGHT,
@@ -351,7 +353,7 @@ What it costs to detect a wrong bit, or to correct one and detect two, as `[hard
 {protection_table(record)}
 
 The check bits stand between a memory and its logic, within the same clock; that is what lowers fmax.
-
+{section(estimated())}
 ## Goals
 
 The project's own goals. Where a goal says only "LUT4", both ways of counting are shown.

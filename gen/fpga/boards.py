@@ -11,8 +11,12 @@ from sosmith.model.suggestion import did_you_mean
 RATE = 1_000_000
 """Rate of a board's serial line without another wish, in baud."""
 
-_LUTS = {"SB_LUT4": 1, "LUT4": 1, "CCU2C": 2, "TRELLIS_DPR16X4": 4}
-"""Number of LUT4 that a cell uses."""
+_LUTS = {
+    "SB_LUT4": 1,
+    **dict.fromkeys(("LUT1", "LUT2", "LUT3", "LUT4", "ALU"), 1),
+    **{"CCU2C": 2, "TRELLIS_DPR16X4": 4, "RAM16SDP4": 4},
+}
+"""Number of LUT4 that a cell uses; on a Gowin FPGA smaller LUTs are cells of their own, and so is one with a carry."""
 
 
 @dataclass(frozen=True, kw_only=True)

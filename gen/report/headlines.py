@@ -172,11 +172,10 @@ def _cost(cost: Mapping[str, Any]) -> Fact:
     blocks = count(cost["multiplier_blocks"] or 0, "multiplier block")
     if cost["source"] == "synthesis":
         return Fact("Cost", count(cost["luts"], "LUT"), sentence=f"{blocks}; synthesized for {cost['board']}")
-    if cost["source"] == "estimate":
-        rest = f"{blocks}, {count(cost['register_bits'], 'flip-flop')}; estimated before synthesis"
-        return Fact("Cost", count(cost["luts"], "LUT"), sentence=rest)
-    memory = f"{count(cost['memory_words'], 'word')} of memory, an accumulator of {cost['accumulator_bits']} bits"
-    return Fact("Cost", count(cost["instructions"], "instruction"), sentence=f"a sample, on one unit; {memory}")
+    memory = f"{count(cost['memory_bits'], 'bit')} of memory"
+    within = f"the LUT4 to within {100 * cost['within']:.0f} % for 9 of 10 designs tested"
+    rest = f"{blocks}, {count(cost['register_bits'], 'flip-flop')}, {memory}, estimated for {cost['device']}; {within}"
+    return Fact("Cost", f"about {count(cost['luts'], 'LUT')}", sentence=rest)
 
 
 def _speed(evidence: Evidence) -> Fact:

@@ -56,7 +56,12 @@ class Multiplication:
     @property
     def extra_bits(self) -> int:
         """Adder bits for operands one bit wider than whole blocks; a sign bit that is always 0 adds nothing."""
-        return _extra(self.data, self.factor) * self.factor.bits + _extra(self.factor, self.data) * self.data.bits
+        return self.extra_bits_of(MULTIPLIER_BITS)
+
+    def extra_bits_of(self, bits: int) -> int:
+        """Adder bits for operands one bit wider than whole blocks of operands with `bits` bits."""
+        ends = (_extra(self.data, self.factor, bits), _extra(self.factor, self.data, bits))
+        return ends[0] * self.factor.bits + ends[1] * self.data.bits
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -152,7 +157,7 @@ def cost_of_graphs(
                 adders += nodes[node.operands[0]].width
             elif node.op is Op.DELAY:
                 registers += node.width
-            elif (multiplication := _multiplication(graph, node)) is not None:
+            elif (multiplication := multiplication_of(graph, node)) is not None:
                 multiplications.append(multiplication)
         registers += sum(nodes[i].width for i in graph.outputs)
     return Cost(multiplications=tuple(multiplications), adder_bits=adders, register_bits=registers)
@@ -202,7 +207,7 @@ def products_from_adders(
     for k, graph in enumerate(graphs):
         constant = scalings(graph)
         for index, node in enumerate(graph.nodes):
-            multiplication = _multiplication(graph, node)
+            multiplication = multiplication_of(graph, node)
             if multiplication is None:
                 continue
             taken = multiplication.blocks_of(block_bits)
@@ -235,7 +240,7 @@ def _bits_by_digits(graph: Graph, products: Iterable[int]) -> int:
     )
 
 
-def _multiplication(graph: Graph, node: Node) -> Multiplication | None:
+def multiplication_of(graph: Graph, node: Node) -> Multiplication | None:
     """Return the multiplication that a node is, None if it is none."""
     if node.op is Op.SCALE:
         factor = Operand(abs(node.parameter).bit_length() + (node.parameter < 0), node.parameter < 0)
@@ -250,9 +255,9 @@ def _operand(node: Node) -> Operand:
     return Operand(node.width, node.signed)
 
 
-def _extra(operand: Operand, other: Operand) -> bool:
+def _extra(operand: Operand, other: Operand, block_bits: int) -> bool:
     seen = operand.beside(other)
-    return seen == operand.bits and seen > MULTIPLIER_BITS and seen % MULTIPLIER_BITS == 1
+    return seen == operand.bits and seen > block_bits and seen % block_bits == 1
 
 
 def _pieces(bits: int, block_bits: int) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from sosmith.model.dataflow.graph import Graph, Node, Op
 
@@ -47,6 +47,25 @@ def _needed(graph: Graph, nodes: set[int]) -> set[int]:
             found.add(index)
             left += graph.nodes[index].operands
     return found
+
+
+def known_early(graph: Graph, stages: Sequence[int]) -> set[int]:
+    """Return the sums without a product of their pipeline stage that are added to one with a product.
+
+    Synthesis has to keep them apart: it would otherwise merge all additions into one and delay the product by that.
+    """
+    products: set[int] = set()
+    for index, node in enumerate(graph.nodes):
+        own = [i for i in node.operands if stages[i] == stages[index] and node.op is not Op.DELAY]
+        if (node.op in {Op.SCALE, Op.MULTIPLY} and not graph.is_gate(node)) or products & set(own):
+            products.add(index)
+    return {
+        i
+        for index, node in enumerate(graph.nodes)
+        if index in products and node.op in {Op.ADD, Op.SUBTRACT}
+        for i in node.operands
+        if i not in products and stages[i] == stages[index] and graph.nodes[i].op in {Op.ADD, Op.SUBTRACT}
+    }
 
 
 def loop_delays(graph: Graph) -> frozenset[int]:

@@ -62,28 +62,9 @@ from amaranth.lib.wiring import In, Out
 
 from sosmith.hdl.constant_banks import NO_CONSTANTS, Pair
 from sosmith.hdl.pipelined_logic import PipelinedLogic, banks_in_use, limits, name_ports, shape_of
-from sosmith.hdl.plan.pipeline import pipeline_stages
+from sosmith.hdl.plan.pipeline import known_early, pipeline_stages
 from sosmith.model.dataflow.datapath import Stage
 from sosmith.model.dataflow.graph import Graph, Node, Op
-
-
-def _known_early(graph: Graph, stages: list[int]) -> set[int]:
-    """Return the sums without a product of their pipeline stage that are added to one with a product.
-
-    Synthesis has to keep them apart: it would otherwise merge all additions into one and delay the product by that.
-    """
-    products: set[int] = set()
-    for index, node in enumerate(graph.nodes):
-        own = [i for i in node.operands if stages[i] == stages[index] and node.op is not Op.DELAY]
-        if (node.op in {Op.SCALE, Op.MULTIPLY} and not graph.is_gate(node)) or products & set(own):
-            products.add(index)
-    return {
-        i
-        for index, node in enumerate(graph.nodes)
-        if index in products and node.op in {Op.ADD, Op.SUBTRACT}
-        for i in node.operands
-        if i not in products and stages[i] == stages[index] and graph.nodes[i].op in {Op.ADD, Op.SUBTRACT}
-    }
 
 
 class PipelinedStage(wiring.Component):
@@ -163,7 +144,7 @@ class PipelinedStage(wiring.Component):
         graph = self.stage.graph
         stages = pipeline_stages(graph)
         valid, takes, banks = self._control(m, max(stages) + 1)
-        apart = _known_early(graph, stages)
+        apart = known_early(graph, stages)
         logic = PipelinedLogic(
             m,
             graph,

@@ -10,9 +10,8 @@ from sosmith.sim.exploration.evaluation import Point
 def pareto_front(points: Sequence[Point]) -> list[Point]:
     """Points that pass and that no other one beats: neither dearer nor with a larger bound, and better in one of both.
 
-    Costs are compared only if they count the same and are of as many samples a clock, and of one architecture where
-    they are not synthesized. Of points that are equal in both, the first stays. The order is that of rising cost within
-    each kind of cost.
+    Costs are compared only if they count the same and are of as many samples a clock. Of points that are equal in both,
+    the first stays. The order is that of rising cost within each kind of cost.
     """
     kinds: dict[tuple[str, str], list[Point]] = {}
     for point in points:
@@ -29,12 +28,12 @@ def pareto_front(points: Sequence[Point]) -> list[Point]:
 
 
 def cost_kind(point: Point) -> tuple[str, str]:
-    """Name what the cost counts, and what else must be the same for costs to be compared: architecture and rate.
+    """Name what the cost counts, and what else must be the same for costs to be compared: the rate.
 
-    The architecture does not matter to a synthesized cost. Several samples a clock are asked for where one of them is
-    too slow, at a multiple of its cost.
+    Several samples a clock are asked for where one of them is too slow, at a multiple of its cost. Estimates of an
+    earlier version, which do not tell for which FPGA, are of one architecture each.
     """
-    synthesized = point["cost"]["source"] == "synthesis"
+    known = point["cost"]["source"] == "synthesis" or "device" in point["cost"]
     lanes = point.get("samples_per_clock", 1)  # points of an earlier version do not tell
-    parts = ["" if synthesized else point["architecture"], f"{lanes} samples a clock" if lanes > 1 else ""]
+    parts = ["" if known else point["architecture"], f"{lanes} samples a clock" if lanes > 1 else ""]
     return point["cost"]["unit"], ", ".join(filter(None, parts))

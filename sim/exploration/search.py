@@ -36,14 +36,11 @@ _CHECKED = 200
 _NO_DESIGN = (20.0, 20.0)
 """What the optimizer is told instead of the decades of cost and bound, together with a broken constraint."""
 
-_ARCHITECTURE = "hardware.architecture"
-
 
 class Search:
     """A search of `count` designs for the front of proven error bound against cost.
 
-    A space of no more combinations than that is done as a grid. If the costs are estimates and the architecture is a
-    parameter, each architecture is searched by itself, as their costs count different things.
+    A space of no more combinations than that is done as a grid.
 
     Parameters
     ----------
@@ -72,11 +69,7 @@ class Search:
         if self._grid is not None:
             return
         _check(subject, parameters)
-        apart: Sequence[Any] = (None,)
-        architectures = parameters.get(_ARCHITECTURE)
-        if subject.board is None and architectures is not None and not isinstance(architectures, Span):
-            apart = tuple(dict.fromkeys(architectures))
-        self._studies = [(each, _study(subject.seed + k)) for k, each in enumerate(apart)]
+        self._study = _study(subject.seed)
 
     def batches(self) -> Iterator[Sequence[Task]]:
         """Yield batches of tasks; the results of each must be there before the next one is asked for."""
@@ -89,37 +82,32 @@ class Search:
             if not new:
                 return  # everything has been done, or nearly
             yield new
-            for study, trial, task in asked:
-                _tell(study, trial, self._points[task.key])
+            for trial, task in asked:
+                _tell(self._study, trial, self._points[task.key])
 
-    def _batch(self, size: int) -> tuple[list[Task], list[tuple[Any, Any, Task]]]:
-        """Ask for new designs, each study in turn; return them, and all trials that wait for a result of theirs."""
+    def _batch(self, size: int) -> tuple[list[Task], list[tuple[Any, Task]]]:
+        """Ask for new designs; return them, and all trials that wait for a result of theirs."""
         new: list[Task] = []
-        waiting: list[tuple[Any, Any, Task]] = []
+        waiting: list[tuple[Any, Task]] = []
         known = frozenset(self._asked_for)
-        while len(new) < size and self._studies:
-            architecture, study = self._studies[0]
-            for _ in range(_TRIES):
-                trial = study.ask()
-                task = self._subject.task(self._changes(trial, architecture))
-                if task.key in known:
-                    _tell(study, trial, self._points[task.key])
-                    continue
-                waiting.append((study, trial, task))
-                if task.key not in self._asked_for:
-                    self._asked_for.add(task.key)
-                    new.append(task)
-                    self._studies.append(self._studies[0])  # until its next turn
-                    break
-            del self._studies[0]  # for good, if it thinks of nothing that has not been asked for
+        tries = 0
+        while len(new) < size and tries < _TRIES:
+            tries += 1
+            trial = self._study.ask()
+            task = self._subject.task(self._changes(trial))
+            if task.key in known:
+                _tell(self._study, trial, self._points[task.key])
+                continue
+            waiting.append((trial, task))
+            if task.key not in self._asked_for:
+                self._asked_for.add(task.key)
+                new.append(task)
+                tries = 0
         self.tasks += new
         return new, waiting
 
-    def _changes(self, trial: Any, architecture: Any) -> dict[str, Any]:
-        return {
-            key: architecture if key == _ARCHITECTURE and architecture is not None else _suggested(trial, key, values)
-            for key, values in self._parameters.items()
-        }
+    def _changes(self, trial: Any) -> dict[str, Any]:
+        return {key: _suggested(trial, key, values) for key, values in self._parameters.items()}
 
 
 def _grid(parameters: Parameters, count: int) -> dict[str, Sequence[Any]] | None:

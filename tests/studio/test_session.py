@@ -203,7 +203,7 @@ def test_realizations_come_one_after_another(session: Session) -> None:
     rows = {row["realization"]: row for row in known["realizations"]["rows"]}
     assert list(rows) == [*sosmith.Specification.choices()["hardware.realization"][1:]]
     made = sosmith.design(FILTER, realization="delta")
-    assert (rows["delta"]["bound"], rows["delta"]["cost"]["luts"]) == (float(made.bound), made.cost.luts)
+    assert (rows["delta"]["bound"], rows["delta"]["cost"]["luts"]) == (float(made.bound), made.estimates[0].luts)
     change(session, {"output.max_error": 0.00099})
     assert state(session)["realizations"]["rows"] == []
     session.handle({"do": "realizations", "on": False}, "page")

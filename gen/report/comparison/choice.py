@@ -104,8 +104,8 @@ def _of_smallest_architecture(reports: Sequence[Report], passing: Sequence[int])
 def hardware_cost(report: Report) -> float | None:
     """Cost of a report's hardware in one figure, None if it does not tell.
 
-    LUT4, with a multiplier block counted as `LUTS_OF_A_BLOCK` of them; of a program, its instructions: the hardware
-    that runs it is nearly the same for all.
+    LUT4, with a multiplier block counted as `LUTS_OF_A_BLOCK` of them; of a program in a report of an earlier version,
+    its instructions.
     """
     luts, blocks = fact(report, "provenance.cost.luts"), fact(report, "provenance.cost.multiplier_blocks")
     if luts is not None:
@@ -115,11 +115,14 @@ def hardware_cost(report: Report) -> float | None:
 
 
 def cost_unit(report: Report) -> str:
-    """Say in words what `hardware_cost` counts."""
+    """Say in words what `hardware_cost` counts, and how good it is."""
     if fact(report, "provenance.cost.luts") is None:
         return "instructions"
-    estimated = fact(report, "provenance.cost.source") == "estimate"
-    return "LUT4 equivalents" + (", estimated before synthesis" if estimated else "")
+    if fact(report, "provenance.cost.source") != "estimate":
+        return "LUT4 equivalents"
+    within, device = fact(report, "provenance.cost.within"), fact(report, "provenance.cost.device")
+    how = "" if within is None else f" for {device}, 9 of 10 to within {100 * within:.0f} %"
+    return f"LUT4 equivalents, estimated before synthesis{how}"
 
 
 def _bound(report: Report) -> float:

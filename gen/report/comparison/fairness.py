@@ -63,12 +63,16 @@ def _trace(reports: Sequence[Report]) -> str:
 
 
 def _cost(reports: Sequence[Report]) -> str:
-    sources = {(fact(each, "provenance.cost.source"), fact(each, "provenance.cost.board")) for each in reports}
-    if len(sources) > 1:
-        named = ", ".join(sorted(source_name(*each) for each in sources))
+    keys = ("provenance.cost.source", "provenance.cost.board", "provenance.cost.device")
+    sources = {tuple(fact(each, key) for key in keys) for each in reports}
+    if len({source[:2] for source in sources}) > 1:
+        named = ", ".join(sorted({source_name(*each[:2]) for each in sources}))
         return f"The costs have different origins: {named}."
-    if next(iter(sources))[0] != "synthesis" and _differ(reports, "architecture"):
-        return f"Before synthesis, architectures cannot be compared: {_listed(reports, 'architecture')}."
+    if len(sources) > 1 and next(iter(sources))[0] == "estimate":
+        return "The costs are estimates of different versions, or for different FPGAs."
+    if sources <= {("estimate", None, None), ("program", None, None)} and _differ(reports, "architecture"):
+        named = _listed(reports, "architecture")
+        return f"Estimates of an earlier version cannot be compared between architectures: {named}."
     return ""
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -229,16 +229,15 @@ def _designed(tell: Tell, text: str, path: str) -> Design:
 
 
 def _cost(made: Design) -> dict[str, Any]:
-    """Estimates before synthesis: of the parallel datapath, or of the program that one multiplier runs."""
-    schedule = made.manifest["schedule"]
-    if schedule is None:
-        sizes: Sequence[Sequence[int]] = made.manifest["cost"]["multipliers"]
-        return {"multipliers": len(sizes), "luts": made.cost.luts, "instructions": None, "words": None}
+    """Return what the core is estimated to take on an ECP5, before synthesis."""
+    found = made.estimates[0]
     return {
-        "multipliers": made.core.architecture.multiplier_blocks,
-        "luts": None,
-        "instructions": len(schedule["instructions"]),
-        "words": schedule["words"],
+        "device": found.device,
+        "luts": found.luts,
+        "flip_flops": found.flip_flops,
+        "multipliers": found.multiplier_blocks,
+        "memory": found.memory_bits,
+        "within": found.tested.nine_in_ten,
     }
 
 

@@ -373,9 +373,14 @@ function plane() {
 
 // ---- What the proof says
 
-function cost(one) {
-  if (one.instructions !== null) return `${one.instructions} instructions, ${one.words} words, ${one.multipliers ? "1 multiplier" : "no multiplier"}`;
-  return `${one.multipliers} multiplier${one.multipliers === 1 ? "" : "s"}, about ${one.luts.toLocaleString("en")} LUTs`;
+const counted = (number, name) => `${number.toLocaleString("en")} ${name}${number === 1 ? "" : "s"}`;
+
+const size = (one) => `about ${one.luts.toLocaleString("en")} LUT4`;
+
+function sizeBeside(one) {
+  const within = `LUT4 to within ${Math.round(100 * one.within)} % for 9 of 10 designs tested`;
+  const others = [counted(one.flip_flops, "flip-flop"), counted(one.multipliers, "multiplier"), `${counted(one.memory, "bit")} of memory`];
+  return `${others.join(", ")} on ${one.device}; ${within}`;
 }
 
 function verdict() {
@@ -418,7 +423,7 @@ function proven() {
     tile("error bound", withUnit(short(result.bound), unit), `${short(result.bound / lsb, 4)} LSB, ${short(100 * result.bound / result.allowed, 3)} % of what is allowed`, result.bound / result.allowed),
     tile("realization", result.realization || "none", result.architecture),
     tile("time", `${result.cycles.toLocaleString("en")} clock${result.cycles === 1 ? "" : "s"}`, `a sample and channel; latency ${result.latency.toLocaleString("en")} clocks`),
-    tile("cost, estimated", cost(result.cost).split(",")[0], cost(result.cost).split(", ").slice(1).join(", ")),
+    tile("cost, estimated", size(result.cost), sizeBeside(result.cost)),
     tile("limit cycles", result.limit_cycles.length ? (largest > 0 ? `${short(largest, 3)} LSB` : "none") : "–", "at most, of any one section, without input"),
   );
   const part = (value) => `${short(100 * value / result.allowed, 3)} %`;
@@ -451,7 +456,7 @@ function realizations() {
   const unit = known.preview ? known.preview.unit : "";
   rows("realizations", [["realization", false], ["architecture", false], [withUnit("bound", unit && `in ${unit}`), true], ["clocks a sample", true], ["latency", true], ["cost, estimated", false]], found.map((one) => ({
     name: one.realization === chosen ? "taken" : "",
-    cells: one.refused ? [one.realization, "–", "–", "–", "–", one.refused] : [one.realization + (one.realization === chosen ? ", taken" : ""), one.architecture, short(one.bound), one.cycles.toLocaleString("en"), one.latency.toLocaleString("en"), cost(one.cost)],
+    cells: one.refused ? [one.realization, "–", "–", "–", "–", one.refused] : [one.realization + (one.realization === chosen ? ", taken" : ""), one.architecture, short(one.bound), one.cycles.toLocaleString("en"), one.latency.toLocaleString("en"), `${size(one.cost)}, ${counted(one.cost.multipliers, "multiplier")}`],
   })));
 }
 

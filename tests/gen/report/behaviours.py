@@ -7,12 +7,15 @@ from sosmith.gen.report.provenance import Provenance
 COST = {
     "source": "estimate",
     "board": None,
+    "device": "ECP5 LFE5U-25F",
     "luts": 1000,
     "multiplier_blocks": 2,
     "register_bits": 300,
     "instructions": None,
     "memory_words": None,
     "accumulator_bits": None,
+    "memory_bits": 0,
+    "within": 0.2,
 }
 
 

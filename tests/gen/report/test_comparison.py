@@ -13,7 +13,7 @@ import pytest
 from tests.gen.report.reports import WORSE, report
 
 from sosmith.gen.report.comparison.baseline import Judgement, judge, read_tolerances
-from sosmith.gen.report.comparison.choice import choose
+from sosmith.gen.report.comparison.choice import choose, cost_unit
 from sosmith.gen.report.comparison.differences import alike, differences
 from sosmith.gen.report.comparison.fairness import fairness
 from sosmith.gen.report.comparison.markdown import comparison_markdown
@@ -111,6 +111,15 @@ def test_errors_on_different_traces_have_no_winner_but_costs_do() -> None:
     assert fairness([report(), report(**OTHER_TRACE)]).accuracy == "The input codes differ: traces wear_ramp, steps."
 
 
+def test_estimates_for_one_fpga_are_compared_between_architectures() -> None:
+    known = {"provenance.cost.device": "ECP5 LFE5U-25F", "provenance.cost.within": 0.12}
+    reports = [report(**known), report(architecture="serial", **known, **WORSE)]
+    assert fairness(reports).cost == ""
+    assert rows_of(*reports)["provenance.cost.luts"].best == (0,)
+    unit = "LUT4 equivalents, estimated before synthesis for ECP5 LFE5U-25F, 9 of 10 to within 12 %"
+    assert cost_unit(reports[0]) == unit
+
+
 @pytest.mark.parametrize(
     ("changes", "reason"),
     [
@@ -118,7 +127,14 @@ def test_errors_on_different_traces_have_no_winner_but_costs_do() -> None:
             {"provenance.cost.source": "synthesis", "provenance.cost.board": "icestick"},
             "The costs have different origins: estimate before synthesis, synthesis for icestick.",
         ),
-        ({"architecture": "serial"}, "Before synthesis, architectures cannot be compared: parallel, serial."),
+        (
+            {"architecture": "serial"},
+            "Estimates of an earlier version cannot be compared between architectures: parallel, serial.",
+        ),
+        (
+            {"provenance.cost.device": "ECP5 LFE5U-25F"},
+            "The costs are estimates of different versions, or for different FPGAs.",
+        ),
     ],
 )
 def test_costs_of_different_origins_have_no_winner(changes: dict[str, Any], reason: str) -> None:

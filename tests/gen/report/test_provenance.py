@@ -14,6 +14,7 @@ from tests.commands.command_line import FILTER
 from tests.gen.report.evidences import evidence
 
 from sosmith.gen.core import CoreDesign, design_core
+from sosmith.gen.estimate.estimate import USUAL, Estimate, usual_estimates
 from sosmith.gen.fpga.boards import find_board
 from sosmith.gen.fpga.synthesis import Netlist
 from sosmith.gen.report import curves
@@ -54,10 +55,14 @@ def test_digests_change_with_their_subject(changes: dict[str, Any], changed: set
     assert {name for name in DIGESTS if getattr(before, name) != getattr(after, name)} == changed
 
 
+def estimate_of(design: CoreDesign) -> Estimate:
+    return usual_estimates(design.architecture, find_board(USUAL[0]))[0]
+
+
 def test_cost_by_its_origin(tmp_path: Path) -> None:
     design, provenance = made()
     assert provenance.cost == hardware_cost(design)
-    assert (provenance.cost["source"], provenance.cost["luts"]) == ("estimate", 310)
+    assert (provenance.cost["source"], provenance.cost["luts"]) == ("estimate", estimate_of(design).luts)
     cells = {"SB_LUT4": 952, "SB_MAC16": 13}
     netlist = Netlist(find_board("icebreaker"), tmp_path / "netlist.v", cells, "0.70")
     counted = hardware_cost(design, netlist)
@@ -67,7 +72,18 @@ def test_cost_by_its_origin(tmp_path: Path) -> None:
     program = folded.architecture.program
     assert isinstance(program, Program)
     cost = hardware_cost(folded)
-    assert (cost["source"], cost["instructions"], cost["luts"]) == ("program", len(program.instructions), None)
+    found = estimate_of(folded)
+    assert (cost["source"], cost["device"], cost["instructions"]) == (
+        "estimate",
+        found.device,
+        len(program.instructions),
+    )
+    assert (cost["luts"], cost["register_bits"], cost["memory_bits"]) == (
+        found.luts,
+        found.flip_flops,
+        found.memory_bits,
+    )
+    assert (cost["multiplier_blocks"], cost["within"]) == (1, found.tested.nine_in_ten)
 
 
 def test_error_over_time_keeps_every_peak() -> None:

@@ -25,6 +25,7 @@ from tests.suite.extras import needed
 
 import sosmith
 from sosmith import SpecificationError, ToolError
+from sosmith.gen.word_lengths.cost import LUTS_OF_A_BLOCK
 from sosmith.instrument.scenarios.traces import traces_for
 from sosmith.sim.exploration import processes
 from sosmith.sim.exploration.evaluation import evaluate
@@ -63,7 +64,10 @@ def test_figures_are_those_of_the_design(found: sosmith.Exploration) -> None:
     assert len(error) == 300
     assert point["error"]["max_abs"] == pytest.approx(np.abs(error).max(), rel=1e-12)
     assert point["error"]["bound"] == design.bound
-    assert (point["cost"]["value"], point["cost"]["luts"]) == (design.cost.area, design.cost.luts)
+    estimate = design.estimates[0]
+    assert (point["cost"]["device"], point["cost"]["luts"]) == (estimate.device, estimate.luts)
+    assert point["cost"]["multiplier_blocks"] == estimate.multiplier_blocks
+    assert point["cost"]["value"] == estimate.luts + LUTS_OF_A_BLOCK * estimate.multiplier_blocks
     assert (point["cycles_per_sample"], point["architecture"], point["passed"]) == (1, "parallel", True)
 
 

@@ -133,9 +133,12 @@ def test_what_falls_short_is_not_on_the_front() -> None:
     assert front(point("a", 1, 1, passed=False), point("b", 2, 2), {"key": "c", "refused": "no"}) == ["b"]
 
 
-def test_costs_before_synthesis_are_compared_within_an_architecture() -> None:
+def test_costs_of_several_architectures_share_an_axis() -> None:
+    """But those of an earlier version, which did not tell for which FPGA they were."""
     other = point("b", 2, 2, architecture="serial")
     assert front(point("a", 1, 1), other) == ["a", "b"]
+    estimate = {"cost": {"value": 2, "unit": "LUT4", "source": "estimate", "device": "ECP5 LFE5U-25F"}}
+    assert front(point("a", 1, 1) | estimate, other | estimate) == ["a"]
     cells = {"cost": {"value": 2, "unit": "LUT4", "source": "synthesis"}}
     assert front(point("a", 1, 1) | cells, other | cells) == ["a"]
 

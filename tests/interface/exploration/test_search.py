@@ -131,10 +131,10 @@ def test_a_longer_search_goes_on_from_a_shorter_one(found: Outcome, tmp_path: Pa
     assert searched(tmp_path, 48).points == found.points[:48]
 
 
-def test_architectures_whose_costs_count_different_things_are_searched_apart(tmp_path: Path) -> None:
+def test_architectures_are_a_parameter_like_any_other(tmp_path: Path) -> None:
     machines = {"hardware.architecture": ["parallel", "folded"]}
     points = searched(tmp_path, 48, **machines).points
-    assert [point["changes"]["hardware.architecture"] for point in points] == ["parallel", "folded"] * 24
+    assert {point["changes"]["hardware.architecture"] for point in points} == {"parallel", "folded"}
     assert list(points[0]["changes"]) == [*SPACE, "hardware.architecture"]
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from sosmith.gen.architectures.architecture import Architecture
 from sosmith.gen.calibration.fit import Fit, read_measurements
+from sosmith.gen.facts.cost_table import cost_table
 from sosmith.gen.facts.design_tables import budget_table, limit_cycles_table, uncertainty_table
 from sosmith.gen.facts.table import Table
 from sosmith.gen.filter.decimation import SAMPLED
@@ -37,6 +38,8 @@ def design_tables(design: Design, *, details: bool = False) -> list[Table]:
     ]
     if facts.decimation is not None:
         tables.append(_rates(design.rate_costs, output.unit, facts.channels))
+    if design.estimates:
+        tables.append(cost_table(design.estimates))
     if not details:
         return tables
     if design.uncertainty is not None:

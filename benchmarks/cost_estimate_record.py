@@ -1,0 +1,124 @@
+"""The record of syntheses that the estimate of cost is fitted to and tested with, and what docs/cost.md says of it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from benchmarks.cost_draws import draw
+from benchmarks.cost_fit import Row, errors
+
+from sosmith.gen.core import CoreDesign, design_core
+from sosmith.gen.estimate.estimate import FITTED, TITLES
+from sosmith.gen.fpga.boards import find_board
+from sosmith.gen.specification.specification import from_text
+
+ROOT = Path(__file__).resolve().parent.parent
+RECORD = ROOT / "benchmarks" / "cost_estimate.json"
+
+GOAL = 0.15
+"""Relative error of LUT4 that nine in ten designs should not exceed."""
+
+FITTED_UP_TO = 230
+"""Draws up to this seed are for the fit, and were looked at while quantities were chosen; later ones are for tests."""
+
+Recorded = dict[str, Any]
+"""A row of the record: ``seed`` of a draw, or ``core`` and ``target`` of benchmarks/cost.json; ``board``,
+``architecture``, ``source``, a mark of what was synthesized, ``quantities``, ``luts``, ``flip_flops``,
+``multiplier_blocks``. Of a draw that cannot be met ``seed`` and ``refused`` alone."""
+
+
+def recorded() -> list[Recorded]:
+    """Read the record."""
+    if not RECORD.exists():
+        return []
+    rows: list[Recorded] = json.loads(RECORD.read_text(encoding="utf-8"))
+    return rows
+
+
+def write(rows: Sequence[Recorded]) -> None:
+    """Write the record, a row to a line."""
+    lines = ",\n".join(json.dumps(row, sort_keys=True) for row in rows)
+    RECORD.write_text(f"[\n{lines}\n]\n", encoding="utf-8")
+
+
+def is_unseen(seed: int) -> bool:
+    """Say whether a draw is for testing only."""
+    return seed > FITTED_UP_TO
+
+
+def designed(seed: int) -> CoreDesign:
+    """Design what a seed draws.
+
+    Raises
+    ------
+    SpecificationError, ShortfallError
+        If it cannot be met.
+    """
+    drawn = draw(seed)
+    return design_core(from_text(drawn.toml, Path(f"draw{seed}.toml")), board=find_board(drawn.board))
+
+
+def rows_of(record: Sequence[Recorded]) -> list[Row]:
+    """Return the rows that have been synthesized."""
+    return [
+        Row(
+            name=f"draw {row['seed']}" if "seed" in row else f"{row['core']} on {row['target']}",
+            architecture=row["architecture"],
+            family=find_board(row["board"]).device.family,
+            unseen="seed" in row and is_unseen(row["seed"]),
+            quantities=row["quantities"],
+            luts=row["luts"],
+            flip_flops=row["flip_flops"],
+        )
+        for row in record
+        if "refused" not in row
+    ]
+
+
+def nine_in_ten(found: Sequence[float]) -> float:
+    """Return the relative error that nine in ten do not exceed, in whole percent upwards."""
+    return float(np.ceil(100 * np.sort(np.abs(found))[int(np.ceil(0.9 * len(found))) - 1]) / 100)
+
+
+def section(record: Sequence[Recorded]) -> str:
+    """Return the section of docs/cost.md."""
+    rows, factors = rows_of(record), json.loads(FITTED.read_text(encoding="utf-8"))["factors"]
+    unseen = [row for row in rows if row.unseen]
+    names = dict.fromkeys(row.architecture for row in sorted(rows, key=lambda row: row.architecture))
+    groups: list[tuple[str, Callable[[Row], bool]]] = [
+        *((title, lambda row, family=family: row.family == family) for family, title in TITLES.items()),  # type: ignore[misc]
+        *((name, lambda row, name=name: row.architecture == name) for name in names),  # type: ignore[misc]
+        ("all", lambda row: True),
+    ]
+    lines = [
+        "| designs | fitted to | tested with | LUT4 within 15 % | 9 of 10 within | FF, 9 of 10 within |",
+        "|---|---|---|---|---|---|",
+    ]
+    for title, belongs in groups:
+        of_fit = [row for row in rows if belongs(row) and not row.unseen]
+        tested = [row for row in unseen if belongs(row)]
+        if not tested:
+            continue
+        luts, flip_flops = errors(tested, factors), errors(tested, factors, "flip_flops")
+        share = f"{sum(abs(error) <= GOAL for error in luts)} of {len(luts)}"
+        ends = f"{100 * nine_in_ten(luts):.0f} % | {100 * nine_in_ten(flip_flops):.0f} %"
+        lines.append(f"| {title} | {len(of_fit)} | {len(tested)} | {share} | {ends} |")
+    table = "\n".join(lines)
+    return f"""
+## Estimates before synthesis
+
+Written by `python -m benchmarks.cost_estimate` from `benchmarks/cost_estimate.json`. `design`, the report, the studio
+and `explore` show estimates of LUT4 and flip-flops. They count bits of sums, choices, comparisons and memories in the
+plan of the hardware, each times a factor for its architecture and family of FPGA. Factors are fitted to synthesis with
+Yosys of what the seeds up to {FITTED_UP_TO} draw, and of cores above. Errors are those on what later seeds draw,
+which was looked at neither by the fit nor while quantities were chosen. Drawn are filters of all families and kinds,
+orders 1 to 4, some calibrated, with up to 32 channels, reload, protect, decimate, look-ahead and limits of multipliers,
+but no parallel cores with reload on FPGAs without multiplier blocks. iCE40 is the UP5K and the HX8K, ECP5 the
+LFE5U-25F, Gowin the GW1NR-9C.
+
+{table}
+"""

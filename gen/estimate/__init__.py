@@ -1,0 +1,1 @@
+"""What a core takes on an FPGA, estimated before synthesis."""

@@ -1,0 +1,116 @@
+"""Quantities of a core: of its stages, its program or its units, its decimator, and the shell around them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+from sosmith.gen.architectures.architecture import Architecture
+from sosmith.gen.estimate.graphs import Pipelined, of_pipelined
+from sosmith.gen.estimate.online import of_units
+from sosmith.gen.estimate.programs import of_program
+from sosmith.gen.estimate.quantities import (
+    Quantities,
+    flags_of,
+    of_inputs,
+    of_memory,
+    of_output_buffer,
+    tree,
+)
+from sosmith.gen.fpga.boards import Device
+from sosmith.hdl.plan.look_ahead import plans
+from sosmith.hdl.plan.streams import channel_bits
+from sosmith.hdl.plan.unfolding import unfolded_stages
+from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.dataflow.decimator import Decimator
+from sosmith.model.reload.constants import constants, with_room
+
+
+def quantities_of(architecture: Architecture, device: Device) -> Quantities:
+    """Count what a core is made of on a device, with its decimator and what stands before that."""
+    if architecture.online is not None:
+        made = of_units(architecture, device)
+    elif architecture.program is not None:
+        made = of_program(architecture, device)
+    else:
+        made = _of_stages(architecture, device)
+    made["cores"] += 1
+    if architecture.decimator is not None:
+        made += _of_decimator(architecture.decimator, architecture.channels, device)
+        made += of_inputs(architecture.datapath.inputs, architecture.datapath.calibrated)
+        if architecture.ahead is not None:
+            made += quantities_of(architecture.ahead, device)
+    return made
+
+
+def _of_stages(architecture: Architecture, device: Device) -> Quantities:
+    """Count a core whose every operation has its own hardware."""
+    whole = with_room(architecture.datapath) if architecture.reload else architecture.datapath
+    datapath, channels = whole.behind_decimator, channel_bits(architecture.channels)
+    stages = _pipelined(architecture, datapath)
+    made: Quantities = Counter()
+    for stage in stages:
+        made += of_pipelined(stage, device, protect=architecture.protect, loads=architecture.reload)
+    made["guards"] += architecture.protect != "none"
+    made["guarded_ports"] += architecture.reload and architecture.protect != "none"
+    made["registers"] += (2 + channels) * sum(stage.depth for stage in stages)
+    made += _of_shell(datapath, architecture)
+    if architecture.reload:
+        made += _of_constants(architecture)
+    if channels:
+        near = max(stage.distance for stage in stages) - 1
+        made["channels"] += channels
+        made["logic"] += near * tree(2 * channels)
+        made["registers"] += near * (1 + channels)
+        made += of_output_buffer(sum(port.bits for port in datapath.inputs) + channels)
+    return made
+
+
+def _pipelined(architecture: Architecture, datapath: Datapath) -> Sequence[Pipelined]:
+    """Return the stages with their pipeline stages."""
+    stages = unfolded_stages(datapath, architecture.samples_per_clock)
+    if architecture.look_ahead:
+        return [Pipelined.of_turns(plan) for plan in plans(stages)]
+    graphs = [(stage.graph, made) for stage, made in zip(stages, architecture.adders, strict=True)]
+    if architecture.channels == 1:
+        return [Pipelined.of_one(graph, made) for graph, made in graphs]
+    channels, rewrites = architecture.channels, architecture.protect != "none"
+    return [Pipelined.of_channels(graph, channels, made, rewrites=rewrites) for graph, made in graphs]
+
+
+def _of_shell(datapath: Datapath, architecture: Architecture) -> Quantities:
+    lanes = architecture.samples_per_clock
+    made: Quantities = Counter()
+    if architecture.decimator is None:
+        for _ in range(lanes):
+            made += of_inputs(datapath.inputs, datapath.calibrated)
+    flags = flags_of(datapath) + (architecture.protect != "none")
+    made["compared"] += 2 * datapath.output.bits * bool(datapath.wear)
+    return made + of_output_buffer((datapath.output.bits + flags) * lanes + channel_bits(architecture.channels))
+
+
+def _of_constants(architecture: Architecture) -> Quantities:
+    """Count the registers of constants that can be loaded, and what loads them."""
+    loadable = constants(architecture.datapath)
+    bits, words = sum(each.bits for each in loadable), sum(each.words for each in loadable)
+    guarded = architecture.protect != "none"
+    return Counter(
+        {"ports": 1, "chosen": bits, "loaded": words, "registers": 2 * bits, "parities": 2 * tree(bits) * guarded}
+    )
+
+
+def _of_decimator(decimator: Decimator, channels: int, device: Device) -> Quantities:
+    width, bits = decimator.width, decimator.output.bits
+    made: Quantities = Counter({"decimators": 1})
+    made["sums"] += decimator.factor.bit_length() + (width if decimator.dropped else 0)
+    if channels == 1:
+        made["sums"] += 2 * decimator.stages * width
+        made["registers"] += decimator.register_bits + 4 * decimator.stages
+        return made
+    made["sums"] += width
+    made["chosen"] += 4 * width + decimator.input.bits
+    made["channels"] += channel_bits(channels)
+    made["registers"] += width + 2 * decimator.input.bits + bits
+    states = channels << (2 * decimator.stages - 1).bit_length()
+    kept = decimator.input.bits + decimator.factor.bit_length() + 1
+    return made + of_memory(device, states, width) + of_memory(device, channels, kept)
