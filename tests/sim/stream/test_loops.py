@@ -21,7 +21,7 @@ from sosmith.sim.verilated_model import Builder, Model
 
 ROOT = Path(__file__).parents[3]
 FAULTY = Path(__file__).with_name("faulty.sv")
-SAMPLES = 80
+SAMPLES = 200
 FOLLOWS = "outputs must not follow s_axis_tvalid or m_axis_tready within a clock, as they did at clock "
 HUNG = "a sample must move at least every "
 FAULTS = {
@@ -34,8 +34,8 @@ FAULTS = {
     6: "a stalled core must not drop m_axis_tvalid, as it did at sample ",
     7: "a stalled core must not change m_axis_tdata from ",
     8: "a stalled core must not change m_axis_tuser from ",
-    9: f"{SAMPLES} samples must come out, not more",
-    10: f"{SAMPLES} samples must come out, not more",
+    9: "200 samples must come out, not more",
+    10: "200 samples must come out, not more",
     11: HUNG,
     12: "a stalled core must not drop m_axis_tvalid, as it did at sample ",
     13: "the first results after a reset must not depend on what came before it",
