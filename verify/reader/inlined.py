@@ -45,13 +45,10 @@ def inlined(source: Source, top: str) -> Source:
     modules = source.modules
     merged = modules[top].copy()
     names = {f"{top}_{part}" for part in FUNCTIONS} & modules.keys()
-    while any(inside in names for inside, _, _ in merged.instances):
-        instances, merged.instances = merged.instances, []
-        for inside, name, ports in instances:
-            if inside in names:
-                merged = _joined(merged, modules[inside], name, ports)
-            else:
-                merged.instances.append((inside, name, ports))
+    while (place := next((k for k, each in enumerate(merged.instances) if each[0] in names), None)) is not None:
+        # Those that wait stay in it: what they are connected to is renamed with the rest.
+        inside, name, ports = merged.instances.pop(place)
+        merged = _joined(merged, modules[inside], name, ports)
     rest = _below(modules, {inside for inside, _, _ in merged.instances})
     if {top, *rest} == modules.keys():
         return source
