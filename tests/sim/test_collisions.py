@@ -29,7 +29,7 @@ def _spoilt_module(module: str, *, always: bool) -> str:
             hit = write[1] if always else f"{write[1]} && {write[2]} == {read[2]}"
             return f"{read[1]} ^ {{{bits}{{{hit} }}}};"
 
-        module, count = re.subn(rf"(_\d+_ <= {name} ?\[(.+)\]);", inverted, module)
+        module, count = re.subn(rf"(\b\w+ <= {name} ?\[(.+)\]);", inverted, module)
         assert count == 1
     return module
 

@@ -214,7 +214,7 @@ def test_without_keep_the_texts_say_nothing_of_it() -> None:
 
 
 def test_the_document_shows_what_is_written() -> None:
-    document = (Path(__file__).parents[3] / "docs" / "hardware.md").read_text()
+    document = (Path(__file__).parents[4] / "docs" / "hardware.md").read_text()
     excerpts = re.findall(r"```systemverilog\n(.*?)```", document, re.DOTALL)
     assert len(excerpts) == 2
     for kind, excerpt in zip(("folded", "parallel"), excerpts, strict=True):
