@@ -41,7 +41,7 @@ def is_signed(value: Expression) -> bool:
         return False
     if value.symbol == "signed":
         return True
-    if value.symbol in {"&", "|"} and len(value.operands) == 1:
+    if value.symbol in {"&", "|", "^"} and len(value.operands) == 1:
         return False
     operands = value.operands[1:] if value.symbol == "?" else value.operands
     return all(is_signed(operand) for operand in operands)

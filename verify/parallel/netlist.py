@@ -119,7 +119,7 @@ class Netlist:
             return max(self.width(side) for side in value.operands[1:])
         if value.symbol in {"==", "!=", "<", ">", "<=", ">=", "!"}:
             return 1
-        if value.symbol in {"&", "|"} and len(value.operands) == 1:
+        if value.symbol in {"&", "|", "^"} and len(value.operands) == 1:
             return 1
         return max(self.width(operand) for operand in value.operands)
 

@@ -179,6 +179,8 @@ class Ternary:
             return self._all(value.operands[0])
         if value.symbol == "|":
             return self._any(value.operands[0])
+        if value.symbol == "^" and len(value.operands) == 1:
+            return self._odd(value.operands[0])
         if value.symbol == "!":
             any_ = self._any(value.operands[0])
 
@@ -279,6 +281,17 @@ class Ternary:
         def found(values: Values) -> Trits:
             own, mask = word(values)
             return (0, 1) if ~own & mask else (1, 1) if mask == full else (0, 0)
+
+        return found
+
+    def _odd(self, value: Expression) -> _Function:
+        """Whether an odd number of bits is set."""
+        width = self._netlist.width(value)
+        word, full = self._extended(value, width), (1 << width) - 1
+
+        def found(values: Values) -> Trits:
+            own, mask = word(values)
+            return (own.bit_count() & 1, 1) if mask == full else (0, 0)
 
         return found
 

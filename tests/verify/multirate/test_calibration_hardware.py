@@ -1,5 +1,6 @@
 """The decimator of an instrument and its wires to the calibration: proven, and rejected when anything is wrong."""
 
+import re
 from functools import partial
 
 import pytest
@@ -96,28 +97,30 @@ def test_sentences() -> None:
 def test_digits_that_are_wrong_are_rejected() -> None:
     """A result of two words leaves the calibration in two ports, the lower digit whole and below the other."""
     text, (_, certificate) = written(CASES[3]), designed(CASES[3])
-    low, high = ".given0(i_data[14:0])", ".port_486_0(i_data[23:15])"
-    assert (text.count(low), text.count(high)) == (1, 2)  # the second one of the decimator
+    (lower,) = re.findall(r"\.(port_\w+)\(i_data\[14:0\]\)", text)  # that of the decimator
+    upper, _ = re.findall(r"\.(port_\w+)\(i_data\[23:15\]\)", text)  # its own, after the calibration's
+    low, high = ".given0(i_data[14:0])", f".{upper}(i_data[23:15])"
+    assert (text.count(low), text.count(high)) == (1, 2)
     check_decimator(text, certificate)
 
     rejected = partial(check_rejected, CASES[3])
-    digits = "ahead.port_486_0 must be a digit of the result, as there are 2 outputs for it"
-    driven = "  assign port_486_0 = given1[8:0];\n"
+    digits = f"ahead.{upper} must be a digit of the result, as there are 2 outputs for it"
+    driven = "  assign given1_8_0 = given1[8:0];\n"
     other = "not another value"
     rejected(
-        text.replace(low, ".given0(i_data[23:9])").replace(high, ".port_486_0(i_data[8:0])", 1),
+        text.replace(low, ".given0(i_data[23:9])").replace(high, f".{upper}(i_data[8:0])", 1),
         f"decimator.sum1 must be what a decimator has there after a clock with {ENTERS}, {other}",
     )
     rejected(
-        text.replace("{ port_486_0, port_484_0 }", "{ port_484_0, port_486_0 }"),
+        text.replace(f"{{ {upper}, {lower} }}", f"{{ {lower}, {upper} }}"),
         f"decimator.sum1 must be what a decimator has there after a clock with {ENTERS}, {other}",
     )
-    rejected(text.replace(driven, "  assign port_486_0 = given1[9:1];\n"), digits)
-    rejected(text.replace(driven, "  assign port_486_0 = added[8:0];\n"), digits)
-    rejected(text.replace(driven, "  assign port_486_0 = total_high[8:0];\n"), digits)
-    rejected(text.replace(driven, ""), "each bit of port_486_0 in plain_ahead that is read must be driven")
+    rejected(text.replace(driven, "  assign given1_8_0 = given1[9:1];\n"), digits)
+    rejected(text.replace(driven, "  assign given1_8_0 = added[8:0];\n"), digits)
+    rejected(text.replace(driven, "  assign given1_8_0 = total_high[8:0];\n"), digits)
+    rejected(text.replace(driven, ""), "each bit of given1_8_0 in plain_ahead_result that is read must be driven")
     rejected(
-        text.replace(driven, "  assign port_486_0 = given0[8:0];\n"),
+        text.replace(driven, "  assign given1_8_0 = given0[8:0];\n"),
         "the digits of the calibration must be 0..1, each once",
     )
     narrow = "the digits of the calibration must have 24 bits in all, and all of each but for the last"
