@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -89,18 +89,18 @@ def section(record: Sequence[Recorded]) -> str:
     rows, factors = rows_of(record), json.loads(FITTED.read_text(encoding="utf-8"))["factors"]
     unseen = [row for row in rows if row.unseen]
     names = dict.fromkeys(row.architecture for row in sorted(rows, key=lambda row: row.architecture))
-    groups: list[tuple[str, Callable[[Row], bool]]] = [
-        *((title, lambda row, family=family: row.family == family) for family, title in TITLES.items()),  # type: ignore[misc]
-        *((name, lambda row, name=name: row.architecture == name) for name in names),  # type: ignore[misc]
-        ("all", lambda row: True),
+    groups = [
+        *((title, {id(row) for row in rows if row.family == family}) for family, title in TITLES.items()),
+        *((name, {id(row) for row in rows if row.architecture == name}) for name in names),
+        ("all", set(map(id, rows))),
     ]
     lines = [
         "| designs | fitted to | tested with | LUT4 within 15 % | 9 of 10 within | FF, 9 of 10 within |",
         "|---|---|---|---|---|---|",
     ]
-    for title, belongs in groups:
-        of_fit = [row for row in rows if belongs(row) and not row.unseen]
-        tested = [row for row in unseen if belongs(row)]
+    for title, own in groups:
+        of_fit = [row for row in rows if id(row) in own and not row.unseen]
+        tested = [row for row in unseen if id(row) in own]
         if not tested:
             continue
         luts, flip_flops = errors(tested, factors), errors(tested, factors, "flip_flops")

@@ -76,7 +76,10 @@ def words(job: Case) -> list[list[tuple[int, int]]]:
     top = 1 << 23
     ends = (-top, top - 1, -1, 0, 1)
     lines = -(-job.channels // 2)
-    pick = lambda: chance.choice(ends) if chance.random() < 0.3 else chance.randrange(-top, top)  # noqa: E731
+
+    def pick() -> int:
+        return chance.choice(ends) if chance.random() < 0.3 else chance.randrange(-top, top)
+
     return [[(pick(), pick()) for _ in range(FRAMES)] for _ in range(lines)]
 
 
