@@ -5,7 +5,6 @@ import json
 import random
 import re
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
@@ -14,7 +13,7 @@ from unittest.mock import patch
 
 import pytest
 from amaranth.hdl import Const, Signal, Value
-from cocotb_tools.runner import Icarus
+from tests.sim.converters.bench_run import found_by
 
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.hdl.converters.front_end import FrontEnd, _Scan
@@ -24,7 +23,6 @@ from sosmith.model.converters.spi_converter import CONVERTERS, ReadingFault
 from sosmith.model.dataflow.status import Flag
 from sosmith.model.port import Port
 from sosmith.sim.converters.cocotb_bus import thermocouple_frame
-from sosmith.sim.simulators import PLAIN_ASSERTIONS
 
 VOLTAGE = Port.from_range("voltage", 16, Fraction(0), Fraction(10), unit="V")
 SIGNED = Port.from_range("x", 12, Fraction(-1), Fraction(1), signed=True)
@@ -115,31 +113,7 @@ def run(folder: Path, job: Case, given: list[list[list[int]]]) -> dict[str, Any]
     (folder / "job.json").write_text(
         json.dumps({"clock": job.clock, "readings": readings, "results": job.samples * job.channels})
     )
-    runner = Icarus()
-    runner.build(
-        sources=[folder / "front_end.sv"],
-        hdl_toplevel="front_end",
-        build_dir=folder / "build",
-        timescale=("1ns", "1ps"),
-        log_file=folder / "build.log",
-    )
-    with suppress(SystemExit):  # of a test that fails
-        runner.test(
-            test_module="tests.sim.converters.front_end_bench",
-            hdl_toplevel="front_end",
-            hdl_toplevel_lang="verilog",
-            build_dir=folder / "build",
-            test_dir=folder,
-            results_xml=str(folder / "results.xml"),
-            timescale=("1ns", "1ps"),
-            extra_env={"CONVERTERS_BENCH": str(folder), **PLAIN_ASSERTIONS},
-            log_file=folder / "run.log",
-        )
-    if not (folder / "found.json").exists():
-        found = re.findall(r"AssertionError: (.*)", (folder / "run.log").read_text())
-        raise AssertionError(found[0] if found else (folder / "run.log").read_text())
-    made: dict[str, Any] = json.loads((folder / "found.json").read_text())
-    return made
+    return found_by("front_end_bench", folder)
 
 
 def expected(job: Case, given: list[list[list[int]]]) -> tuple[list[list[int]], list[bool], list[int]]:

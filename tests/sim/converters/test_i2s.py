@@ -4,7 +4,6 @@
 import json
 import random
 import re
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
@@ -13,7 +12,7 @@ from unittest.mock import patch
 
 import pytest
 from amaranth.hdl import Module, Signal
-from cocotb_tools.runner import Icarus
+from tests.sim.converters.bench_run import found_by
 
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.hdl.converters.front_end import FrontEnd
@@ -25,7 +24,6 @@ from sosmith.model.converters.reading import Reading
 from sosmith.model.converters.schedule import Schedule
 from sosmith.model.converters.spi_dac import SPI_DACS
 from sosmith.model.port import Port
-from sosmith.sim.simulators import PLAIN_ASSERTIONS
 
 PORT = Port.from_range("x", 24, Fraction(-1), Fraction(1), signed=True)
 NARROW = Port.from_range("x", 16, Fraction(-1), Fraction(1), signed=True)
@@ -101,30 +99,7 @@ def run(folder: Path, job: Case, given: list[list[tuple[int, int]]], schedule: S
             }
         )
     )
-    runner = Icarus()
-    runner.build(
-        sources=[folder / "front_end.sv"],
-        hdl_toplevel="front_end",
-        build_dir=folder / "build",
-        timescale=("1ns", "1ps"),
-        log_file=folder / "build.log",
-    )
-    with suppress(SystemExit):  # of a test that fails
-        runner.test(
-            test_module="tests.sim.converters.i2s_bench",
-            hdl_toplevel="front_end",
-            hdl_toplevel_lang="verilog",
-            build_dir=folder / "build",
-            test_dir=folder,
-            results_xml=str(folder / "results.xml"),
-            timescale=("1ns", "1ps"),
-            extra_env={"CONVERTERS_BENCH": str(folder), **PLAIN_ASSERTIONS},
-            log_file=folder / "run.log",
-        )
-    if not (folder / "found.json").exists():
-        found = re.findall(r"AssertionError: (.*)", (folder / "run.log").read_text())
-        raise AssertionError(found[0] if found else (folder / "run.log").read_text())
-    return json.loads((folder / "found.json").read_text())
+    return found_by("i2s_bench", folder)
 
 
 def check(job: Case, given: list[list[tuple[int, int]]], found: Any) -> None:
