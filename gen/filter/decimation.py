@@ -286,7 +286,8 @@ def choose(spec: FilterSpec, sample_rate: Fraction, allowed: Fraction, bits: int
 
 
 def _why_stages(found: Decimation) -> str:
-    return f"{found.stages} stages keep what folds into the pass band below {nearest_db(found.worst_aliasing):.1f} dB"
+    stages = "1 stage keeps" if found.stages == 1 else f"{found.stages} stages keep"
+    return f"{stages} what folds into the pass band below {nearest_db(found.worst_aliasing):.1f} dB"
 
 
 def nearest_db(gain: Fraction) -> float:

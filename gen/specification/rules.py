@@ -295,17 +295,28 @@ def _check_band(table: FilterTable, key: str, kind: str, sample_rate: Fraction) 
         raise UnfitError(f"one frequency for {kind}", found, where=where)
     if not all(0 < frequency < sample_rate / 2 for frequency in frequencies):
         raise UnfitError(f"above 0 and below half the sample_rate ({literal(sample_rate / 2)} Hz)", found, where=where)
-    margin = MARGIN * sample_rate
-    if not all(margin <= frequency <= sample_rate / 2 - margin for frequency in frequencies):
-        raise UnfitError(
-            f"at least a millionth of the sample_rate ({literal(margin)} Hz) away from 0 and from half the"
-            " sample_rate, as no word length suffices for a filter closer to them",
-            found,
-            where=where,
-        )
+    _check_margin(table, frequencies, kind, sample_rate, where)
     if list(frequencies) != sorted(set(frequencies)):
         raise UnfitError("rising, [low, high]", found, where=where)
     return frequencies
+
+
+def _check_margin(
+    table: FilterTable, frequencies: Sequence[Fraction], kind: str, sample_rate: Fraction, where: str
+) -> None:
+    """Check that no pole lies too close to the unit circle, at the rate at which the filter works."""
+    factor = 1 if table.decimate in {None, AUTO} else int(table.decimate)
+    margin = MARGIN * sample_rate
+    if all(margin / factor <= frequency <= sample_rate / 2 - margin for frequency in frequencies):
+        return
+    rate = "the sample_rate" if factor == 1 else f"the sample_rate / {factor}"
+    cure = " without filter.decimate" if kind == "lowpass" and factor == 1 and frequencies[0] < margin else ""
+    raise UnfitError(
+        f"at least a millionth of {rate} ({literal(margin / factor)} Hz) away from 0 and from half the sample_rate,"
+        f" as no word length suffices for a filter closer to them{cure}",
+        _frequencies(frequencies),
+        where=where,
+    )
 
 
 def _frequencies(frequencies: Sequence[Fraction]) -> str:

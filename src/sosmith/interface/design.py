@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property, partial
 from os import PathLike, fspath
@@ -25,7 +25,7 @@ from sosmith.interface.quantity import Quantity
 from sosmith.interface.specification import Specification, specification_of
 from sosmith.interface.tables.cost import Cost
 from sosmith.interface.trace import Trace
-from sosmith.model.errors import SpecificationError, falling_short
+from sosmith.model.errors import ShortfallError, SpecificationError, falling_short
 
 if TYPE_CHECKING:
     from sosmith.gen.estimate.estimate import Estimate
@@ -213,13 +213,16 @@ class Design:
     def rate_costs(self) -> dict[str, RateCosts]:
         """What the filter costs "decimated", and the same filter "direct", without a decimator; empty without one.
 
-        The second is designed for the comparison.
+        The second is designed for the comparison, and missing if no formats meet the specification without a decimator.
         """
         from sosmith.gen.output.decimation_facts import direct_design, rate_costs
 
         if self.core.datapath.decimator is None:
             return {}
-        return {"decimated": rate_costs(self.core), "direct": rate_costs(direct_design(self.core))}
+        costs = {"decimated": rate_costs(self.core)}
+        with suppress(ShortfallError):
+            costs["direct"] = rate_costs(direct_design(self.core))
+        return costs
 
     @property
     def cost(self) -> Cost:

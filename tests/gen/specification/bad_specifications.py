@@ -673,7 +673,20 @@ BAD = [
     ("cutoff above half the sample rate", CUT, "cutoff = 60.5", f"filter.cutoff must be {NYQUIST}, not 60.5"),
     ("cutoff zero", CUT, "cutoff = 0.0", f"filter.cutoff must be {NYQUIST}, not 0"),
     ("cutoff negative", CUT, "cutoff = -1e-3", f"filter.cutoff must be {NYQUIST}, not -0.001"),
-    ("cutoff of a millionth", CUT, "cutoff = 9.9e-5", f"filter.cutoff must be {MARGIN}, not 9.9e-05"),
+    (
+        "cutoff of a millionth",
+        CUT,
+        "cutoff = 9.9e-5",
+        f"filter.cutoff must be {MARGIN} without filter.decimate, not 9.9e-05",
+    ),
+    (
+        "cutoff of a millionth behind a decimator",
+        CUT,
+        "cutoff = 2.4e-5\ndecimate = 4",
+        f"filter.cutoff must be {MARGIN}, not 2.4e-05".replace(
+            "the sample_rate (0.0001 Hz)", "the sample_rate / 4 (2.5e-05 Hz)"
+        ),
+    ),
     (
         "cutoff just below half the sample rate",
         CUT,

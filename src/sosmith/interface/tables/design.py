@@ -14,7 +14,7 @@ from sosmith.gen.facts.table import Table
 from sosmith.gen.filter.decimation import SAMPLED
 from sosmith.gen.output.core_facts import CoreFacts, SectionFacts
 from sosmith.gen.output.decimation_facts import DecimationFacts, RateCosts
-from sosmith.gen.quantity import quantity
+from sosmith.gen.quantity import count, quantity
 from sosmith.gen.specification.specification import Specification
 from sosmith.gen.specification.wear_limits import WearSpec
 from sosmith.instrument.calibration.uncertainty import of_polynomial
@@ -84,7 +84,8 @@ def _decimation(found: DecimationFacts, unit: str) -> Iterator[tuple[str, str]]:
         )
     yield (
         "decimator",
-        f"{found.stages} integrators and combs of {found.width} bits, {found.width - found.dropped} bits leave, at "
+        f"{count(found.stages, 'integrator')} and {count(found.stages, 'comb')} of {found.width} bits, "
+        f"{found.width - found.dropped} bits leave, at "
         f"{found.sample_rate:,.6g} Hz",
     )
     if found.held:
@@ -117,6 +118,8 @@ def _rates(costs: Mapping[str, RateCosts], unit: str, channels: int) -> Table:
         ("error bound", *(quantity(one.bound, unit) for one in each)),
         ("delay", *(quantity(one.delay, "s") for one in each)),
     ]
+    if "direct" not in costs:
+        rows.append(("without a decimator", "no word lengths meet the specification"))
     return Table("The same filter without a decimator", rows, ("", *costs))
 
 
