@@ -21,7 +21,7 @@ from types import MappingProxyType
 
 from sosmith.verify.certificate_file import Certificate, NodeEntry, Operation, StageEntry
 from sosmith.verify.graph import require
-from sosmith.verify.parallel.forms import Forms, shifted
+from sosmith.verify.parallel.forms import ONE, Forms, shifted
 from sosmith.verify.parallel.lanes import LaneNode, in_lanes
 from sosmith.verify.program.normal_form import Form, Monomial, constant, plus
 
@@ -198,8 +198,11 @@ class GraphCodes:
     def shortened(self, word: Form, width: int, at_inlet: bool = False) -> Form:
         """Return the variable whose code a word of `width` bits is; any other word as it is.
 
-        Those are what the next lane takes over, and, where a word enters an instance, what stages hand on.
+        Those are what the next lane takes over, and, where a word enters an instance, what stages hand on. A constant
+        stays: its few bits are also the lowest ones of a code that is a multiple of a power of two.
         """
+        if not word.keys() - {ONE}:
+            return word
         for codes, by_width in ((self._seams, self._seams_of), (self._kept, self._kept_of)):
             if not codes or (len(word) < 2 if codes is self._kept else not at_inlet):
                 continue
