@@ -19,7 +19,7 @@ FLAT = {
         "family": "chebyshev1",
         "kind": "lowpass",
         "order": 6,
-        "cutoff": 2.127,
+        "cutoff": 2.1269429280502186,
         "passband_loss": 0.5,
         "decimate": 4,
     },
