@@ -7,11 +7,11 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
+from sosmith.gen.estimate.memories import of_memory
 from sosmith.gen.estimate.quantities import (
     Quantities,
     check_bits,
     of_check_bits,
-    of_memory,
     soft_product,
     tree,
 )
