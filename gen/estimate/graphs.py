@@ -12,7 +12,6 @@ from sosmith.gen.estimate.quantities import (
     Quantities,
     check_bits,
     of_check_bits,
-    soft_product,
     tree,
 )
 from sosmith.gen.fpga.boards import Device
@@ -187,13 +186,25 @@ def of_product(product: Multiplication, device: Device, constant: int | None = N
     if constant is not None and not abs(constant) & (abs(constant) - 1):
         return Counter({"sums": product.data.bits} if constant < 0 else {})  # wires alone, or a change of sign
     if device.multiplier is None:
-        mask = (1 << product.factor.bits) - 1
-        rows = min(product.data.bits, product.factor.bits) if constant is None else (constant & mask).bit_count()
-        return Counter({"soft_multipliers" if constant is None else "soft_products": soft_product(product, rows)})
+        return _soft_product(product, constant)
     blocks = product.blocks_of(device.factor_bits)
     joined = (blocks - 1) * 2 * device.factor_bits
     extra = product.extra_bits_of(device.factor_bits)
     return Counter({"blocks": blocks, "joined": joined + extra})
+
+
+def _soft_product(product: Multiplication, constant: int | None) -> Quantities:
+    """Count a product without multiplier blocks: the bits to be added up, or what adds them.
+
+    A zero of a constant leaves none. Copies of a variable are added up three by three, the last two by carry; with a
+    sign each of them is extended to the whole product, half of the other operand on average.
+    """
+    data, factor = product.size
+    if constant is not None:
+        return Counter({"soft_products": data * (constant & ((1 << factor) - 1)).bit_count()})
+    narrow, wide = sorted((data, factor))
+    signed = product.data.signed or product.factor.signed
+    return Counter({"soft_multipliers": max(0, 2 * narrow - 3) * (wide + (narrow // 2 if signed else 1))})
 
 
 def _sum(plan: Pipelined, index: int) -> Quantities:

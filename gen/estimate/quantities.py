@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
-from sosmith.gen.word_lengths.cost import Multiplication
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.port import Port
 
@@ -70,16 +69,3 @@ def of_output_buffer(bits: int) -> Quantities:
 def flags_of(datapath: Datapath) -> int:
     """Return the number of flags of a result: two of inputs, one of its limits, those of wear, one while it settles."""
     return 3 + 2 * bool(datapath.wear) + datapath.settles
-
-
-def soft_product(product: Multiplication, rows: int) -> int:
-    """Return the LUT4 of a product without multiplier blocks: rows are added up three by three, the last two by carry.
-
-    `rows` is the number of shifted copies of the data, or of the factor if that is wider. With a sign each of them is
-    extended to the whole product, half of the other operand on average.
-    """
-    narrow, wide = sorted((product.data.bits, product.factor.bits))
-    if rows < narrow:  # a constant with zeros
-        narrow, wide = product.factor.bits, product.data.bits
-    signed = product.data.signed or product.factor.signed
-    return (2 * (rows - 2) + 1) * (wide + (narrow // 2 if signed else 1)) if rows > 1 else 0
