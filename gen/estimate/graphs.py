@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from sosmith.gen.estimate.memories import of_memory
+from sosmith.gen.estimate.products import of_product, product_in
 from sosmith.gen.estimate.quantities import (
     Quantities,
     check_bits,
@@ -15,7 +16,6 @@ from sosmith.gen.estimate.quantities import (
     tree,
 )
 from sosmith.gen.fpga.boards import Device
-from sosmith.gen.word_lengths.cost import Multiplication, multiplication_of
 from sosmith.hdl.plan.interleaving import schedule
 from sosmith.hdl.plan.look_ahead import TurnPlan
 from sosmith.hdl.plan.pipeline import known_early, pipeline_stages
@@ -174,37 +174,8 @@ def _operation(graph: Graph, node: Node, device: Device, *, loads: bool) -> Quan
         return Counter({"sums": nodes[node.operands[0]].width})
     if node.op is Op.CLAMP:
         return clamp(node, nodes[node.operands[0]])
-    product = multiplication_of(graph, node)
-    if product is None:
-        return Counter()
-    constant = node.parameter if node.op is Op.SCALE and not loads else None
-    return of_product(product, device, constant)
-
-
-def of_product(product: Multiplication, device: Device, constant: int | None = None) -> Quantities:
-    """Count a product, by a constant or of two values, as synthesis makes it on a device."""
-    if constant is not None and not abs(constant) & (abs(constant) - 1):
-        return Counter({"sums": product.data.bits} if constant < 0 else {})  # wires alone, or a change of sign
-    if device.multiplier is None:
-        return _soft_product(product, constant)
-    blocks = product.blocks_of(device.factor_bits)
-    joined = (blocks - 1) * 2 * device.factor_bits
-    extra = product.extra_bits_of(device.factor_bits)
-    return Counter({"blocks": blocks, "joined": joined + extra})
-
-
-def _soft_product(product: Multiplication, constant: int | None) -> Quantities:
-    """Count a product without multiplier blocks: the bits to be added up, or what adds them.
-
-    A zero of a constant leaves none. Copies of a variable are added up three by three, the last two by carry; with a
-    sign each of them is extended to the whole product, half of the other operand on average.
-    """
-    data, factor = product.size
-    if constant is not None:
-        return Counter({"soft_products": data * (constant & ((1 << factor) - 1)).bit_count()})
-    narrow, wide = sorted((data, factor))
-    signed = product.data.signed or product.factor.signed
-    return Counter({"soft_multipliers": max(0, 2 * narrow - 3) * (wide + (narrow // 2 if signed else 1))})
+    product = product_in(graph, node, loads=loads)
+    return Counter() if product is None else of_product(product, device)
 
 
 def _sum(plan: Pipelined, index: int) -> Quantities:

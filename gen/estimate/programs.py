@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections import Counter
 
 from sosmith.gen.architectures.architecture import Architecture
-from sosmith.gen.estimate.graphs import clamp, of_product
+from sosmith.gen.estimate.graphs import clamp
 from sosmith.gen.estimate.memories import of_memory, of_rom
+from sosmith.gen.estimate.products import Product, of_product
 from sosmith.gen.estimate.quantities import (
     Quantities,
     check_bits,
@@ -38,7 +39,7 @@ def of_program(architecture: Architecture, device: Device) -> Quantities:
     made["shifts"] += 2 * word * serial
     if not serial:
         factor = Operand(word, signed=True)
-        made += of_product(Multiplication(factor, factor), device)
+        made += of_product(Product(Multiplication(factor, factor)), device)
     made["channels"] += channel_bits(channels)
     depth = SERIAL_DEPTH if serial else FOLDED_DEPTH
     made["registers"] += acc + word * (4 if serial else 3) + (depth - 1) * (instruction_bits(program) + 1)
