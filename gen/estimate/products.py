@@ -67,9 +67,17 @@ def of_product(product: Product, device: Device) -> Quantities:
         return Counter({"sums": operands.data.bits} if constant is not None and constant < 0 else {})
     if device.multiplier is None:
         return Counter(_soft(operands) if constant is None else {"soft_products": _added_bits(operands, constant)})
-    blocks = operands.blocks_of(device.factor_bits)
-    joined = (blocks - 1) * 2 * device.factor_bits
-    return Counter({"blocks": blocks, "joined": joined + operands.extra_bits_of(device.factor_bits)})
+    return Counter({"blocks": operands.blocks_of(device.factor_bits), "joined": _joined(operands, device.factor_bits)})
+
+
+def _joined(operands: Multiplication, block: int) -> int:
+    """Return the bits of the sums that join the products of blocks, of which each begins where its operands do."""
+    wide, narrow = sorted(operands.size, reverse=True)
+    pieces = [(low, min(block, wide - low)) for low in range(0, wide, block)]
+    of_factor = [low for low in range(0, narrow, block)]
+    return sum(bits + narrow for low, bits in pieces if low) + sum(
+        bits + narrow - low for low in of_factor if low for _, bits in pieces
+    )
 
 
 def _added_bits(operands: Multiplication, constant: int) -> int:
