@@ -15,7 +15,6 @@ from sosmith.gen.estimate.quantities import (
 )
 from sosmith.gen.estimate.sums import of_sums
 from sosmith.gen.fpga.boards import Device
-from sosmith.model.dataflow.adder_graph import adder_bits, adder_graph, by_operand
 from sosmith.model.dataflow.graph import Graph, Node, Op
 
 
@@ -23,9 +22,6 @@ def of_pipelined(plan: Pipelined, device: Device, *, protect: str = "none", load
     """Count a stage on a device; `loads` says that its constants come from registers."""
     made: Quantities = Counter()
     graph = plan.graph
-    for operand, group in by_operand(graph, plan.adders):
-        sums = adder_graph(tuple(graph.nodes[index].parameter for index in group))
-        made["sums"] += adder_bits(sums, *graph.nodes[operand].range[1:])
     made += of_sums(plan)
     for index, node in enumerate(graph.nodes):
         if node.op is Op.DELAY:

@@ -1,80 +1,116 @@
-"""Quantities of sums.
+"""Quantities of sums, with those that products by constants are made of.
 
 Synthesis merges sums that only one other sum uses in the same pipeline stage, and adds up all their operands at once:
-three by three without carries, in two LUT4 a bit, until two are left for a chain of carries.
+three by three without carries, in two LUT4 a bit, until two are left for a chain of carries. A constant is an operand
+as well, though what adds it is simpler.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from sosmith.gen.estimate.pipelined import SUMS, Pipelined
 from sosmith.gen.estimate.quantities import Quantities
+from sosmith.model.dataflow.adder_graph import Adder, adder_bits, adder_graph, by_operand, multiple_range, odd_part
 from sosmith.model.dataflow.graph import Graph, Node, Op
 
 
 class _Added(NamedTuple):
-    """What is added up: its lowest bit, and the bit behind its highest; a negative one is subtracted."""
+    """What is added up: its lowest bit, the bit behind its highest, and whether it is subtracted."""
 
     low: int
     end: int
     signed: bool
     negative: bool = False
+    constant: bool = False
+
+
+class _Last(NamedTuple):
+    """The last sum of a product by a constant that no other product uses, and what it adds up: lowest bit and width."""
+
+    bits: int
+    operands: tuple[tuple[int, int], ...]
 
 
 def of_sums(plan: Pipelined) -> Quantities:
-    """Count all sums of a stage but those that products by constants are made of."""
+    """Count all sums of a stage."""
     made: Quantities = Counter()
-    nodes = plan.graph.nodes
-    for index in range(len(nodes)):
-        users = plan.users[index]
-        alone = not (len(users) == 1 and users[0] < len(nodes) and _takes(plan, index, users[0]))
-        if _is_sum(plan, index) and alone:
-            made += _of_added(list(_added(plan, index)), plan.width(index))
+    last = dict(_last_sums(plan, made))
+    for index in range(len(plan.graph.nodes)):
+        if _is_sum(plan, index):
+            if not _is_taken(plan, index):
+                made += _of_added(list(_added(plan, index, last)), plan.width(index))
+        elif index in last and not _is_taken(plan, index):
+            made["sums"] += last[index].bits
     return made
+
+
+def _last_sums(plan: Pipelined, made: Quantities) -> Iterator[tuple[int, _Last]]:
+    """Yield the last sum of each product by a constant, and add all others to `made`."""
+    nodes = plan.graph.nodes
+    for operand, group in by_operand(plan.graph, plan.adders):
+        low, high = nodes[operand].range[1:]
+        sums = adder_graph(tuple(nodes[index].parameter for index in group))
+        used = {term[0] for each in sums for term in (each.left, each.right)}
+        last = {each.multiple: each for number, each in enumerate(sums, 1) if number not in used}
+        made["sums"] += adder_bits([each for each in sums if each.multiple not in last], low, high)
+        multiples = [1, *(each.multiple for each in sums)]
+        for index in group:
+            multiple, shift = odd_part(nodes[index].parameter)
+            if multiple in last:
+                yield index, _last_sum(last.pop(multiple), multiples, shift, (low, high))
+
+
+def _last_sum(adder: Adder, multiples: Sequence[int], shift: int, ends: tuple[int, int]) -> _Last:
+    terms = []
+    for number, place in (adder.left, adder.right):
+        least, most = multiple_range(multiples[number], *ends)
+        terms.append((shift + place, max(least.bit_length(), most.bit_length()) + (least < 0)))
+    return _Last(adder_bits([adder], *ends), tuple(terms))
 
 
 def _is_sum(plan: Pipelined, index: int) -> bool:
     return plan.graph.nodes[index].op in SUMS and not _is_concatenation(plan.graph, plan.graph.nodes[index])
 
 
-def _takes(plan: Pipelined, index: int, user: int) -> bool:
-    return _is_sum(plan, index) and _is_sum(plan, user) and plan.is_merged(index, user)
+def _is_taken(plan: Pipelined, index: int) -> bool:
+    """Say whether synthesis merges a sum with the one that uses it."""
+    user = next(iter(plan.users[index]), len(plan.graph.nodes))
+    return user < len(plan.graph.nodes) and _is_sum(plan, user) and plan.is_merged(index, user)
 
 
-def _added(plan: Pipelined, index: int, low: int = 0, *, negative: bool = False) -> Iterator[_Added]:
-    """Yield what is added up for a sum whose lowest bit is `low`."""
+def _added(
+    plan: Pipelined, index: int, last: Mapping[int, _Last], low: int = 0, *, negative: bool = False
+) -> Iterator[_Added]:
+    """Yield what is added up for a sum whose lowest bit is `low`; `last` as in `_last_sums`."""
     nodes = plan.graph.nodes
     node = nodes[index]
     for number, operand in enumerate(node.operands):
         source, start = plan.source(operand), low + node.frac - nodes[operand].frac
         minus = negative != (number == 1 and node.op is Op.SUBTRACT)
         if nodes[source].op is Op.CONSTANT:
-            yield from _ones(nodes[source].parameter, start)
-        elif _takes(plan, source, index):
-            yield from _added(plan, source, start, negative=minus)
+            yield _Added(start, start + 1, signed=False, constant=True)
+        elif _is_sum(plan, source) and _is_taken(plan, source):
+            yield from _added(plan, source, last, start, negative=minus)
+        elif source in last and _is_taken(plan, source):
+            for place, bits in last[source].operands:
+                yield _Added(start + place, start + place + bits, nodes[operand].signed, minus)
         else:
             yield _Added(start, start + nodes[operand].width, nodes[operand].signed, minus)
-
-
-def _ones(constant: int, low: int) -> Iterator[_Added]:
-    """Yield the ones of a constant; those of a negative one from the sign on are one."""
-    for bit in range(constant.bit_length() + 1):
-        if constant >> bit & 1:
-            yield _Added(low + bit, low + bit + 1, signed=constant < 0 and bit == constant.bit_length())
 
 
 def _of_added(added: Sequence[_Added], width: int) -> Quantities:
     """Count what adds up so many numbers in `width` bits: carries, and what leaves two numbers to them."""
     made: Quantities = Counter()
-    end = min(width, max(each.end for each in added))
-    for bit in range(end):
-        here = [each for each in added if each.low <= bit and (each.signed or bit < each.end)]
-        made["merged"] += max(0, len(here) - 2)
-        made["sums"] += len(here) >= 2 or (len(here) == 1 and any(each.negative for each in added if each.low <= bit))
-    made["sums"] += width - end
+    values = [each for each in added if not each.constant]
+    for bit in range(min(width, max((each.end for each in values), default=0))):
+        here = sum(each.low <= bit and (each.signed or bit < each.end) for each in values)
+        made["merged"] += max(0, here - 2)
+        made["rounded"] += here > 1 and len(values) < len(added)
+    starts = sorted(each.low for each in added)[1:2] + [each.low for each in added if each.negative]
+    made["sums"] += max(0, width - min(starts, default=width))
     return made
 
 
