@@ -7,12 +7,7 @@ from collections import Counter
 from sosmith.gen.estimate.memories import of_memory
 from sosmith.gen.estimate.pipelined import SUMS, Pipelined
 from sosmith.gen.estimate.products import of_product, product_in
-from sosmith.gen.estimate.quantities import (
-    Quantities,
-    check_bits,
-    of_check_bits,
-    tree,
-)
+from sosmith.gen.estimate.quantities import Quantities, check_bits, of_check_bits, tree
 from sosmith.gen.estimate.sums import of_sums
 from sosmith.gen.fpga.boards import Device
 from sosmith.model.dataflow.graph import Graph, Node, Op
@@ -20,9 +15,7 @@ from sosmith.model.dataflow.graph import Graph, Node, Op
 
 def of_pipelined(plan: Pipelined, device: Device, *, protect: str = "none", loads: bool = False) -> Quantities:
     """Count a stage on a device; `loads` says that its constants come from registers."""
-    made: Quantities = Counter()
-    graph = plan.graph
-    made += of_sums(plan)
+    graph, made = plan.graph, of_sums(plan)
     for index, node in enumerate(graph.nodes):
         if node.op is Op.DELAY:
             made += _state(plan, index, device, protect)

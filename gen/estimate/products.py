@@ -27,6 +27,13 @@ class Product(NamedTuple):
     constant: int | None = None
 
     @property
+    def bits(self) -> int:
+        """Bits that are computed: all of them, or as many as a negative constant has without a sign."""
+        data, factor = self.operands.size
+        cut = self.constant is not None and self.constant < 0 and not self.operands.data.signed
+        return factor if cut else data + factor
+
+    @property
     def is_wires(self) -> bool:
         """Whether it takes no more than wires, or a change of sign."""
         return self.constant is not None and not abs(self.constant) & (abs(self.constant) - 1)
@@ -66,26 +73,25 @@ def of_product(product: Product, device: Device) -> Quantities:
     if product.is_wires:
         return Counter({"sums": operands.data.bits} if constant is not None and constant < 0 else {})
     if device.multiplier is None:
-        return Counter(_soft(operands) if constant is None else {"soft_products": _added_bits(operands, constant)})
-    return Counter({"blocks": operands.blocks_of(device.factor_bits), "joined": _joined(operands, device.factor_bits)})
+        return _soft(operands) if constant is None else Counter({"soft_products": _added_bits(product, constant)})
+    block = device.factor_bits
+    return Counter({"blocks": operands.blocks_of(block), "joined": _joined(product, block)})
 
 
-def _joined(operands: Multiplication, block: int) -> int:
-    """Return the bits of the sums that join the products of blocks, of which each begins where its operands do."""
-    wide, narrow = sorted(operands.size, reverse=True)
-    pieces = [(low, min(block, wide - low)) for low in range(0, wide, block)]
-    of_factor = [low for low in range(0, narrow, block)]
-    return sum(bits + narrow for low, bits in pieces if low) + sum(
-        bits + narrow - low for low in of_factor if low for _, bits in pieces
-    )
+def _joined(product: Product, block: int) -> int:
+    """Return the bits of the sums that join the products of blocks, from where they begin to where they end."""
+    narrow, wide = sorted(product.operands.size)
+    bits = 0
+    for low in range(0, wide, block):
+        width = min(min(block, wide - low) + narrow, product.bits - low)
+        bits += width * (low > 0) + sum(width - start for start in range(block, narrow, block))
+    return bits
 
 
-def _added_bits(operands: Multiplication, constant: int) -> int:
+def _added_bits(product: Product, constant: int) -> int:
     """Return the bits to be added up in a product by a constant: a copy of the data for each of its ones."""
-    data, factor = operands.size
-    ones = (bit for bit in range(factor) if constant >> bit & 1)
-    unsigned = not operands.data.signed and constant < 0  # what is above the result is left out
-    return sum(min(data, factor - bit) if unsigned else data for bit in ones)
+    data, factor = product.operands.size
+    return sum(min(data, product.bits - bit) for bit in range(factor) if constant >> bit & 1)
 
 
 def _soft(operands: Multiplication) -> Quantities:
