@@ -67,7 +67,8 @@ def _last_sum(adder: Adder, multiples: Sequence[int], shift: int, ends: tuple[in
     terms = []
     for number, place in (adder.left, adder.right):
         least, most = multiple_range(multiples[number], *ends)
-        terms.append((shift + place, max(least.bit_length(), most.bit_length()) + (least < 0)))
+        bits = max((least if least >= 0 else ~least).bit_length(), most.bit_length()) + (least < 0)
+        terms.append((shift + place, bits))
     return _Last(adder_bits([adder], *ends), tuple(terms))
 
 
