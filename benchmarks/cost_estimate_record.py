@@ -117,13 +117,15 @@ def section(record: Sequence[Recorded]) -> str:
 ## Estimates before synthesis
 
 Written by `python -m benchmarks.cost_estimate` from `benchmarks/cost_estimate.json`. `design`, the report, the studio
-and `explore` show estimates of LUT4 and flip-flops. They count bits of sums, choices, comparisons and memories in the
-plan of the hardware, each times a factor for its architecture and family of FPGA. Factors are fitted to synthesis with
-Yosys of what the seeds up to {FITTED_UP_TO} draw, and of cores above. Errors are those on what later seeds draw,
-which was looked at neither by the fit nor while quantities were chosen. Drawn are filters of all families and kinds,
-orders 1 to 4, some calibrated, with up to 32 channels, reload, protect, decimate, look-ahead and limits of multipliers,
-but no parallel cores with reload on FPGAs without multiplier blocks. iCE40 is the UP5K and the HX8K, ECP5 the
-LFE5U-25F, Gowin the GW1NR-9C.
+and `explore` show estimates of LUT4 and flip-flops. They count bits of sums, products, choices, comparisons and
+memories in the plan of the hardware as synthesis makes them, each times a factor for its architecture and family of
+FPGA: sums that are merged, products that several multiplier blocks make, memories in slices, of block RAM or of LUT4 by
+what Yosys weighs them with. Factors are fitted to synthesis with Yosys of what the seeds up to {FITTED_UP_TO} draw, and
+of cores above. Errors are those on what later seeds draw, which was looked at neither by the fit nor while quantities
+were chosen. Drawn are filters of all families, kinds and realizations, orders 1 to 4, some calibrated, with up to 32
+channels, reload, protect, start, decimate, look-ahead, several samples a clock and limits of multipliers, but no
+parallel cores with reload on FPGAs without multiplier blocks. iCE40 is the UP5K and the HX8K, ECP5 the LFE5U-25F, Gowin
+the GW1NR-9C.
 
 {table}
 """
