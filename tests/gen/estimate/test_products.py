@@ -44,15 +44,15 @@ def test_a_constant_that_is_loaded_has_its_sign_and_spare_bits() -> None:
     assert counted("ulx3s_25f", 0x2FFFF, 20, loads=True)["blocks"] == 4
 
 
-@pytest.mark.parametrize(("constant", "blocks"), [(962, 1), (-339, 2)])
-def test_a_negative_constant_has_all_bits_of_an_unsigned_product(constant: int, blocks: int) -> None:
-    """-339 times 12 bits is emitted as ``22'h3ffead * temperature``, which takes two blocks."""
+@pytest.mark.parametrize(("constant", "blocks", "joined"), [(962, 1, 0), (-339, 2, 22 - 18)])
+def test_a_negative_constant_has_all_bits_of_an_unsigned_product(constant: int, blocks: int, joined: int) -> None:
+    """-339 times 12 bits is emitted as ``22'h3ffead * temperature``: two blocks, of which four bits are added up."""
     g = GraphBuilder()
     temperature = g.input("temperature", 0, 0, 4095)
     graph = g.build([g.multiply(g.constant(constant, 0), temperature)])
     product = product_in(graph, graph.nodes[-1], loads=False)
     assert product is not None
-    assert of_product(product, find_board("ulx3s_25f").device)["blocks"] == blocks
+    assert of_product(product, find_board("ulx3s_25f").device) == {"blocks": blocks, "joined": joined}
 
 
 def test_counted_blocks_are_those_of_synthesis() -> None:
