@@ -36,7 +36,7 @@ from sosmith.gen.fpga.yosys import yosys_version
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.model.errors import SosmithError
 
-COUNT = 300
+COUNT = 576
 """Seeds that are drawn."""
 
 _LEAST_CORES = 3
