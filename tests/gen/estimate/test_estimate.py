@@ -82,12 +82,12 @@ def test_the_factors_are_those_of_the_fit() -> None:
 
 
 def with_every_quantity() -> list[Recorded]:
-    """Return rows of every architecture and family that together have every quantity, and are designed at once."""
+    """Return rows with every quantity and family of each architecture, which are designed at once."""
     drawn = [row for row in recorded() if "seed" in row and "refused" not in row]
     rows = [row for row in drawn if row["architecture"] != "parallel" or not _is_searched(row["seed"])]
-    chosen, seen = [], set[str]()
+    chosen, seen = [], set[tuple[str, str]]()
     for row in rows:
-        told = {*row["quantities"], f"{row['architecture']} on {find_board(row['board']).device.family}"}
+        told = {(row["architecture"], name) for name in (*row["quantities"], find_board(row["board"]).device.family)}
         if not told <= seen:
             chosen.append(row)
             seen |= told
@@ -133,7 +133,9 @@ def test_products_are_made_of_adders_where_there_are_no_blocks() -> None:
     assert without is not None
     assert (with_blocks.multiplier_blocks > 0, without.multiplier_blocks) == (True, 0)
     assert without.luts > with_blocks.luts
-    assert sum(map(len, on_board(made, BOARDS["ice40_hx8k_b_evn"]).adders)) > 0
+    adapted = on_board(made, BOARDS["ice40_hx8k_b_evn"])
+    assert sum(map(len, adapted.adders)) > 0
+    assert without == estimated(adapted, BOARDS["ice40_hx8k_b_evn"])
 
 
 def test_what_is_told_of_an_estimate() -> None:
