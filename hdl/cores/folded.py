@@ -73,7 +73,7 @@ from sosmith.hdl.check_bits import CheckBits
 from sosmith.hdl.instruction import PipelinedInstruction
 from sosmith.hdl.memory_ports import read_port, write_port
 from sosmith.hdl.pipelined_logic import limits
-from sosmith.hdl.plan.folded_clocks import FOLDED_DEPTH, SERIAL_DEPTH, memory_depth, overlaps
+from sosmith.hdl.plan.folded_clocks import FOLDED_DEPTH, SERIAL_DEPTH, memory_depth, overlaps, word_slices
 from sosmith.hdl.plan.instructions import address_bits, encoded, instruction_bits
 from sosmith.hdl.plan.streams import channel_bits
 from sosmith.hdl.reload import ReloadPort
@@ -105,10 +105,6 @@ _NO_COLLISIONS = {"no_rw_check": 1}
 a clock a simulator reads the old word and a block RAM anything; without the attribute, Yosys adds registers and a
 comparator to make both equal.
 """
-
-
-_SLICES = {256: 16, 512: 8, 1024: 4, 2048: 2}
-"""Width of an iCE40's block RAM, by its number of words."""
 
 
 class _Control:
@@ -593,16 +589,10 @@ class FoldedCore(Shell):
     def _memory(
         self, m: Module, check: CheckBits, read: tuple[Value, Value], write: tuple[Value, Value, Value]
     ) -> Value:
-        """Make the memory of all channels; return the word read.
-
-        It is cut into slices as wide as a block RAM of so many words. Block RAMs side by side need no logic; behind
-        each other they would.
-        """
+        """Make the memory of all channels, cut into `word_slices`; return the word read."""
         words, depth = self.program.words, memory_depth(self.program, self.channels)
-        width = next((bits for most, bits in _SLICES.items() if depth <= most), _SLICES[max(_SLICES)])
         slices: list[Value] = []
-        for low in range(0, check.width, width):
-            high = min(low + width, check.width)
+        for low, high in word_slices(depth, check.width):
             one = check.word(1) >> low & ((1 << (high - low)) - 1)
             init = [one if address % words == self.program.one else 0 for address in range(depth)]
             m.submodules[f"words{low}"] = ram = Memory(shape=high - low, depth=depth, init=init, attrs=_NO_COLLISIONS)
