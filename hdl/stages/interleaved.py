@@ -160,8 +160,27 @@ class InterleavedStage(wiring.Component):
             adders=self.adders,
         )
         logic.connect([getattr(self, f"i{k}") for k in range(len(graph.inputs))])
-        at, wires, names = logic.at, logic.wires, logic.names
         scrub = self._scrub(m)
+        reads = self._connect_memories(m, logic, valid, channel, scrub)
+        if self.protect != "none":
+            self._judge(m, reads, [there | scrubs for there, scrubs in zip(valid, scrub, strict=True)])
+        last = plan.depth - 1
+        for k, i in enumerate(graph.outputs):
+            register = Signal(shape_of(graph.nodes[i]), name=f"{logic.names[i]}_register", reset_less=True)
+            m.d.comb += getattr(self, f"o{k}").eq(register)
+            with m.If(self.advance):
+                m.d.sync += register.eq(logic.at(i, last))
+                if graph.nodes[i].op is Op.CLAMP:
+                    below, above = limits(graph.nodes[i], logic.at(graph.nodes[i].operands[0], last))
+                    m.d.sync += self.o_saturated.eq(below | above)
+        return m
+
+    def _connect_memories(
+        self, m: Module, logic: PipelinedLogic, valid: list[Value], channel: list[Value], scrub: list[Value]
+    ) -> dict[int, Read]:
+        """Give each state a memory with one word for each channel; return what is read, by the node of the state."""
+        graph, plan = self.stage.graph, self.schedule
+        at, wires, names = logic.at, logic.wires, logic.names
         reads: dict[int, Read] = {}
         for index in graph.delays:
             node, written = graph.nodes[index], plan.writes[index]
@@ -193,18 +212,7 @@ class InterleavedStage(wiring.Component):
                 write.data.eq(Mux(self.clear, 0, check.written(following))),
                 write.en.eq(self.clear | (self.advance & writes)),
             ]
-        if self.protect != "none":
-            self._judge(m, reads, [there | scrubs for there, scrubs in zip(valid, scrub, strict=True)])
-        last = plan.depth - 1
-        for k, i in enumerate(graph.outputs):
-            register = Signal(shape_of(graph.nodes[i]), name=f"{names[i]}_register", reset_less=True)
-            m.d.comb += getattr(self, f"o{k}").eq(register)
-            with m.If(self.advance):
-                m.d.sync += register.eq(at(i, last))
-                if graph.nodes[i].op is Op.CLAMP:
-                    below, above = limits(graph.nodes[i], at(graph.nodes[i].operands[0], last))
-                    m.d.sync += self.o_saturated.eq(below | above)
-        return m
+        return reads
 
     def _scrub(self, m: Module) -> list[Value]:
         """Return for each pipeline stage, and for the outputs, whether it holds a scrub."""
