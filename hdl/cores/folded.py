@@ -320,10 +320,10 @@ class FoldedCore(Shell):
         if self.channels == 1:
             m.d.comb += control.start.eq(self.s_axis_tvalid & ~waits)
             return
-        found, exists = Signal(name="found"), Signal(name="channel_exists")
-        m.d.comb += [found.eq(self.s_axis_tvalid & ~waits), exists.eq(self.s_axis_tdest < self.channels)]
-        m.d.comb += [control.start.eq(found & exists), self.m_axis_tdest.eq(control.channel)]
-        m.d.sync += control.dropped.eq(found & ~exists & ~control.dropped)
+        offered, exists = Signal(name="found"), Signal(name="channel_exists")
+        m.d.comb += [offered.eq(self.s_axis_tvalid & ~waits), exists.eq(self.s_axis_tdest < self.channels)]
+        m.d.comb += [control.start.eq(offered & exists), self.m_axis_tdest.eq(control.channel)]
+        m.d.sync += control.dropped.eq(offered & ~exists & ~control.dropped)
         with m.If(control.start):
             m.d.sync += control.channel.eq(self.s_axis_tdest)
 
