@@ -502,7 +502,7 @@ def _reload(design: CoreDesign) -> ReloadFacts | None:
 
 def _in_order(datapath: Datapath) -> Sequence[Datapath]:
     """Return what stands before a decimator, if anything does, and the datapath itself."""
-    return (datapath,) if datapath.ahead is None else (datapath.ahead, datapath)
+    return (datapath,) if datapath.calibration is None else (datapath.calibration, datapath)
 
 
 def _formats(stage: Stage, datapath: Datapath) -> Sequence[NodeFormat]:

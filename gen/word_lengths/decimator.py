@@ -91,7 +91,7 @@ class PreStage:
         """Return the datapath of the filter with the decimator, and the calibration if there is one, before it."""
         ahead = self.ahead(calibrated)
         inputs, codes = ((self.decimator.input,), ()) if ahead is None else (ahead.inputs, ahead.calibrated)
-        return replace(datapath, inputs=inputs, calibrated=codes, decimator=self.decimator, ahead=ahead)
+        return replace(datapath, inputs=inputs, calibrated=codes, decimator=self.decimator, calibration=ahead)
 
     def counted(self, quantized: Quantized) -> Quantized:
         """Return the proven filter with the parts of decimator and calibration in its budget."""

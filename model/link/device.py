@@ -71,20 +71,20 @@ class Device:
 
     def feed(self, data: bytes) -> bytes:
         """Take bytes of the line, whatever they are; return those that the board sends back."""
-        return b"".join(self._answer(found) for found in self._receiver.feed(data))
+        return b"".join(self._answer(received) for received in self._receiver.feed(data))
 
-    def _answer(self, found: Message | Counter) -> bytes:
-        if isinstance(found, Counter):
-            self._count(found)
+    def _answer(self, received: Message | Counter) -> bytes:
+        if isinstance(received, Counter):
+            self._count(received)
             return b""
-        if found.type == Type.OPEN:
-            self._next = found.sequence
+        if received.type == Type.OPEN:
+            self._next = received.sequence
             self._retained.clear()
             self._core.reset()
         if self._next is None:
             self._count(Counter.SEQUENCE)
             return b""
-        age = (self._next - found.sequence) % SEQUENCES
+        age = (self._next - received.sequence) % SEQUENCES
         if 0 < age <= len(self._retained):
             self._count(Counter.REPEATED)
             return b"".join(message.frame for message in list(self._retained)[-age:])
@@ -92,10 +92,10 @@ class Device:
             self._count(Counter.SEQUENCE)
             return b""
         self._next = (self._next + 1) % SEQUENCES
-        content, status = self._carried_out(found)
+        content, status = self._carried_out(received)
         if status is not Status.OK:
             self._count(Counter.REFUSED)
-        response = Message(found.type | RESPONSE, found.sequence, content + bytes([status]))
+        response = Message(received.type | RESPONSE, received.sequence, content + bytes([status]))
         self._retained.append(response)
         return response.frame
 

@@ -183,18 +183,18 @@ class Identity(BaseModel):
         """
         text = memory.split(b"\0", 1)[0]
         try:
-            found = Identity.model_validate_json(text)
+            identity = Identity.model_validate_json(text)
         except ValidationError as error:
             raise LinkError(
                 f"the board's identity must be the JSON of docs/protocol.md, not: {first_fault(error)}"
             ) from None
         json.loads(text, object_pairs_hook=_each_key_once)
-        fitting = samples_per_message(found.sample_bytes, found.result_bytes)
-        if found.samples > fitting:
+        fitting = samples_per_message(identity.sample_bytes, identity.result_bytes)
+        if identity.samples > fitting:
             raise LinkError(
-                f"the board's identity must have at most {fitting} samples in a message, not {found.samples}"
+                f"the board's identity must have at most {fitting} samples in a message, not {identity.samples}"
             )
-        return found
+        return identity
 
 
 def first_fault(error: ValidationError) -> str:
@@ -205,12 +205,12 @@ def first_fault(error: ValidationError) -> str:
 
 
 def _each_key_once(pairs: Sequence[tuple[str, Any]]) -> dict[str, Any]:
-    found: dict[str, Any] = {}
+    table: dict[str, Any] = {}
     for key, value in pairs:
-        if key in found:
+        if key in table:
             raise LinkError(f"the board's identity must have each key once, not {_plain(key)} twice")
-        found[key] = value
-    return found
+        table[key] = value
+    return table
 
 
 def _plain(text: str) -> str:

@@ -114,12 +114,12 @@ def _cure(text: str, place: str) -> str:
     number = re.match(r"line (\d+)", place)
     lines = text.splitlines()
     line = lines[int(number[1]) - 1] if number and int(number[1]) <= len(lines) else ""
-    if (found := _UNIT.fullmatch(line)) and (found[3] or found[4]):
-        value = Decimal(found[2].replace("_", "")).scaleb(_PREFIXES.get(found[3], 0))
-        return f"a number without a unit: {found[1]} = {value:f}"
-    if found := _WORD.fullmatch(line):
-        known = _FLAGS.get(found[2])
-        return f"true or false: {found[1]} = {known}" if known else f'a text in quotes: {found[1]} = "{found[2]}"'
+    if (match := _UNIT.fullmatch(line)) and (match[3] or match[4]):
+        value = Decimal(match[2].replace("_", "")).scaleb(_PREFIXES.get(match[3], 0))
+        return f"a number without a unit: {match[1]} = {value:f}"
+    if match := _WORD.fullmatch(line):
+        known = _FLAGS.get(match[2])
+        return f"true or false: {match[1]} = {known}" if known else f'a text in quotes: {match[1]} = "{match[2]}"'
     if re.match(r"\s*[\w.-]+\s*:", line):
         return "a key, an equals sign and a value, as in order = 4: TOML has no colons there"
     return ""

@@ -150,15 +150,15 @@ def read_traces(path: Path, ports: tuple[Port, ...], sample_rate: Fraction, chan
         an integer from 0 to ``channels - 1``; if a channel has no row, or more rows than another.
     """
     columns = _Columns.of(ports)
-    found: dict[int, _Gathered] = {}
+    gathered: dict[int, _Gathered] = {}
     for chunk in read_csv_chunks(path, columns.all):
         several = columns.channel in chunk
         parts = _by_channel(chunk, channels) if several else {0: chunk}
         for channel, part in parts.items():
-            found.setdefault(channel, _Gathered(columns, ports)).take(part)
+            gathered.setdefault(channel, _Gathered(columns, ports)).take(part)
     if several:
-        _check_lengths(path, found, channels)
-    return tuple(found[channel].trace(path, sample_rate, several=several) for channel in sorted(found))
+        _check_lengths(path, gathered, channels)
+    return tuple(gathered[channel].trace(path, sample_rate, several=several) for channel in sorted(gathered))
 
 
 def rows_of_channel(table: CsvTable, channel: int) -> CsvTable:
@@ -187,20 +187,20 @@ def _by_channel(table: CsvTable, channels: int) -> dict[int, CsvTable]:
     return {int(channel): table.take(np.flatnonzero(number == channel)) for channel in np.unique(number)}
 
 
-def _check_lengths(path: Path, found: Mapping[int, _Gathered], channels: int) -> None:
+def _check_lengths(path: Path, gathered: Mapping[int, _Gathered], channels: int) -> None:
     """Check that all channels have as many rows."""
-    lengths = [len(found[channel].lines) if channel in found else 0 for channel in range(channels)]
+    lengths = [len(gathered[channel].lines) if channel in gathered else 0 for channel in range(channels)]
     length = min(lengths)
     shortest = lengths.index(length)
     if not length:
-        given = ", ".join(map(str, sorted(found)))
+        given = ", ".join(map(str, sorted(gathered)))
         raise SpecificationError(f"{path} must have rows of channel {shortest}, not only of {given}")
     longer = [channel for channel in range(channels) if lengths[channel] > length]
     if longer:
-        first = min(longer, key=lambda channel: found[channel].lines[length])
+        first = min(longer, key=lambda channel: gathered[channel].lines[length])
         raise SpecificationError(
-            f"{path}, line {found[first].lines[length]}: {CHANNEL} {first} must end after row {length}, like channel "
-            f"{shortest}, not continue"
+            f"{path}, line {gathered[first].lines[length]}: {CHANNEL} {first} must end after row {length}, "
+            f"like channel {shortest}, not continue"
         )
 
 

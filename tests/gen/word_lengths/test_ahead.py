@@ -87,7 +87,7 @@ def test_nothing_is_limited_before_the_decimator() -> None:
     tree = tomllib.loads(INSTRUMENT.format(extra=""), parse_float=Decimal)
     tree["calibration"]["coefficients"] = [[Decimal(-30), Decimal("0.5")], [Decimal(9)], [Decimal("-1.5")]]
     made = design_core(from_tree(tree, Path("slight.toml")))
-    ahead, output = made.datapath.ahead, made.datapath.output
+    ahead, output = made.datapath.calibration, made.datapath.output
     assert ahead is not None
     assert not [node for stage in ahead.stages for node in stage.graph.nodes if node.op is Op.CLAMP]
     assert ahead.output.signed
@@ -142,7 +142,7 @@ def test_facts_for_programs() -> None:
 
 def test_what_folds_is_counted_over_the_calibrations_range() -> None:
     made = whole()
-    ahead, found = made.datapath.ahead, manifest(core_facts(made))["decimation"]
+    ahead, found = made.datapath.calibration, manifest(core_facts(made))["decimation"]
     assert ahead is not None
     low, high = ahead.result_range
     span = float((high - low) * ahead.output.lsb)
@@ -220,7 +220,7 @@ def test_wear_is_judged_behind_the_filter(hold: bool) -> None:
     text = locomotive_text(architecture="folded", hold=hold) + wear
     made = design_core(from_text(text, Path("locomotive.toml")))
     assert len(made.datapath.wear) == 1
-    ahead, decimator = made.datapath.ahead, made.datapath.decimator
+    ahead, decimator = made.datapath.calibration, made.datapath.decimator
     assert ahead is not None
     assert decimator is not None
     assert not ahead.wear
@@ -282,7 +282,7 @@ def test_a_fitted_calibration_says_what_is_outside_of_it() -> None:
     """The codes that its measurements covered are judged before the decimator, of every sample."""
     text = re.sub(r"calibration\.coefficients = .*", 'calibration.data = "april.csv"', INSTRUMENT.format(extra=""))
     made = design_core(from_text(text, EXAMPLES / "measurements" / "slight.toml"))
-    ahead, datapath = made.datapath.ahead, made.datapath
+    ahead, datapath = made.datapath.calibration, made.datapath
     assert ahead is not None
     assert made.architecture.ahead is not None
     assert made.architecture.ahead.datapath == ahead

@@ -110,7 +110,7 @@ BROKEN = [
     ("the first sample twice", "self.s_axis_tvalid & (first | flows)", "self.s_axis_tvalid"),
     ("the first sample lost", "filled | (flows &", "filled | first | (flows &"),
     ("never filled", "fills.eq(0), filled.eq(1)", "fills.eq(0), filled.eq(0)"),
-    ("no calibration's flags", "decimator.i_flags.eq(ahead.m_axis_tuser)", "decimator.i_flags.eq(0)"),
+    ("no calibration's flags", "decimator.i_flags.eq(calibration.m_axis_tuser)", "decimator.i_flags.eq(0)"),
 ]
 
 
