@@ -221,7 +221,7 @@ class Publisher:
         if time.monotonic() >= self._due and self._client.is_connected():
             self._due = time.monotonic() + INTERVAL
             for one in readings.now:
-                made = {
+                content = {
                     "time": utc_text(readings.utc, "milliseconds"),
                     "sample": readings.samples - 1,
                     "quantity": readings.identity.output_port.name,
@@ -231,13 +231,13 @@ class Publisher:
                     "per_hour": one.per_hour,
                     "flags": one.flags,
                 }
-                self._outbox.show(f"{self._topic}/channel/{one.channel}", _json(made))
+                self._outbox.show(f"{self._topic}/channel/{one.channel}", _json(content))
         self._turn()
 
     def alarm(self, alarm: Alarm) -> None:
         """Publish an alarm, now or when the broker is back."""
         self._number += 1
-        made = {
+        content = {
             "number": self._number,
             "since": utc_text(self._start, "milliseconds"),
             "time": utc_text(alarm.utc, "milliseconds"),
@@ -247,7 +247,7 @@ class Publisher:
             "value": alarm.value,
             "unit": self._readings.identity.output_port.unit,
         }
-        self._outbox.put(f"{self._topic}/alarm", _json(made))
+        self._outbox.put(f"{self._topic}/alarm", _json(content))
         if self._outbox.left_out and not self._left_out:
             self._news.put(f"{MOST} alarms wait for the broker at {self._broker}; further ones are left out")
         self._left_out = self._outbox.left_out
@@ -353,8 +353,8 @@ def _topic(text: str) -> str:
     return text
 
 
-def _json(made: dict[str, Any]) -> str:
-    return json.dumps(made, ensure_ascii=False, allow_nan=False)
+def _json(content: dict[str, Any]) -> str:
+    return json.dumps(content, ensure_ascii=False, allow_nan=False)
 
 
 def _drained(queue: SimpleQueue[Item]) -> list[Item]:

@@ -132,9 +132,9 @@ class Outbox:
 
     def acknowledged(self, client_number: int) -> None:
         """Note that the broker has acknowledged what has this number of the client."""
-        found = self._under_way.pop(client_number, None)
-        if found is not None and found.number is not None:
-            self._changed("DELETE FROM message WHERE number = ?", found.number)
+        message = self._under_way.pop(client_number, None)
+        if message is not None and message.number is not None:
+            self._changed("DELETE FROM message WHERE number = ?", message.number)
             self._waiting -= 1
 
     def close(self) -> None:
