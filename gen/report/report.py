@@ -27,22 +27,22 @@ from sosmith.model.text_files import to_json, write_files
 
 def _shortfalls(evidence: Evidence, max_abs: float, measures: ResponseMeasures | None) -> list[str]:
     """Reasons why the run did not pass, one sentence each; none if it did."""
-    found = []
+    shortfalls = []
     facts, run = evidence.facts, evidence.run
     if run.mismatches:
         where = "" if run.first_mismatch is None else f", first at sample {run.first_mismatch:,}"
-        found.append(
+        shortfalls.append(
             f"The hardware differs from the integer model at {run.mismatches:,} of {run.samples:,} samples{where}."
         )
     error = quantity(max_abs, facts.unit)
     if max_abs > facts.error_bound:
-        found.append(f"The largest error is {error}, over the limit of {quantity(facts.error_bound, facts.unit)}.")
+        shortfalls.append(f"The largest error is {error}, over the limit of {quantity(facts.error_bound, facts.unit)}.")
     if max_abs > facts.max_error:
         asked = quantity(facts.max_error, facts.unit)
-        found.append(f"The largest error is {error}, more than the {asked} that the specification allows.")
+        shortfalls.append(f"The largest error is {error}, more than the {asked} that the specification allows.")
     if facts.filter is not None and measures is not None:
-        found += mask_shortfalls(facts.filter, measures)
-    return [*found, *limited_inputs(evidence.input_ranges)]
+        shortfalls += mask_shortfalls(facts.filter, measures)
+    return [*shortfalls, *limited_inputs(evidence.input_ranges)]
 
 
 def _notes(evidence: Evidence) -> list[str]:
@@ -110,7 +110,7 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
     statistics = error_statistics(run.error)
     measures = None if facts.filter is None else measure_response(facts.filter)
     shortfalls = _shortfalls(evidence, statistics.max_abs, measures)
-    found = behaviour(evidence)
+    measured = behaviour(evidence)
     summary: dict[str, Any] = {
         "name": facts.name,
         "core": facts.core,
@@ -118,7 +118,7 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
         "passed": not shortfalls,
         "shortfalls": shortfalls,
         "notes": _notes(evidence),
-        "inputs": [found.entry for found in evidence.input_ranges],
+        "inputs": [each.entry for each in evidence.input_ranges],
         "samples": run.samples,
         "channels": run.channels,
         "cycles": run.cycles,
@@ -140,7 +140,7 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
             "parts": dict(facts.error_parts),
             "unit": facts.unit,
         },
-        **behaviour_entry(found),
+        **behaviour_entry(measured),
         "max_error": facts.max_error,
         "lsb": facts.lsb,
         "range": list(facts.range),
@@ -154,7 +154,7 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
         "alternatives": [
             {"name": other.name, "max_abs": other.max_abs, "rms": other.rms} for other in evidence.alternatives
         ],
-        "limit_cycles": [limit_cycle_entry(found) for found in facts.limit_cycles],
+        "limit_cycles": [limit_cycle_entry(cycles) for cycles in facts.limit_cycles],
         "realization": evidence.realization,
         "architecture": facts.architecture,
         "cycles_per_second": evidence.cycles_per_second,
@@ -170,7 +170,7 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
             "filter": filter_curve(facts.filter),
         },
     }
-    summary["facts"] = headlines(evidence, summary, found)
+    summary["facts"] = headlines(evidence, summary, measured)
     cleaned: dict[str, Any] = _without_infinities(summary)
     return cleaned
 

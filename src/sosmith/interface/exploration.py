@@ -243,14 +243,14 @@ def explore(
     if simulate:
         outcome = confirmed(outcome, place, uncertainty=budget_in_json, simulator=simulator, progress=progress)
     progress("writing the results", 0, 0)
-    made = Exploration(outcome, place)
+    exploration = Exploration(outcome, place)
     files = {
-        "exploration.json": to_json(made.as_dict()),
+        "exploration.json": to_json(exploration.as_dict()),
         "points.csv": outcome.table(),
-        "exploration.html": made.page(),
+        "exploration.html": exploration.page(),
     }
     write_files(place, files)
-    return made
+    return exploration
 
 
 def _arrow() -> tuple[Any, Any]:
