@@ -240,16 +240,14 @@ class Architecture(ABC):
         if self.decimator is None:
             return self._cleared_cycles + self._taken_cycles
         filled = decimator_clocks.reset_cycles(self.decimator, self.channels)
-        before_decimator = self.before_decimator
+        before = self.before_decimator
         if self.channels > 1:
-            cleared = max(self._cleared_cycles, 0 if before_decimator is None else before_decimator._cleared_cycles)
-            return max(cleared, filled) + (0 if before_decimator is None else before_decimator._taken_cycles)
-        if before_decimator is None:
+            cleared = max(self._cleared_cycles, 0 if before is None else before._cleared_cycles)
+            return max(cleared, filled) + (0 if before is None else before._taken_cycles)
+        if before is None:
             return filled
         # The calibration gives the first sample that the decimator fills with.
-        return (
-            before_decimator._cleared_cycles + before_decimator.latency_cycles + filled + decimator_clocks.FIRST_SAMPLE
-        )
+        return before._cleared_cycles + before.latency_cycles + filled + decimator_clocks.FIRST_SAMPLE
 
     @property
     def cycles_per_sample(self) -> int:
@@ -293,8 +291,8 @@ class Architecture(ABC):
             return core
         from sosmith.hdl.decimation.decimator import DecimatedCore  # only what makes hardware loads Amaranth
 
-        before_decimator = None if self.before_decimator is None else self.before_decimator._core(before=True)
-        return DecimatedCore(self.datapath, core, before_decimator, hold=self.hold, opens=self._cleared_cycles)
+        before = None if self.before_decimator is None else self.before_decimator._core(before=True)
+        return DecimatedCore(self.datapath, core, before, hold=self.hold, opens=self._cleared_cycles)
 
     @property
     def _flags_given(self) -> int:

@@ -35,7 +35,7 @@ class BoardBuild:
     core_verilog : str
         The core alone, whose digest the board tells.
     bitstream : Bitstream
-        What the programs made of it.
+        What the programs produced from it.
     """
 
     design: CoreDesign

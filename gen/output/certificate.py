@@ -18,7 +18,7 @@ from sosmith.gen.proof.cascade_proof import (
     StageModel,
     TransferFunction,
     error_drives,
-    made_response,
+    quantized_response,
     through,
 )
 from sosmith.gen.proof.linear_model import linear_models
@@ -309,7 +309,7 @@ def _closer(
     low = Fraction(0) if steady else low
     return _Closer(
         rounding=on_grid(_magnitude(error_drives(stages))),
-        coefficients=on_grid(difference(made_response(stages), exact, low, high, _ACCURACY).magnitude),
+        coefficients=on_grid(difference(quantized_response(stages), exact, low, high, _ACCURACY).magnitude),
         gain=_gain(exact),
     )
 

@@ -107,7 +107,7 @@ def coefficient_extent(
     steady: bool = False,
 ) -> Extent:
     """Limits of the output of the stages' transfer functions minus that of the ideal sections."""
-    return _deviation(made_response(stages), through(ideal), low, high, steady=steady)
+    return _deviation(quantized_response(stages), through(ideal), low, high, steady=steady)
 
 
 def _deviation(quantized: Response, exact: Response, low: Fraction, high: Fraction, *, steady: bool) -> Extent:
@@ -118,7 +118,7 @@ def _deviation(quantized: Response, exact: Response, low: Fraction, high: Fracti
     return Extent(-limits.magnitude, limits.magnitude)
 
 
-def made_response(stages: Sequence[StageModel]) -> Response:
+def quantized_response(stages: Sequence[StageModel]) -> Response:
     """Impulse response of the stages without their quantizers."""
     wires = [IMPULSE]
     for stage in stages:

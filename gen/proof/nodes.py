@@ -105,7 +105,7 @@ class Nodes:
         self._denominator = fmpq_poly([1])
         for denominator in denominators:
             self._denominator *= polynomial(denominator)
-        self._turns = math.gcd(*(power_of(denominator) for denominator in denominators if len(denominator) > 1))
+        self._interleaved = math.gcd(*(power_of(denominator) for denominator in denominators if len(denominator) > 1))
         """M of a denominator in powers of ``w**M``."""
         self.degree = len(radii)
         self.bits = bits
@@ -215,9 +215,9 @@ class Nodes:
         rows = {at: beginning[at + d : at : -1] for at in range(min(window, _FIRST))} | self._distant
         candidates = sorted(rows)
         picked, least = _pivots(np.array([rows[at] for at in candidates], dtype=object), self.fine)
-        if not least and self._neighbours < self._turns:
-            # M responses take turns: neighbours that miss too many of these are too few at any precision.
-            self._neighbours = self._turns
+        if not least and self._neighbours < self._interleaved:
+            # M responses are interleaved: neighbours that miss too many of these are too few at any precision.
+            self._neighbours = self._interleaved
             raise _CoarseError(0)
         short = self.bits + self.spread.bit_length() + _SLACK_BITS - least.bit_length()
         if short > 0:

@@ -8,7 +8,7 @@ from fractions import Fraction
 from typing import cast
 
 from sosmith.gen.filter.design import Filter
-from sosmith.gen.proof.cascade_proof import made_response
+from sosmith.gen.proof.cascade_proof import quantized_response
 from sosmith.gen.proof.linear_model import linear_models
 from sosmith.gen.realizations.registry import REALIZATIONS, Section
 from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
@@ -98,12 +98,10 @@ def _with_any_first_sample(
     start = before.start
     _, span = before.output.limits  # of the samples less a first one: as wide as the range of the samples
     wider = first_range[1] - first_range[0] - span
-    off = made_response([linear_models(section.graph) for section in sections]).at_zero_frequency - gain_at_zero(ideal)
-    gain = (
-        Fraction(0)
-        if start.first_sample is None
-        else start.first_sample.gain * Fraction(2) ** -start.first_sample.gain_frac
-    )
+    realized = quantized_response([linear_models(section.graph) for section in sections])
+    off = realized.at_zero_frequency - gain_at_zero(ideal)
+    first = start.first_sample
+    gain = Fraction(0) if first is None else first.gain * Fraction(2) ** -first.gain_frac
     error = abs(gain - gain_at_zero(ideal)) * max(-first_range[0], first_range[1]) + abs(off) * max(wider, Fraction(0))
     return replace(before, start=replace(start, error=error))
 

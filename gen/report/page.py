@@ -275,7 +275,7 @@ def _uncertainty_caption(budget: Mapping[str, Any]) -> str:
 
 
 _BANDS = 8
-"""Bands of a decimator that are told one by one; the gain falls from band to band."""
+"""Bands of a decimator that are listed one by one; the gain falls from band to band."""
 
 
 def _decimation_table(decimation: DecimationFacts) -> Table:

@@ -1,4 +1,4 @@
-"""What a run is told by: digests of specification, exact calculation, trace and datapath; the hardware's cost."""
+"""What identifies a run: digests of specification, exact calculation, trace and datapath; the hardware's cost."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Provenance:
     trace_sha256 : str
         Of the input codes of all channels, with the inputs' formats and the sample rate.
     datapath_sha256 : str
-        Of the datapath, told as its C model, whatever its name.
+        Of the datapath, as its C model, whatever its name.
     cycles_per_sample : float
         Largest number of clocks between samples that the hardware needs, without waiting: a whole number but where a
         beat holds several samples, or behind a decimator, where it is the average.

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from sosmith.gen.filter.response import ResponseMeasures, measure_response
+from sosmith.gen.output.core_facts import CoreFacts
 from sosmith.gen.output.manifest import limit_cycle_entry
 from sosmith.gen.quantity import quantity
 from sosmith.gen.report.behaviour import behaviour, behaviour_entry, readings_of
@@ -21,7 +22,7 @@ from sosmith.gen.report.page import render_page
 from sosmith.gen.report.provenance import Provenance
 from sosmith.gen.report.sound import sound_entry
 from sosmith.gen.version import __version__
-from sosmith.model.reference.accuracy import accuracy_percent, error_statistics, sqnr_db
+from sosmith.model.reference.accuracy import ErrorStatistics, accuracy_percent, error_statistics, sqnr_db
 from sosmith.model.text_files import to_json, write_files
 
 
@@ -130,16 +131,7 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
         "bit_exact": run.mismatches == 0,
         "mismatches": run.mismatches,
         "first_mismatch": run.first_mismatch,
-        "error": {
-            "max_abs": statistics.max_abs,
-            "max_lsb": statistics.max_abs / facts.lsb,
-            "rms": statistics.rms,
-            "mean": statistics.mean,
-            "bound": facts.error_bound,
-            "proven": True,
-            "parts": dict(facts.error_parts),
-            "unit": facts.unit,
-        },
+        "error": _error(facts, statistics),
         **behaviour_entry(measured),
         "max_error": facts.max_error,
         "lsb": facts.lsb,
@@ -164,15 +156,34 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
         "files": dict(evidence.files),
         "tools": dict(evidence.tools),
         "provenance": None if evidence.provenance is None else _entry(evidence.provenance),
-        "curves": {
-            "error": error_over_time(evidence),
-            "spectrum": error_spectrum(evidence),
-            "filter": filter_curve(facts.filter),
-        },
+        "curves": _curves(evidence),
     }
     summary["facts"] = headlines(evidence, summary, measured)
     cleaned: dict[str, Any] = _without_infinities(summary)
     return cleaned
+
+
+def _error(facts: CoreFacts, statistics: ErrorStatistics) -> dict[str, Any]:
+    """Errors in the output's unit, and the largest one in its LSBs too."""
+    return {
+        "max_abs": statistics.max_abs,
+        "max_lsb": statistics.max_abs / facts.lsb,
+        "rms": statistics.rms,
+        "mean": statistics.mean,
+        "bound": facts.error_bound,
+        "proven": True,
+        "parts": dict(facts.error_parts),
+        "unit": facts.unit,
+    }
+
+
+def _curves(evidence: Evidence) -> dict[str, Any]:
+    """Curves that pages of comparisons draw."""
+    return {
+        "error": error_over_time(evidence),
+        "spectrum": error_spectrum(evidence),
+        "filter": filter_curve(evidence.facts.filter),
+    }
 
 
 def _entry(provenance: Provenance) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from fractions import Fraction
 from sosmith.gen.filter.decimation import Decimation, choose, decimated
 from sosmith.gen.filter.design import Filter
 from sosmith.gen.specification.specification import FilterSpec
-from sosmith.gen.word_lengths.ahead import calibration_ahead
+from sosmith.gen.word_lengths.calibration import calibration_before_decimator
 from sosmith.gen.word_lengths.quantize import gain_of
 from sosmith.gen.word_lengths.quantized import CALIBRATION, DECIMATION, Quantized
 from sosmith.model.dataflow.datapath import Datapath
@@ -156,7 +156,7 @@ def pre_stage_of(
     def calibration(gain: Fraction) -> Quantized | None:
         if polynomial is None:
             return None
-        return calibration_ahead(name, inputs, polynomial, output, allowed * _CALIBRATION_SHARE / gain)
+        return calibration_before_decimator(name, inputs, polynomial, output, allowed * _CALIBRATION_SHARE / gain)
 
     guessed = calibration(Fraction(_GUESSED_GAIN))
     x = inputs[0] if guessed is None else guessed.datapath.output

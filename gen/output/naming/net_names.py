@@ -73,7 +73,7 @@ def plain_names(text: str) -> str:
 
 
 class _Naming:
-    """What is found of the nets of a module."""
+    """What is known of the nets of a module."""
 
     def __init__(self, text: str) -> None:
         self._roles = _roles(text)

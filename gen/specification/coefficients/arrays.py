@@ -46,7 +46,7 @@ def read_array_file(path: Path) -> Content:
     Raises
     ------
     SpecificationError
-        If the file cannot be read, is too large, or holds no filter that can be told.
+        If the file cannot be read, is too large, or holds no filter that can be recognized.
     """
     suffix = path.suffix.lower()
     if suffix == ".json":

@@ -75,7 +75,7 @@ def build_command(
         designed = design(asked, core=core, realization=realization, board=board, progress=step)
         designed.generate(folder, step)
         if board in PROJECTS:
-            _told(designed.project(board, folder=folder, rate=baud, progress=step), folder, as_json=as_json)
+            _show_project(designed.project(board, folder=folder, rate=baud, progress=step), folder, as_json=as_json)
             return
         built = designed.build(board, folder=folder, rate=baud, progress=step)
         if program and built.passed:
@@ -94,7 +94,7 @@ def build_command(
     note(f"bitstream: {built.bitstream}")
 
 
-def _told(summary: dict[str, Any], folder: Path, *, as_json: bool) -> None:
+def _show_project(summary: dict[str, Any], folder: Path, *, as_json: bool) -> None:
     """Print what a project is, and that nothing was built."""
     project = summary["project"]
     if as_json:

@@ -29,7 +29,7 @@ class _Closed(io.RawIOBase):
 
 
 class _Results(io.FileIO):
-    """Stdout: what it does not take is told at the end, when all files are written."""
+    """Stdout: what it does not take is reported at the end, when all files are written."""
 
     lost: str | None = None
 
@@ -44,7 +44,7 @@ class _Results(io.FileIO):
 
 
 class _Messages(io.FileIO):
-    """Stderr: a message that cannot be told is no reason to leave work undone."""
+    """Stderr: a message that cannot be written is no reason to leave work undone."""
 
     def write(self, data: ReadableBuffer) -> int:
         try:

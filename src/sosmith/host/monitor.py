@@ -97,7 +97,7 @@ class Changed:
 
 @dataclass(frozen=True)
 class Idle:
-    """Nothing new: no board, or one without new results. It is told at every turn, for what must not wait."""
+    """Nothing new: no board, or one without new results. Given in every pass of the loop, for what must not wait."""
 
 
 Event = Connected | Received | Changed | Lost | Idle

@@ -232,7 +232,7 @@ class Publisher:
                     "flags": one.flags,
                 }
                 self._outbox.show(f"{self._topic}/channel/{one.channel}", _json(content))
-        self._turn()
+        self._exchange()
 
     def alarm(self, alarm: Alarm) -> None:
         """Publish an alarm, now or when the broker is back."""
@@ -251,7 +251,7 @@ class Publisher:
         if self._outbox.left_out and not self._left_out:
             self._news.put(f"{MOST} alarms wait for the broker at {self._broker}; further ones are left out")
         self._left_out = self._outbox.left_out
-        self._turn()
+        self._exchange()
 
     def news(self) -> list[str]:
         """Return what has happened to the connection since the last call, a sentence each."""
@@ -270,7 +270,7 @@ class Publisher:
         self._outbox.show(f"{self._topic}/status", "ended")
         end = time.monotonic() + PATIENCE
         while True:
-            self._turn()
+            self._exchange()
             if self._outbox.empty or time.monotonic() > end:
                 break
             time.sleep(0.01)
@@ -281,7 +281,7 @@ class Publisher:
             kept = "" if self._keep is None else f"; {self._outbox.waiting} wait in {self._keep} for the next start"
             raise ToolError(f"the broker at {self._broker} must acknowledge every alarm, not leave out {left}{kept}")
 
-    def _turn(self) -> None:
+    def _exchange(self) -> None:
         """Take what is acknowledged, and give the client what it may have now."""
         for number in _drained(self._acknowledged):
             self._outbox.acknowledged(number)

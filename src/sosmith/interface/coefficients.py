@@ -82,7 +82,7 @@ class Coefficients:
         Raises
         ------
         SpecificationError
-            If the file cannot be read, holds no filter that can be told, or is not stable.
+            If the file cannot be read, holds no filter that can be recognized, or is not stable.
         """
         source = Path(fspath(path))
         content = read_filter_file(source)

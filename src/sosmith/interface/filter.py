@@ -1,4 +1,4 @@
-"""The ideal filter of a specification: what can be told about it before anything is rounded."""
+"""The ideal filter of a specification: what can be said about it before anything is rounded."""
 
 from __future__ import annotations
 

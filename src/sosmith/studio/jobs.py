@@ -100,7 +100,7 @@ def prove(tell: Tell, *, text: str, path: str) -> dict[str, Any]:
 
 
 def side_by_side(tell: Tell, *, text: str, path: str) -> list[dict[str, Any]]:
-    """Design every realization of a specification; each row is told as a part as soon as it is there."""
+    """Design every realization of a specification; each row is sent as a part as soon as it is there."""
     spec = _specification(text, path)
     names = [name for name in Specification.choices()["hardware.realization"] if name != "auto"]
     rows = []
@@ -140,7 +140,7 @@ def trace(tell: Tell, *, text: str, path: str, source: str, seconds: float | Non
     exact = design.run_exact(**inputs.inputs)
     error = hardware - exact
     decimator = design.core.datapath.decimator
-    every = 1 if decimator is None else decimator.factor  # what is told of a sample is told of those with a result
+    every = 1 if decimator is None else decimator.factor  # only samples with a result can be compared
     edges = np.unique(np.linspace(0, len(error), min(POINTS, len(error)) + 1).astype(int))
     truth = [None] * error[0].size if inputs.truth is None else _columns(inputs.truth[::every])
     return {

@@ -12,7 +12,7 @@ from tests.model.reload.swapping import compute_swapping
 
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.output.core_facts import core_facts
-from sosmith.gen.proof.cascade_proof import made_response
+from sosmith.gen.proof.cascade_proof import quantized_response
 from sosmith.gen.proof.linear_model import linear_models
 from sosmith.gen.reload.first_samples import check_samples, first_samples, held_codes, samples_of
 from sosmith.gen.reload.other_constants import with_constants
@@ -120,7 +120,7 @@ def test_the_error_of_a_set_counts_first_samples_of_others() -> None:
     own = with_constants(made, None, None)
     assert made.filter is not None
     off = abs(
-        made_response([linear_models(section.graph) for section in made.sections]).at_zero_frequency
+        quantized_response([linear_models(section.graph) for section in made.sections]).at_zero_frequency
         - gain_at_zero(made.filter)
     )
     low, high = samples_of(made)

@@ -21,7 +21,7 @@ from sosmith.gen.output.decimation_facts import direct_design, rate_costs
 from sosmith.gen.output.manifest import manifest
 from sosmith.gen.specification.specification import from_text, from_tree
 from sosmith.gen.word_lengths import decimator as decimator_module
-from sosmith.gen.word_lengths.ahead import calibration_ahead
+from sosmith.gen.word_lengths.calibration import calibration_before_decimator
 from sosmith.gen.word_lengths.quantized import CALIBRATION, DECIMATION
 from sosmith.instrument.scenarios.traces import traces_for
 from sosmith.instrument.uncertainty.instrument_budget import instrument_of
@@ -196,13 +196,13 @@ def test_a_result_too_wide_for_a_port() -> None:
     inputs = [Port.from_range(name, 16, Fraction(0), Fraction(1)) for name in ("voltage", "temperature")]
     output = Port.from_range("y", 16, Fraction(0), Fraction(1), unit="mm")
     polynomial = Polynomial.from_numbers([["5000", "0"], ["-7000"]])
-    made = calibration_ahead("wide", inputs, polynomial, output, Fraction(1, 2))
+    made = calibration_before_decimator("wide", inputs, polynomial, output, Fraction(1, 2))
     assert made.datapath.output.bits == 31
     with refused(
         "what the calibration gives to the decimator must have at most 32 bits, not 33: raise output.max_error or "
         "narrow the ranges of the inputs"
     ):
-        calibration_ahead("wide", inputs, polynomial, output, Fraction(1, 8))
+        calibration_before_decimator("wide", inputs, polynomial, output, Fraction(1, 8))
 
 
 def test_registers_too_wide_for_the_models() -> None:
@@ -271,7 +271,7 @@ def test_another_calibration_exceeds_the_bound() -> None:
     assert worst_error(made, codes) <= float(quantized.bound)
     (first, *more), *rows = quantized.polynomial.coefficients
     wrong = Polynomial(((first + datapath.output.lsb / 2, *more), *rows))
-    other = calibration_ahead("slight_ahead", datapath.inputs, wrong, datapath.output, Fraction(1, 16))
+    other = calibration_before_decimator("slight_ahead", datapath.inputs, wrong, datapath.output, Fraction(1, 16))
     ahead = replace(other.datapath, output=quantized.before_decimator.datapath.output)
     assert other.datapath.output.lsb == ahead.output.lsb
     changed = replace(quantized, datapath=replace(datapath, ahead=ahead))

@@ -22,7 +22,7 @@ _WIDEST = 32
 """Bits of the widest port."""
 
 
-def calibration_ahead(
+def calibration_before_decimator(
     name: str, inputs: Sequence[Port], polynomial: Polynomial, output: Port, allowed: Fraction
 ) -> Quantized:
     """Choose formats of a calibration before a decimator, and prove its error.
