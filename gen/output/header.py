@@ -26,6 +26,7 @@ from sosmith.gen.output.module_lines import module_lines
 from sosmith.gen.output.pins import pins
 from sosmith.gen.quantity import frequency
 from sosmith.gen.version import __version__
+from sosmith.model.ascii_text import in_comment
 from sosmith.model.templates import render
 
 _LINE = 112
@@ -52,7 +53,7 @@ def _described(stage: str, module: str, facts: CoreFacts) -> str:
     above = [line for section in _sections(stage, facts) for line in _section_lines(section)]
     for row in facts.formats:
         if row.stage == stage:
-            line = f"{row.node}: {row.format}, {row.low:.6g} to {row.high:.6g} {row.unit}".rstrip()
+            line = f"{row.node}: {row.format}, {row.low:.6g} to {row.high:.6g} {in_comment(row.unit)}".rstrip()
             module, count = re.subn(_declaration(row.node), rf"  // {line}\n\g<0>", module, count=1, flags=re.MULTILINE)
             above += [line] * (not count)
     depth = max(map(int, re.findall(r"^  reg valid(\d+) ", module, re.MULTILINE)), default=0)
@@ -97,7 +98,7 @@ def _title(design: CoreDesign, facts: CoreFacts) -> str:
 
 def _promise(facts: CoreFacts) -> Sequence[str]:
     (output,) = facts.interface.outputs.fields
-    bound = f"{facts.error_bound:.6g} {facts.unit}".rstrip()
+    bound = f"{facts.error_bound:.6g} {in_comment(facts.unit)}".rstrip()
     return (
         f"Proven for all inputs in range: |{output.port.name} - exact| <= {bound}.",
         f"{facts.name}.certificate.json has the proof; `sosmith verify` repeats it.",

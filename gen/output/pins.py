@@ -11,6 +11,7 @@ from sosmith.gen.core import CoreDesign
 from sosmith.gen.output.core_facts import InterfaceFacts, StreamFacts
 from sosmith.hdl.axi_stream import core_members
 from sosmith.hdl.bus.axi_lite import slave_members
+from sosmith.model.ascii_text import in_comment
 from sosmith.model.reload.registers import ADDRESS_BITS
 
 
@@ -91,7 +92,7 @@ def _meaning(name: str, interface: InterfaceFacts) -> str:
             port = field.port
             kind = "two's complement" if port.signed else "unsigned"
             offset = f"{float(port.zero):g} + " if port.zero else ""
-            value = f"{offset}{float(port.lsb):.9g} * code {port.unit}".rstrip()
+            value = f"{offset}{float(port.lsb):.9g} * code {in_comment(port.unit)}".rstrip()
             parts.append(f"[{field.offset + port.bits - 1}:{field.offset}] {port.name}, {kind}, = {value}")
         return "; ".join(parts)
     if name.endswith("tuser"):

@@ -12,7 +12,7 @@ from decimal import Decimal
 from fractions import Fraction
 from typing import TypeVar
 
-from sosmith.gen.specification.verilog_names import KEYWORDS, MAX_NAME, is_identifier
+from sosmith.gen.specification.verilog_names import KEYWORDS, MAX_NAME, OBEYED, is_identifier
 from sosmith.model.suggestion import did_you_mean
 
 Item = TypeVar("Item")
@@ -224,11 +224,13 @@ def key_text(key: str) -> str:
 
 
 def identifier(value: object) -> str:
-    """Read a Verilog identifier that is not a keyword."""
+    """Read a Verilog identifier that is neither a keyword nor a word that tools obey."""
     if not isinstance(value, str) or not is_identifier(value):
         raise UnfitError(IDENTIFIER, literal(value))
     if value in KEYWORDS:
         raise UnfitError(f"{IDENTIFIER}, and no keyword of SystemVerilog", literal(value))
+    if OBEYED.fullmatch(value):
+        raise UnfitError(f"{IDENTIFIER}, and no word that tools obey in comments", literal(value))
     return value
 
 

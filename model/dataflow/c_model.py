@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
+from sosmith.model.ascii_text import in_comment
 from sosmith.model.dataflow.graph import Graph, Node, Op
 from sosmith.model.dataflow.status import Flag
 from sosmith.model.templates import render
@@ -62,7 +63,7 @@ def _told(port: Port) -> str:
     """Say what the code of a port means."""
     return (
         f"{port.name}_code: {port.lowest} .. {port.highest}, value = {float(port.zero)!r} + "
-        f"{float(port.lsb)!r} * code {port.unit.replace('*/', '* /')}".rstrip()
+        f"{float(port.lsb)!r} * code {in_comment(port.unit)}".rstrip()
     )
 
 

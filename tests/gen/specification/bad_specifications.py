@@ -219,6 +219,12 @@ BAD = [
     ("name with a dollar", NAME, 'name = "a$b"', f"name must be {IDENTIFIER}, not 'a$b'"),
     ("name with a line break", NAME, 'name = "a\\nb"', f"name must be {IDENTIFIER}, not 'a\\nb'"),
     (
+        "name is a word that tools obey",
+        NAME,
+        'name = "Verilator"',
+        f"name must be {IDENTIFIER}, and no word that tools obey in comments, not 'Verilator'",
+    ),
+    (
         "name is a keyword",
         NAME,
         'name = "module"',
