@@ -103,7 +103,7 @@ def design_core(
     asked = AskedRealization(_known(realization or spec.hardware.realization), source, widths_of)
     response, decimates = response_of(spec, kind, progress)
     _check_realization(spec, asked, response)
-    before_decimator, budget, calibrates = _before_decimator(
+    calibration, budget, calibrates = _calibration_hardware(
         spec, response, _budget(spec, response.pre_stage, board), board
     )
     search = Search(
@@ -111,7 +111,7 @@ def design_core(
         response=response,
         asked=asked,
         budget=budget,
-        before_decimator=before_decimator,
+        calibration=calibration,
         board=board,
         progress=progress,
     )
@@ -262,7 +262,7 @@ def pre_stage_in(
     return pre_stage, {"decimation": reason}
 
 
-def _before_decimator(
+def _calibration_hardware(
     spec: Specification, response: Response, budget: Budget, board: Board | None
 ) -> tuple[Architecture | None, Budget, dict[str, str]]:
     """Choose the architecture of the calibration before a decimator: that of the filter, or the smallest that keeps up.
@@ -291,11 +291,11 @@ def _before_decimator(
     raise ShortfallError(refused)
 
 
-def _left(blocks: Blocks, before_decimator: Architecture) -> Blocks:
+def _left(blocks: Blocks, calibration: Architecture) -> Blocks:
     """Return the multiplier blocks that what stands before the decimator leaves."""
     if blocks.available is None:
         return blocks
-    return blocks._replace(available=max(0, blocks.available - before_decimator.multiplier_blocks))
+    return blocks._replace(available=max(0, blocks.available - calibration.multiplier_blocks))
 
 
 def refuse_decimated_channels(design: CoreDesign, where: str) -> None:

@@ -98,7 +98,7 @@ class Search:
         The realization that is asked for.
     budget : Budget
         Time and multiplier blocks.
-    before_decimator : Architecture or None
+    calibration : Architecture or None
         Hardware of the calibration before a decimator; None without one.
     board : Board or None
         Target board.
@@ -110,7 +110,7 @@ class Search:
     response: Response
     asked: AskedRealization
     budget: Budget
-    before_decimator: Architecture | None
+    calibration: Architecture | None
     board: Board | None
     progress: Progress
     _plans: dict[str, Plan] = field(default_factory=dict)
@@ -209,9 +209,7 @@ class Search:
         if pre_stage is None:
             whole = replace(flagged, calibrated=codes)
             return fitting(kind, self.budget, whole, self.board, look_ahead=look_ahead)
-        return fitting(
-            kind, self.budget, pre_stage.before(flagged, codes), self.board, before_decimator=self.before_decimator
-        )
+        return fitting(kind, self.budget, pre_stage.before(flagged, codes), self.board, calibration=self.calibration)
 
     def _may_look_ahead(self, plain: Candidate) -> bool:
         """Say whether look-ahead may take the place of plain loops: if nothing is asked for that excludes it."""

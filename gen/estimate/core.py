@@ -38,8 +38,8 @@ def quantities_of(architecture: Architecture, device: Device) -> Quantities:
     if architecture.decimator is not None:
         made += _of_decimator(architecture.decimator, architecture.channels, device)
         made += of_inputs(architecture.datapath.inputs, architecture.datapath.calibrated)
-        if architecture.before_decimator is not None:
-            made += quantities_of(architecture.before_decimator, device)
+        if architecture.calibration is not None:
+            made += quantities_of(architecture.calibration, device)
     return made
 
 

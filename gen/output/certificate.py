@@ -128,7 +128,7 @@ def _decimation(quantized: Quantized) -> DecimationEntry | None:
         edge=decimation.edge / decimation.sample_rate,
         aliasing=tuple(map(on_grid, decimation.aliasing)),
         bands=tuple(BandEntry(gain=on_grid(peak.gain), at=peak.at) for peak in decimation.bands(filter_)),
-        calibration=None if quantized.before_decimator is None else _calibration(quantized.before_decimator),
+        calibration=None if quantized.calibration is None else _calibration(quantized.calibration),
     )
 
 
@@ -170,7 +170,7 @@ def _item(design: CoreDesign) -> ItemEntry:
     return ItemEntry(
         core=design.core,
         architecture=architecture.name,
-        ahead=None if architecture.before_decimator is None else architecture.before_decimator.name,
+        ahead=None if architecture.calibration is None else architecture.calibration.name,
         channels=architecture.channels,
         samples=architecture.samples_per_clock,
         start="steady" if design.quantized.steady else "zero",

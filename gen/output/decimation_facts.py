@@ -185,7 +185,7 @@ def decimation_facts(core: CoreDesign) -> DecimationFacts | None:
 
 
 def _calibration_facts(core: CoreDesign) -> CalibrationFacts | None:
-    quantized, architecture = core.quantized.before_decimator, core.architecture.before_decimator
+    quantized, architecture = core.quantized.calibration, core.architecture.calibration
     if quantized is None or architecture is None:
         return None
     port, program = quantized.datapath.output, architecture.program
@@ -256,7 +256,7 @@ def _kept_bits(decimator: Decimator, channels: int) -> int:
 
 
 def _named(architecture: Architecture) -> str:
-    calibration = architecture.before_decimator
+    calibration = architecture.calibration
     return (
         architecture.name
         if calibration is None or calibration.name == architecture.name

@@ -115,7 +115,7 @@ def hardware_cost(design: CoreDesign, netlist: Netlist | None = None) -> dict[st
         one before a decimator but without the decimator. What is not known is None.
     """
     cost: dict[str, Any] = dict.fromkeys(_OF_COST)
-    program, calibration = design.architecture.program, design.architecture.before_decimator
+    program, calibration = design.architecture.program, design.architecture.calibration
     programs = [each for each in (program, None if calibration is None else calibration.program) if each is not None]
     if programs:
         cost |= {

@@ -106,7 +106,7 @@ class PreStage:
             budget={CALIBRATION: self.input_error * self.gain, **budget},
             input_error=self.input_error,
             decimation=self.decimation,
-            before_decimator=self.calibration,
+            calibration=self.calibration,
         )
 
 

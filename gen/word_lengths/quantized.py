@@ -63,7 +63,7 @@ class Quantized:
         The proof of the sections; None without a filter.
     decimation : Decimation or None
         How samples are decimated before the filter; None if all go in.
-    before_decimator : Quantized or None
+    calibration : Quantized or None
         The calibration before the decimator; None without one.
     """
 
@@ -75,7 +75,7 @@ class Quantized:
     input_error: Fraction
     proof: CascadeProof | None
     decimation: Decimation | None = None
-    before_decimator: Quantized | None = None
+    calibration: Quantized | None = None
 
     @property
     def bound(self) -> Fraction:

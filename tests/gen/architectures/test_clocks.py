@@ -177,6 +177,6 @@ def early(made: Architecture) -> int:
         made._taken_cycles
         if made.decimator is None
         else 0
-        if made.before_decimator is None
-        else made.before_decimator._taken_cycles
+        if made.calibration is None
+        else made.calibration._taken_cycles
     )

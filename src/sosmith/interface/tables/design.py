@@ -46,7 +46,7 @@ def design_tables(design: Design, *, details: bool = False) -> list[Table]:
         tables.append(uncertainty_table(budget_json(design.uncertainty)))
     if facts.sections:
         tables += [_sections(facts.sections), limit_cycles_table(facts.limit_cycles, facts)]
-    calibration = design.core.architecture.before_decimator
+    calibration = design.core.architecture.calibration
     before = (
         None
         if calibration is None or calibration.program is None
@@ -166,7 +166,7 @@ def _wear_text(wear: WearSpec, output: Port) -> str:
 
 def _all_hardware_rows(architecture: Architecture) -> list[tuple[str, str]]:
     """Return the resources of the hardware, those of a program before a decimator first."""
-    calibration = architecture.before_decimator
+    calibration = architecture.calibration
     apart = [] if calibration is None or calibration.program is None else _hardware_rows(calibration)
     return [*((f"{name}, calibration", value) for name, value in apart), *_hardware_rows(architecture)]
 
