@@ -63,8 +63,8 @@ def settled(stated: StatedSections, asked: Signs | None = None) -> SettledSectio
     Examples
     --------
     >>> rows = ((Fraction(1), Fraction(0), Fraction(0), Fraction(1), Fraction("1.8"), Fraction("-0.9")),)
-    >>> found = settled(StatedSections(format="a table", rows=rows))
-    >>> found.signs, [float(value) for value in found.rows[0][4:]]
+    >>> sections = settled(StatedSections(format="a table", rows=rows))
+    >>> sections.signs, [float(value) for value in sections.rows[0][4:]]
     ('negated', [-1.8, 0.9])
     """
     normal = _scaled([_normalized(k, row) for k, row in enumerate(stated.rows)], stated.gains)
