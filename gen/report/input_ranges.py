@@ -75,26 +75,26 @@ def input_ranges(traces: Sequence[Trace]) -> tuple[InputRange, ...]:
 
 def limited_inputs(ranges: Sequence[InputRange]) -> Iterator[str]:
     """Say which inputs were outside their ranges: no result is accurate to what the trace meant."""
-    for used in ranges:
-        if used.limited:
-            low, high = (quantity(value, used.unit) for value in (used.low, used.high))
+    for each in ranges:
+        if each.limited:
+            low, high = (quantity(value, each.unit) for value in (each.low, each.high))
             yield (
-                f"The input {used.name} must stay in its range, {low} to {high}: {_share(used.limited, used)} of "
+                f"The input {each.name} must stay in its range, {low} to {high}: {_share(each.limited, each)} of "
                 "the values in the trace do not, and were limited to it: scale the trace, or widen "
-                f"input.{used.name}.range."
+                f"input.{each.name}.range."
             )
 
 
 def inputs_at_an_end(ranges: Sequence[InputRange]) -> Iterator[str]:
     """Say which inputs have codes at an end of their ranges, and how many."""
-    for used in ranges:
-        if used.at_end > used.limited and not used.synthetic:
+    for each in ranges:
+        if each.at_end > each.limited and not each.synthetic:
             yield (
-                f"{_share(used.at_end, used)} of the codes of {used.name} are at an end of its range: if the trace "
+                f"{_share(each.at_end, each)} of the codes of {each.name} are at an end of its range: if the trace "
                 "was measured, the converter was overdriven there, and the accuracy is that of a clipped signal."
             )
 
 
-def _share(part: int, used: InputRange) -> str:
-    percent = 100 * part / used.samples
-    return f"{percent:.3g} %" if percent >= 0.01 else f"{part:,} of {used.samples:,}"
+def _share(part: int, whole: InputRange) -> str:
+    percent = 100 * part / whole.samples
+    return f"{percent:.3g} %" if percent >= 0.01 else f"{part:,} of {whole.samples:,}"

@@ -97,9 +97,12 @@ def starting_like(stage: InputStage, gain: Fraction, first_sample: FirstSample |
     """
     frac = 0 if first_sample is None else first_sample.gain_frac
     integer = round(gain * 2**frac)
-    if (first_sample is None) != (integer == 0) or (
-        first_sample is not None and first_sample.is_plain and integer != first_sample.gain
-    ):
+    # Hardware that adds no first sample has a gain of 0 for ever, and without a multiplier a gain of 1.
+    if first_sample is None:
+        fits = integer == 0
+    else:
+        fits = integer != 0 and (integer == first_sample.gain or not first_sample.is_plain)
+    if not fits:
         have = 0 if first_sample is None else first_sample.gain * Fraction(2) ** -frac
         raise ShortfallError(
             f"the gain at zero frequency must be {have}, as the hardware has it, not {float(gain):.6g}"
