@@ -42,8 +42,8 @@ class Netlist:
 def synthesize(sv: Path, top: str, board: Board, folder: Path) -> Netlist:
     """Synthesize the core in `sv` for `board`; takes seconds, and a minute more on the very first call.
 
-    Files go to `folder`, made if missing. An existing netlist is reused if it was made from the same text by the same
-    version of Yosys.
+    Files go to `folder`, created if missing. An existing netlist is reused if it was made from the same text by the
+    same version of Yosys.
 
     Parameters
     ----------

@@ -191,7 +191,7 @@ def board_cost(
     board : Board
         The board.
     cache : Path or None
-        Folder of the summaries, made if missing; None to keep nothing.
+        Folder of the summaries, created if missing; None to keep nothing.
     progress : callable
         Called with the name of each step.
 

@@ -91,8 +91,8 @@ def _with_any_first_sample(
 ) -> InputStage:
     """Return an input stage with the error of the start for first samples in `first_range`.
 
-    With the difference D of the made filter and the ideal one, the coefficients' error is that of ``D (x - x0)``. It is
-    proven for x0 in the range of x; for each unit that x0 lies outside it may be larger by ``|D(1)|``.
+    With the difference D of the quantized filter and the ideal one, the coefficients' error is that of ``D (x - x0)``.
+    It is proven for x0 in the range of x; for each unit that x0 lies outside it may be larger by ``|D(1)|``.
     """
     assert before.start is not None
     start = before.start

@@ -211,7 +211,7 @@ def _without_infinities(value: Any) -> Any:
 
 
 def write_report(evidence: Evidence, directory: Path) -> dict[str, Any]:
-    """Write `report.json` and `report.html` into `directory`, made if missing, and return the summary.
+    """Write `report.json` and `report.html` into `directory`, created if missing, and return the summary.
 
     Raises
     ------

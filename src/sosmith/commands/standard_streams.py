@@ -54,7 +54,7 @@ class _Messages(io.FileIO):
 
 
 class StandardStreams:
-    """Opens what is closed, so that no file of ours becomes a standard stream of a child; to be made once, at first."""
+    """Opens what is closed, so that no file of ours becomes a standard stream of a child; created once, at first."""
 
     def __init__(self) -> None:
         self._stdout: _Closed | _Results = _Closed()
