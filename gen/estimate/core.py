@@ -39,8 +39,8 @@ def quantities_of(architecture: Architecture, device: Device) -> Quantities:
     if architecture.decimator is not None:
         made += _of_decimator(architecture.decimator, architecture.channels, device)
         made += of_inputs(architecture.datapath.inputs, architecture.datapath.calibrated)
-        if architecture.ahead is not None:
-            made += quantities_of(architecture.ahead, device)
+        if architecture.calibration is not None:
+            made += quantities_of(architecture.calibration, device)
     return made
 
 

@@ -202,7 +202,7 @@ def minimum_order(
     """
     fs = Fraction(sample_rate)
 
-    def found() -> tuple[int, float]:
+    def order_and_cutoff() -> tuple[int, float]:
         order, (edge,) = least_order(
             "butterworth",
             "lowpass",
@@ -212,7 +212,7 @@ def minimum_order(
         )
         return order, nearest_double(unwarped(edge, fs))
 
-    return evaluate(found)
+    return evaluate(order_and_cutoff)
 
 
 def design(spec: FilterSpec, sample_rate: Fraction | float) -> Filter:
@@ -349,19 +349,19 @@ def _normalized(rows: Sequence[Row]) -> tuple[str, tuple[Row, ...]]:
     else:
         kind = "highpass" if nyquist >= top / 2 else "bandpass"
     z = {"lowpass": acb(1), "bandstop": acb(1), "highpass": acb(-1), "bandpass": grid[gains.index(top)]}[kind]
-    made, total = [], arb(1)
+    numerator_balls, total = [], arb(1)
     for row in rows:
         response = _response([row], z)
         # If the response is real, its sign is kept, so that a section that inverts the signal also has unity gain.
         gain = abs(response) if kind == "bandpass" else response.real
         if sign(gain) == 0:
-            made.append([arb(b) for b in row[:3]])
+            numerator_balls.append([arb(b) for b in row[:3]])
             continue
         total *= gain
-        made.append([arb(b) / gain for b in row[:3]])
+        numerator_balls.append([arb(b) / gain for b in row[:3]])
     if abs(nearest_double(total - 1)) > _UNITY:
-        made[0] = [b * total for b in made[0]]
-    numerators = [tuple(nearest_double(b) for b in numerator) for numerator in made]
+        numerator_balls[0] = [b * total for b in numerator_balls[0]]
+    numerators = [tuple(nearest_double(b) for b in numerator) for numerator in numerator_balls]
     return kind, tuple((*numerator, *row[3:]) for numerator, row in zip(numerators, rows, strict=True))
 
 

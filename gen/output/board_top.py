@@ -87,9 +87,9 @@ def schedule_of(design: CoreDesign, clock: Fraction) -> Schedule:
     """
     spec, ports = design.spec, design.datapath.inputs
     if ports != tuple(each.reading.port for each in spec.converters):
-        found = " and ".join(port.name for port in ports)
+        names = " and ".join(port.name for port in ports)
         wanted = " and ".join(each.reading.port.name for each in spec.converters)
-        raise SpecificationError(f"the core must have the inputs {wanted} of the converters, not {found}")
+        raise SpecificationError(f"the core must have the inputs {wanted} of the converters, not {names}")
     if spec.dac is not None and spec.dac.port != design.datapath.output:
         raise SpecificationError(
             f"the core must have the output {spec.dac.port.name} of the converter, not {design.datapath.output.name}"

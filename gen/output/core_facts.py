@@ -476,13 +476,13 @@ def _section(name: str, graph: Graph, feedback: tuple[int, ...] | None) -> Secti
 
 
 def _limit_cycles(name: str, graph: Graph, output: Port) -> LimitCycleFacts:
-    found = limit_cycles(graph)
+    cycles = limit_cycles(graph)
     return LimitCycleFacts(
         section=name,
-        largest=float(found.largest * output.lsb),
-        dead_band=float(found.dead_band * output.lsb),
-        none=found.none,
-        lyapunov=None if found.lyapunov is None else tuple(found.lyapunov),
+        largest=float(cycles.largest * output.lsb),
+        dead_band=float(cycles.dead_band * output.lsb),
+        none=cycles.none,
+        lyapunov=None if cycles.lyapunov is None else tuple(cycles.lyapunov),
     )
 
 

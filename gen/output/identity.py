@@ -55,7 +55,7 @@ def _identity(
 ) -> Identity:
     datapath, fingerprint = design.datapath, design.architecture.fingerprint
     words, _ = (0, 0) if fingerprint is None else bank_size(design.architecture)
-    made = Identity(
+    of_one_sample = Identity(
         protocol=VERSION,
         name=datapath.name,
         core=design.core,
@@ -73,7 +73,9 @@ def _identity(
         flags=dict(interface_facts(design).outputs.flags) | ({} if source == "link" else CONVERTER_FLAGS),
         reload=None if fingerprint is None else Reload(design=fingerprint, words=words),
     )
-    return made.model_copy(update={"samples": samples_per_message(made.sample_bytes, made.result_bytes)})
+    return of_one_sample.model_copy(
+        update={"samples": samples_per_message(of_one_sample.sample_bytes, of_one_sample.result_bytes)}
+    )
 
 
 def _check(design: CoreDesign) -> None:

@@ -62,7 +62,7 @@ def pins(design: CoreDesign, interface: InterfaceFacts) -> tuple[Pin, ...]:
     )
     if design.architecture.fingerprint is not None:
         members |= slave_members(ADDRESS_BITS)
-    found = [
+    core_pins = [
         Pin(
             name=name,
             width=Shape.cast(member.shape).width,
@@ -72,7 +72,7 @@ def pins(design: CoreDesign, interface: InterfaceFacts) -> tuple[Pin, ...]:
         for name, member in members.items()
     ]
     buses = ["", "s_axis", "m_axis", "s_axil"]
-    return tuple(sorted(found, key=lambda pin: buses.index(pin.bus)))
+    return tuple(sorted(core_pins, key=lambda pin: buses.index(pin.bus)))
 
 
 def _in_lanes(stream: StreamFacts) -> list[str]:

@@ -293,10 +293,10 @@ def _unfit(finding: ErrorDetails) -> UnfitError:
         return UnfitError(
             f"one of the keys {', '.join(keys)}", f"an unknown one{did_you_mean(path[-1], keys)}", where=where
         )
-    found = "missing" if finding["type"] == "missing" else literal(finding["input"])
+    given = "missing" if finding["type"] == "missing" else literal(finding["input"])
     # A table [input.NAME] is not a field of a model, so it has no description of its own.
     expected = keys[path[-1]].description if path[-1] in keys else "a table"
-    return UnfitError(str(expected), found, where=where)
+    return UnfitError(str(expected), given, where=where)
 
 
 def _table_at(path: tuple[str, ...]) -> type[Table]:

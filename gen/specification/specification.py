@@ -206,7 +206,7 @@ def load(path: Path) -> Specification:
     ------
     SpecificationError
         For all errors, in a sentence each: the file, the path of the key or the line, what was expected and what
-        was found. Rules about several keys are checked once each key is right, and one of a subject is told.
+        was found. Rules about several keys are checked once each key is right, and one of a subject is reported.
     """
     return from_text(read_text(path, what="the specification", max_bytes=MAX_BYTES), path)
 

@@ -99,10 +99,10 @@ _WITH_UNIT = re.compile(rf"({_NUMBER})\s*([kKMGm]?)(?:[Hh]z|dB|V|mm|degC|sps|S/s
 
 def as_number(value: object) -> str:
     """Return how to write a text such as ``1 kHz`` as a number, for the end of a sentence; empty for other values."""
-    found = _WITH_UNIT.fullmatch(value.strip()) if isinstance(value, str) else None
-    if found is None:
+    match = _WITH_UNIT.fullmatch(value.strip()) if isinstance(value, str) else None
+    if match is None:
         return ""
-    exact = Fraction(found[1].replace(",", ".")) * _PREFIXES.get(found[2], 1)
+    exact = Fraction(match[1].replace(",", ".")) * _PREFIXES.get(match[2], 1)
     return f": write {repr(float(exact)).removesuffix('.0')}, without quotes and unit"
 
 

@@ -74,7 +74,7 @@ class OnlineUnits:
                 raise ShortfallError(unsuitable_online(error)) from None
         return 0
 
-    def told(self, datapath: Datapath) -> str:
+    def size_text(self, datapath: Datapath) -> str:
         """Return the product of area and clocks in words, and what it is made of."""
         schedule, luts = online_schedule(datapath, 0), online_cost(datapath).luts
         return (

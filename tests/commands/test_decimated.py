@@ -18,7 +18,7 @@ def path(tmp_path: Path) -> str:
 
 def test_the_design_tells_of_the_calibration(path: str) -> None:
     made = small()
-    ahead, behind = made.architecture.ahead, made.architecture.program
+    ahead, behind = made.architecture.calibration, made.architecture.program
     assert ahead is not None
     assert ahead.program is not None
     assert behind is not None
@@ -51,7 +51,7 @@ def test_factors_are_explored(path: str, tmp_path: Path) -> None:
     assert [point["changes"]["filter.decimate"] for point in found["points"]] == [2, 4]
     assert all(point["passed"] for point in found["points"])
     most = [point["cost"]["instructions"] for point in found["points"]]
-    ahead = small().architecture.ahead
+    ahead = small().architecture.calibration
     assert ahead is not None
     assert ahead.program is not None
     assert min(most) > len(ahead.program.instructions)

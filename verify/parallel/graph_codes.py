@@ -21,9 +21,9 @@ from types import MappingProxyType
 
 from sosmith.verify.certificate_file import Certificate, NodeEntry, Operation, StageEntry
 from sosmith.verify.graph import require
-from sosmith.verify.parallel.forms import ONE, Forms, shifted
+from sosmith.verify.parallel.forms import Forms, shifted
 from sosmith.verify.parallel.lanes import LaneNode, in_lanes
-from sosmith.verify.program.normal_form import Form, Monomial, constant, plus
+from sosmith.verify.program.normal_form import ONE, Form, Monomial, constant, plus
 
 _Key = frozenset[tuple[Monomial, int | Fraction]]
 Origin = tuple[int, int]

@@ -146,13 +146,13 @@ class Board:
 
         They count since the first call of this session, modulo 256 between two calls.
         """
-        found = list(self._session.request(Type.COUNTERS))
-        if len(found) != len(Counter):
-            raise LinkError(f"the board must have {len(Counter)} counters, not {len(found)}")
+        counts = list(self._session.request(Type.COUNTERS))
+        if len(counts) != len(Counter):
+            raise LinkError(f"the board must have {len(Counter)} counters, not {len(counts)}")
         if self._counted is not None:
-            for n, (before, now) in enumerate(zip(self._counted, found, strict=True)):
+            for n, (before, now) in enumerate(zip(self._counted, counts, strict=True)):
                 self._totals[n] += (now - before) % 256
-        self._counted = found
+        self._counted = counts
         return {counter.name.lower(): total for counter, total in zip(Counter, self._totals, strict=True)}
 
     def run(self, **inputs: npt.ArrayLike) -> Results:
@@ -270,8 +270,10 @@ class Board:
         for k, port in enumerate(self._identity.input_ports):
             column = block[..., k]
             if column.size and (column.min() < port.lowest or column.max() > port.highest):
-                found = f"{column.min()}..{column.max()}"
-                raise SpecificationError(f"codes of {port.name} must be in {port.lowest}..{port.highest}, not {found}")
+                extremes = f"{column.min()}..{column.max()}"
+                raise SpecificationError(
+                    f"codes of {port.name} must be in {port.lowest}..{port.highest}, not {extremes}"
+                )
         return block.astype(np.int64, copy=False)
 
     def poll(self) -> tuple[int, Results] | None:

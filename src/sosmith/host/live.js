@@ -9,17 +9,17 @@ let newest = null, shown = null, cursor = null, held = false;
 // ---- Elements and numbers
 
 function element(name, text = "", attributes = {}) {
-  const made = document.createElement(name);
-  made.textContent = text;
-  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
-  return made;
+  const node = document.createElement(name);
+  node.textContent = text;
+  for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
+  return node;
 }
 
 function drawn(name, attributes, text = "") {
-  const made = document.createElementNS("http://www.w3.org/2000/svg", name);
-  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
-  if (text) made.textContent = text;
-  return made;
+  const node = document.createElementNS("http://www.w3.org/2000/svg", name);
+  for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
+  if (text) node.textContent = text;
+  return node;
 }
 
 // What stays the same is left alone: a screen reader would say it again.
@@ -82,18 +82,18 @@ function tiles(picture) {
     return [picture.now[best][column], `channel ${best}`];
   };
   const many = picture.now.length > 1, most = many ? "largest " : "";
-  const made = [];
+  const elements = [];
   if (picture.now.length) {
     const column = (index, name, text) => {
       const [value, where] = largest(index);
-      made.push(tile(most + name, text(value), many ? where : "now"));
+      elements.push(tile(most + name, text(value), many ? where : "now"));
     };
     column(0, facts.quantity, (value) => withUnit(fixed(value, facts.digits), facts.unit));
     if (facts.initial) column(1, "wear", (value) => withUnit(fixed(value, 3), facts.unit));
     if (facts.rated) column(2, "rate", (value) => withUnit(signed(value, 2), perHour));
   }
-  made.push(tile("time", duration(picture.seconds), `${picture.samples.toLocaleString("en")} samples`));
-  byId("tiles").replaceChildren(...made);
+  elements.push(tile("time", duration(picture.seconds), `${picture.samples.toLocaleString("en")} samples`));
+  byId("tiles").replaceChildren(...elements);
 }
 
 function header(table, names) {
@@ -128,10 +128,10 @@ function channels(picture) {
     const cells = [fixed(value, facts.digits)];
     if (facts.initial) cells.push(fixed(wear, 3));
     if (facts.rated) cells.push(signed(rate, 3));
-    const made = cells.map((text) => element("td", text, { class: "number" }));
+    const values = cells.map((text) => element("td", text, { class: "number" }));
     const row = body.rows[k];
     while (row.cells.length > 1) row.deleteCell(-1); // the first one stays, as it may have the focus
-    row.append(...made, badges(flags));
+    row.append(...values, badges(flags));
   });
 }
 
@@ -165,18 +165,18 @@ function series(picture, what) {
 }
 
 function limits(what) {
-  const found = Object.entries(facts.limits);
-  if (what === "wear") return found;
+  const entries = Object.entries(facts.limits);
+  if (what === "wear") return entries;
   const same = facts.initial && facts.initial.every((value) => value === facts.initial[0]);
-  return what === "value" && same ? found.map(([name, wear]) => [name, wear + facts.initial[0]]) : [];
+  return what === "value" && same ? entries.map(([name, wear]) => [name, wear + facts.initial[0]]) : [];
 }
 
 function ticks(low, high, count) {
   const rough = (high - low) / count, power = 10 ** Math.floor(Math.log10(rough));
   const step = [1, 2, 5, 10].map((factor) => factor * power).find((each) => each >= rough);
-  const digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9)), found = [];
-  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) found.push(k * step);
-  return found.map((value) => [value, fixed(value === 0 ? 0 : value, digits)]);
+  const digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9)), positions = [];
+  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) positions.push(k * step);
+  return positions.map((value) => [value, fixed(value === 0 ? 0 : value, digits)]);
 }
 
 function range(curves) {

@@ -561,8 +561,8 @@ class Design:
 
         target = find_board(board, BUILDABLE)
         place = Path("build") / self.core.spec.name / target.name if folder is None else Path(fspath(folder))
-        made = build_board(self.core, target, rate=rate, progress=lambda step: progress(step, 0, 0))
-        return Build.written(made, place)
+        built = build_board(self.core, target, rate=rate, progress=lambda step: progress(step, 0, 0))
+        return Build.written(built, place)
 
     def project(
         self,
@@ -602,9 +602,9 @@ class Design:
 
         target = find_board(board, PROJECTS)
         place = Path("build") / self.core.spec.name / target.name if folder is None else Path(fspath(folder))
-        made = board_project(self.core, target, rate=rate, progress=lambda step: progress(step, 0, 0))
-        made.write(place)
-        return made.summary
+        project = board_project(self.core, target, rate=rate, progress=lambda step: progress(step, 0, 0))
+        project.write(place)
+        return project.summary
 
     def cost_on(self, board: str, progress: Progress = lambda step, done, total: None) -> dict[str, Any]:
         """Return what the design takes of a board's FPGA, with the serial link: the content of ``build.json``.
@@ -766,8 +766,8 @@ class Design:
 
         worth = None if self.uncertainty is None else budget_json(self.uncertainty)
         beside = {name: asdict(costs) for name, costs in self.rate_costs.items()}
-        found = {"uncertainty": worth, "estimates": [each.as_dict() for each in self.estimates]}
-        return self.manifest | found | ({"rate_costs": beside} if beside else {})
+        tree = {"uncertainty": worth, "estimates": [each.as_dict() for each in self.estimates]}
+        return self.manifest | tree | ({"rate_costs": beside} if beside else {})
 
     def _repr_html_(self) -> str:
         overview, budget, *_ = self.tables()
@@ -777,8 +777,8 @@ class Design:
         return overview.html() + budget.html()
 
     def __repr__(self) -> str:
-        made = ", ".join(filter(None, (self.realization, self.architecture)))
-        return f"<sosmith.Design {self.name}: {made}, error at most {self.bound}>"
+        structure = ", ".join(filter(None, (self.realization, self.architecture)))
+        return f"<sosmith.Design {self.name}: {structure}, error at most {self.bound}>"
 
 
 def design(
@@ -830,7 +830,7 @@ def design(
     target = None if board is None else find_board(board)
     spec = specification_of(specification).checked
     with falling_short(spec.path):
-        made = design_core(
+        core_design = design_core(
             spec,
             core=core,
             realization=realization,
@@ -838,4 +838,4 @@ def design(
             board=target,
             progress=lambda step: progress(step, 0, 0),
         )
-    return Design(made)
+    return Design(core_design)

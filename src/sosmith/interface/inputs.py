@@ -78,8 +78,8 @@ def codes_of(design: CoreDesign, inputs: Mapping[str, npt.ArrayLike]) -> Codes:
         if not np.issubdtype(values.dtype, np.integer) and not _whole(values):
             raise SpecificationError(f"codes of {port.name} must be integers, not {values.dtype}")
         if values.min() < port.lowest or values.max() > port.highest:
-            found = f"{values.min()}..{values.max()}"
-            raise SpecificationError(f"codes of {port.name} must be in {port.lowest}..{port.highest}, not {found}")
+            extremes = f"{values.min()}..{values.max()}"
+            raise SpecificationError(f"codes of {port.name} must be in {port.lowest}..{port.highest}, not {extremes}")
         columns.append(values.astype(np.int64))
     return np.stack(columns, axis=-1)
 

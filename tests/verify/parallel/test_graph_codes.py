@@ -7,8 +7,9 @@ from tests.verify.parallel.cores import small
 from tests.verify.small_specifications import PLAIN
 
 import sosmith
-from sosmith.verify.parallel.forms import ONE, Forms
+from sosmith.verify.parallel.forms import Forms
 from sosmith.verify.parallel.graph_codes import GraphCodes
+from sosmith.verify.program.normal_form import ONE
 
 FLAT = {
     "name": "flat",
