@@ -8,7 +8,8 @@ import pytest
 from tests.instrument.calibration.bayesian import FIRST, RANGES, TRUE, TYPE, fitted, measured
 
 from sosmith.gen.calibration.fit import Measurements
-from sosmith.instrument.calibration.bayesian_fit import bayesian_fit, lowest_slope, stays_within
+from sosmith.instrument.calibration.bayesian_fit import bayesian_fit
+from sosmith.instrument.calibration.mixed_effects.day_polynomial import lowest_slope, stays_within
 from sosmith.instrument.calibration.coefficient_covariance import columns, of_bayes
 from sosmith.instrument.calibration.covered_region import CoveredRegion
 from sosmith.instrument.calibration.fit_quality import assess_posterior
