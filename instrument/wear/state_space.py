@@ -28,13 +28,13 @@ LEVEL, RATE, SHARED = range(3)
 
 STATES = 3
 
-KEPT = 24
+KEPT = 32
 """Hypotheses that are kept from a day to the next."""
 
-LOOK_BACK = 10.0
+LOOK_BACK = 14.0
 """Days after which something that happened is told no more, and hypotheses that differ in it are merged."""
 
-TOLD = 0.98
+TOLD = 0.6
 """Probability from which something that happened is told."""
 
 DIFFUSE = 10.0
@@ -85,9 +85,9 @@ class WearModel:
     level_walk: float = 0.005
     rate_walk: float = 0.0003
     jump: float = 0.5
-    jumps: float = 1 / 500
+    jumps: float = 1 / 100
     rate_change: float = 0.06
-    rate_changes: float = 1 / 1000
+    rate_changes: float = 1 / 200
     off: float = 5.0
     offs: float = 1 / 200
     shared: float = 0.0
