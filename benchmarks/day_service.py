@@ -25,7 +25,7 @@ from sosmith.instrument.calibration.mixed_effects.day_polynomial import polynomi
 from sosmith.instrument.calibration.mixed_effects.following_day import Following
 from sosmith.instrument.calibration.mixed_effects.model import Posterior
 from sosmith.instrument.scenarios.file import ScenarioFile, load_scenario
-from sosmith.instrument.wear.state_space import DayReading, WearModel, WearState, filtered
+from sosmith.instrument.wear.state_space import DayReading, WearModel, DayState, filtered
 from sosmith.model.arithmetic.random_streams import streams
 from sosmith.model.arrays import Values
 from sosmith.model.errors import ShortfallError
@@ -171,7 +171,7 @@ def judged(wheels: tuple[Wheel, Wheel], seed: int, column: str) -> dict[str, dic
     return found
 
 
-def _holds(state: WearState, clearance: float, wheel: int) -> bool:
+def _holds(state: DayState, clearance: float, wheel: int) -> bool:
     low, high = state.interval(SHARE, wheel)
     return low <= clearance <= high
 

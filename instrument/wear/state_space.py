@@ -170,7 +170,7 @@ class Hypotheses:
 
 
 @dataclass(frozen=True, eq=False)
-class WearState:
+class DayState:
     """What is known of the wheels on a day, from the readings up to then.
 
     Attributes
@@ -234,7 +234,7 @@ class WearState:
         return high
 
 
-def filtered(days: Sequence[DayReading], model: WearModel) -> list[WearState]:
+def filtered(days: Sequence[DayReading], model: WearModel) -> list[DayState]:
     """Return the state on each day, from the readings up to that day.
 
     Raises
@@ -261,7 +261,7 @@ def filtered(days: Sequence[DayReading], model: WearModel) -> list[WearState]:
         before, new = day.time, _new(now, day.time, wheels, told)
         told += new
         now = _merged(now, day.time)
-        states.append(WearState(day.time, now, tuple(new)))
+        states.append(DayState(day.time, now, tuple(new)))
     return states
 
 
