@@ -54,9 +54,7 @@ KINDS = (
 
 
 def _states(read: Values, error: float) -> list[DayState]:
-    days = [
-        DayReading(time=float(k), clearance=(d,), uncertainty=(error,)) for k, d in enumerate(read.tolist())
-    ]
+    days = [DayReading(time=float(k), clearance=(d,), uncertainty=(error,)) for k, d in enumerate(read.tolist())]
     return filtered(days, WearModel())
 
 

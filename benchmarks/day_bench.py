@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 from examples.wear_campaign import hardware
 from examples.wear_campaign.bench import PAPER_FILTER
-from examples.wear_campaign.methods import PRIOR, Made, Worth, judged, measured
+from examples.wear_campaign.methods import PRIOR, Made, Worth, judged, measured, measured_by
 
-from sosmith.gen.core import CoreDesign
 from sosmith.gen.calibration.fit import Measurements
-from sosmith.gen.reload.reload import check_swap, other_set, own_set
+from sosmith.gen.core import CoreDesign
+from sosmith.gen.reload.reload import check_swap, other_set
 from sosmith.gen.stimuli.core import bench_of
 from sosmith.instrument.calibration.acceptance import DEFAULT_RANGES
 from sosmith.instrument.calibration.bayesian_fit import BayesianFit, bayesian_fit
@@ -40,8 +40,8 @@ TARGETS: dict[str, tuple[float, ...]] = {
     "three": (1.5, 3.5, 7.0),
     "five": (1.5, 3.0, 5.0, 7.0, 9.0),
 }
-"""Clearances in mm of the targets. The lowest is beyond the sensor's rail at the depot's temperature, which is at 1.1 mm
-without an error of the day; the lower half is read more densely, since the paper's accuracy is relative."""
+"""Clearances in mm of the targets. The lowest is beyond the sensor's rail at the depot's temperature, which is at
+1.1 mm without an error of the day; the lower half is read more densely, since the paper's accuracy is relative."""
 
 KNOWN_TO = 0.02
 """Standard uncertainty of a target in mm."""
@@ -68,7 +68,12 @@ FACTORY_SEED = 8999
 
 
 def with_targets(
-    known: Measurements, scenario: ScenarioFile, state: InductiveState, date: int, clearances: tuple[float, ...], seed: int
+    known: Measurements,
+    scenario: ScenarioFile,
+    state: InductiveState,
+    date: int,
+    clearances: tuple[float, ...],
+    seed: int,
 ) -> Measurements:
     """Return measurements with the readings of targets on the day `date`, when the sensor is in `state`."""
     if not clearances:
@@ -117,19 +122,12 @@ def one_run(scenario: ScenarioFile, core: CoreDesign, seed: int) -> Iterator[dic
         worth = Worth(of_bayes(measurements, made), of_posterior(measurements, made).half_width)
         polynomial = made.fit.polynomial
         found = judged(Made(polynomial, polynomial.orders[0], worth, made.plain), trace, core)
-        _, _, smooth = filtered_by(core, polynomial, trace)
+        _, _, smooth = measured_by(Made(polynomial, polynomial.orders[0]), trace, core)
         off = (smooth - trace.truth)[trace.reading]
         row = {"run": scenario.path.stem, "targets": name, "seed": seed, "order": polynomial.orders[0]}
         row |= {key: round(found[key], 4) for key in ("accuracy", "inside", "half_width")}
         row |= {"rms": round(float(np.sqrt(np.mean(off**2))), 4)}
         yield row | loaded(core, made, trace)
-
-
-def filtered_by(core: CoreDesign, polynomial: Any, trace: Any) -> Any:
-    """Return voltage, temperature and filtered clearance of a trace in double precision."""
-    from examples.wear_campaign.methods import _measured
-
-    return _measured(Made(polynomial, polynomial.orders[0]), trace, core)
 
 
 def loaded(core: CoreDesign, made: BayesianFit, trace: Any) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""26 days of service of an axle, with and without targets, filter and the known sum: a part of `python -m benchmarks.days`.
+"""26 days of service of an axle, with and without targets, filter and known sum: a part of `python -m benchmarks.days`.
 
 Both wheels wear by 0.05 mm a day, and by 0.45 mm more on one day of bad track; each has a sensor of its own, calibrated
 on the ten days before the service, whose day errs as on the paper's bench. Each day gives one reading of each wheel, in
@@ -13,19 +13,21 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-from benchmarks.day_bench import ORDER, SCENARIOS, SET_ERROR, TYPE, hardware_of, with_targets
+from benchmarks.day_bench import SCENARIOS, SET_ERROR, TYPE, hardware_of, with_targets
 from examples.wear_campaign.methods import measured
+from scipy.signal import sosfilt
+
 from sosmith.gen.calibration.fit import Measurements
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.reload.reload import check_swap, other_set
 from sosmith.instrument.calibration.acceptance import DEFAULT_RANGES
-from sosmith.instrument.calibration.bayesian_fit import BayesianFit, bayesian_fit
+from sosmith.instrument.calibration.bayesian_fit import bayesian_fit
 from sosmith.instrument.calibration.mixed_effects.day_polynomial import polynomial_of
 from sosmith.instrument.calibration.mixed_effects.following_day import Following
 from sosmith.instrument.calibration.mixed_effects.model import Posterior
 from sosmith.instrument.scenarios.file import ScenarioFile, load_scenario
-from sosmith.instrument.wear.state_space import DayReading, WearModel, DayState, filtered
+from sosmith.instrument.uncertainty.instrument_budget import slopes
+from sosmith.instrument.wear.state_space import DayReading, DayState, WearModel, filtered
 from sosmith.model.arithmetic.random_streams import streams
 from sosmith.model.arrays import Values
 from sosmith.model.errors import ShortfallError
@@ -78,12 +80,15 @@ def in_service(
     first = scenario.document.start.toordinal()
     made = bayesian_fit(known, TYPE, max(known.days), DEFAULT_RANGES)
     last = made.model.course(made.posterior.scatters)
-    before = replace(made.posterior, mean=last.mean[-1], factor=last.factor[-1], offset=None, slope=None, curve_factor=None)
+    before = replace(
+        made.posterior, mean=last.mean[-1], factor=last.factor[-1], offset=None, slope=None, curve_factor=None
+    )
     so_far = Following(before, max(known.days))
     chance = streams(sensor, "service of a wheel")
     found: dict[str, list[float]] = {"double": [], "hardware": [], "uncertainty": []}
     polynomial: Polynomial | None = None
-    shared, refused, expected = 0.0, 0, float(true[0])
+    shared: list[float] = []
+    refused, expected, noise = 0, float(true[0]), reading_noise(core, scenario.sensors.inductive.noise)
     datapath = core.datapath
     for k, clearance in enumerate(true.tolist()):
         day = max(known.days) + 1 + k
@@ -107,11 +112,11 @@ def in_service(
         expected = float(np.mean(values[-KEPT:]))
         found["double"].append(expected)
         found["hardware"].append(float(np.mean(datapath.output.decode(datapath.compute(codes))[-KEPT:])))
-        of_all, of_day = _uncertainty(so_far.posterior, polynomial, V[-1:], T[-1:])
-        found["uncertainty"].append(of_all if targets else of_day)
-        shared = 0.0 if targets else float(np.sqrt(max(of_all**2 - of_day**2, 0.0)))
+        new, common = _uncertainty(so_far.posterior, polynomial, V[-1:], T[-1:], noise)
+        found["uncertainty"].append(new)
+        shared.append(common)
     columns = {name: np.array(values) for name, values in found.items()}
-    return Wheel(true=true, shared=shared, refused=refused, **columns)
+    return Wheel(true=true, shared=float(np.mean(shared)), refused=refused, **columns)
 
 
 def _read(
@@ -122,19 +127,44 @@ def _read(
     time = np.arange(SAMPLES) / float(core.spec.sample_rate)
     one = np.ones(SAMPLES)
     codes = scenario.sensors.codes(
-        clearance * one, temperature * one, time, core.datapath.inputs, streams(int(chance("seed").integers(1 << 30)) + day, "reading"), state=state
+        clearance * one,
+        temperature * one,
+        time,
+        core.datapath.inputs,
+        streams(int(chance("seed").integers(1 << 30)) + day, "reading"),
+        state=state,
     )
     V, T = (port.decode(codes[:, k]) for k, port in enumerate(core.datapath.inputs))
     return V, T, codes
 
 
-def _uncertainty(posterior: Posterior, polynomial: Polynomial, V: Values, T: Values) -> tuple[float, float]:
-    """Return the standard uncertainty of a reading in mm, and the part of it that is new on a day without targets."""
+def _uncertainty(
+    posterior: Posterior, polynomial: Polynomial, V: Values, T: Values, noise: float
+) -> tuple[float, float]:
+    """Return the standard uncertainty in mm of a reading that is new on its day, and that which the days share.
+
+    The sensor's deviations are the same on all days; the error of the day is new, as far as its targets leave it open,
+    and so are what the polynomial misses of the day's curve and the noise of the reading, in V.
+    """
     mean, of_curve, of_day = posterior.predicted_parts(V, T)
     off = mean - polynomial(V, T)[:, None]
-    variance = np.sum(of_curve**2, axis=0) + of_day + off**2
+    deviations = len(posterior.mean)
+    shared = np.sum(of_curve[:deviations] ** 2, axis=0)
+    new = np.sum(of_curve[deviations:] ** 2, axis=0) + of_day + off**2
     weigh = posterior.scatters.variance_of
-    return float(np.sqrt(weigh(variance))[0]), float(np.sqrt(weigh(np.array(of_day)))[0])
+    by_voltage, _ = slopes(polynomial, V, T)
+    whole = float(weigh(new)[0]) + (noise * float(by_voltage[0])) ** 2
+    return float(np.sqrt(whole)), float(np.sqrt(weigh(shared)[0]))
+
+
+def reading_noise(core: CoreDesign, noise: float) -> float:
+    """Return the standard deviation in V of the mean of the last samples of a reading, of white noise in V."""
+    ideal = core.quantized.filter
+    assert ideal is not None, "the instrument has a filter"
+    length = 4 * SAMPLES
+    response = sosfilt(ideal.sos, np.eye(1, length)[0])
+    total = np.convolve(response, np.full(KEPT, 1.0 / KEPT))
+    return noise * float(np.sqrt(np.sum(total**2)))
 
 
 WAYS = ("readings", "filter", "sum", "filter and sum")
@@ -167,7 +197,9 @@ def judged(wheels: tuple[Wheel, Wheel], seed: int, column: str) -> dict[str, dic
         ]
         states = filtered(days, model)
         levels = np.array([[state.level(w)[0] for state in states] for w in range(2)])
-        found[name] = _of(levels, true, np.array([[_holds(s, true[w, k], w) for k, s in enumerate(states)] for w in range(2)]))
+        found[name] = _of(
+            levels, true, np.array([[_holds(s, true[w, k], w) for k, s in enumerate(states)] for w in range(2)])
+        )
     return found
 
 

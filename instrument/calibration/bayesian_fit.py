@@ -1,8 +1,8 @@
 """Calibration by the mixed-effects model: for one day, with what is known of the sensor's type.
 
 Unlike the paper's rule, it knows that a sensor is one of a type, that it drifts, that a day has an error of its own,
-and how large these are compared with the scatter of a measurement. It ends in a polynomial, like the paper's: of the type
-curve's orders, or of as high an order in the voltage as the type allows and the day's own curve needs.
+and how large these are compared with the scatter of a measurement. It ends in a polynomial, like the paper's: of the
+type curve's orders, or of as high an order in the voltage as the type allows and the day's own curve needs.
 """
 
 from __future__ import annotations

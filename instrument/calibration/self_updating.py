@@ -452,6 +452,7 @@ def advice_for(
     temperatures: tuple[float, ...],
     within: float,
     most: int,
+    uncertainty: float = 0.0,
 ) -> Advice:
     """Return what to measure on `date`, a day after the last measurement; see `advise`.
 
@@ -475,7 +476,16 @@ def advice_for(
     made = bayesian_fit(measurements, store.sensor_type(sensor), day, ranges)
     low, high = measurements.covered[1]
     usual = (low, (low + high) / 2, high)
-    return advise(made, ranges, clearances, temperatures or usual, within=within, days=day - last, most=most)
+    return advise(
+        made,
+        ranges,
+        clearances,
+        temperatures or usual,
+        within=within,
+        days=day - last,
+        most=most,
+        uncertainty=uncertainty,
+    )
 
 
 def health_for(store: MeasurementStore, sensor: str, since: str | None = None) -> Health:

@@ -1,4 +1,4 @@
-"""Wear over days from a clearance record: the state-space estimate, its risk at the limit, and what was told on the way."""
+"""Wear over days from a clearance record: the state-space estimate, its risk at the limit, and what was told."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ class OverDays:
 
     @property
     def life(self) -> tuple[float | None, float | None, float | None]:
-        """Days until the critical clearance: as likely as not, and the interval; None where there is no end in sight."""
+        """Days until the critical clearance: as likely as not, and the interval; None for no end in sight."""
         tail = (1 - self.confidence) / 2
         half, low, high = (self.now.life(self.limits.critical_clearance, p) for p in (0.5, tail, 1 - tail))
         return half, low, high

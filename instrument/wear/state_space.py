@@ -373,9 +373,7 @@ def _new(now: Hypotheses, time: float, wheels: int, told: Sequence[Told]) -> lis
     """Return what is told on this day: jumps and changes of the rate that are likely, and were not told before."""
     found = []
     for wheel, what in itertools.product(range(wheels), (Happening.JUMP, Happening.RATE)):
-        if any(
-            (one.event.wheel, one.event.what) == (wheel, what) and one.at > time - 2 * LOOK_BACK for one in told
-        ):
+        if any((one.event.wheel, one.event.what) == (wheel, what) and one.at > time - 2 * LOOK_BACK for one in told):
             continue
         having = [
             (float(weight), k, event)

@@ -19,6 +19,7 @@ from sosmith.instrument.calibration.acceptance import Range
 from sosmith.instrument.calibration.covered_region import CoveredRegion
 from sosmith.instrument.calibration.mixed_effects.model import Posterior
 from sosmith.instrument.calibration.sensor_type import LEAST_ORDER, TERMS
+from sosmith.model.arrays import Values
 from sosmith.model.errors import SpecificationError
 from sosmith.model.polynomial import Polynomial
 
@@ -33,8 +34,11 @@ SMALLEST = 1.0
 """Clearance in mm below which the projection weights errors equally; above it, relative to the clearance."""
 
 FOLLOWED = 0.1
-"""What a polynomial may miss of the day's curve, relative to the standard uncertainty of the curve there, rms: it widens
-intervals by half a percent."""
+"""What a polynomial may miss of the day's curve, relative to the standard uncertainty of the curve there, rms: it
+widens intervals by half a percent."""
+
+FARTHER = Fraction(1, 2)
+"""How much farther in mm the polynomial of a day may leave the range of the clearance than that of the deviations."""
 
 PIECES = 16
 """Pieces of a range on which a polynomial is enclosed by its Bernstein coefficients."""
@@ -69,26 +73,32 @@ def nearest(
     """Return the polynomial nearest to the day's curve over the voltages of the port and the measured temperatures.
 
     The order in the voltage rises from `LEAST_ORDER` to that of the sensor's type, until the polynomial follows the
-    curve as `FOLLOWED` says. None if every one leaves the range of the clearance, or falls with the voltage.
+    curve as `FOLLOWED` says. None if every one leaves what is `_allowed`, or falls with the voltage.
     """
-    voltages, temperatures = (
-        np.linspace(low, high, count)
-        for (low, high), count in zip((ranges[1], temperatures_about(measurements)), PROJECTED, strict=True)
-    )
-    V, T = (grid.ravel() for grid in np.meshgrid(voltages, temperatures))
+    V, T = projected_at(ranges[1], temperatures_about(measurements.covered[1]))
     curve = posterior.curve(V, T)
     sums = Sums(curve, V, T, 1.0 / np.maximum(curve, SMALLEST) ** 2)
     variance = posterior.scatters.mean_of(posterior.predicted(V, T)[1])
-    found = None
+    found, allowed = None, _allowed(posterior, ranges)
     for order in range(LEAST_ORDER, posterior.sensor_type.order + 1):
         solution = sums.solve(terms_up_to(order))
         assert solution is not None, "a grid determines the terms"
         made = solution.polynomial
-        if stays_within(made, ranges) and lowest_slope(made, region) > 0:
+        least, most = extremes(made, ranges)
+        if allowed[0] <= least and most <= allowed[1] and lowest_slope(made, region) > 0:
             found = made
             if float(np.mean((made(V, T) - curve) ** 2 / variance)) <= FOLLOWED**2:
                 break
     return found
+
+
+def projected_at(voltages: Range, temperatures: Range) -> tuple[Values, Values]:
+    """Return the voltages and temperatures at which a curve is fitted by a polynomial."""
+    axes = (
+        np.linspace(low, high, count) for (low, high), count in zip((voltages, temperatures), PROJECTED, strict=True)
+    )
+    V, T = (grid.ravel() for grid in np.meshgrid(*axes))
+    return V, T
 
 
 def terms_up_to(order: int) -> tuple[Term, ...]:
@@ -96,9 +106,9 @@ def terms_up_to(order: int) -> tuple[Term, ...]:
     return TERMS if order == LEAST_ORDER else tuple(itertools.product(range(order + 1), range(2)))
 
 
-def temperatures_about(measurements: Measurements) -> Range:
+def temperatures_about(covered: Range) -> Range:
     """Return the measured temperatures, or those `BESIDE` the only one."""
-    low, high = measurements.covered[1]
+    low, high = covered
     return (low, high) if low < high else (low - BESIDE, high + BESIDE)
 
 
@@ -107,13 +117,38 @@ def stays_within(polynomial: Polynomial, ranges: tuple[Range, Range, Range]) -> 
 
     At all voltages and temperatures of `ranges`; in exact arithmetic, without doubt up to order 2 in the voltage.
     """
-    clearance, (v_low, v_high), temperatures = ((Fraction(low), Fraction(high)) for low, high in ranges)
-    for T in temperatures:
-        row = [sum(value * T**j for j, value in enumerate(one)) for one in polynomial.coefficients]
-        low, high = _extremes(_composed(row, v_low, v_high - v_low))
-        if not clearance[0] <= low <= high <= clearance[1]:
-            return False
-    return True
+    low, high = extremes(polynomial, ranges)
+    return Fraction(ranges[0][0]) <= low <= high <= Fraction(ranges[0][1])
+
+
+def extremes(polynomial: Polynomial, ranges: tuple[Range, Range, Range]) -> tuple[Fraction, Fraction]:
+    """Enclose the clearances in mm of a polynomial, linear in the temperature, over the ports; exact up to order 2."""
+    v_low, v_high = map(Fraction, ranges[1])
+    ends = [
+        _extremes(
+            _composed(
+                [
+                    sum((value * Fraction(T) ** j for j, value in enumerate(row)), Fraction(0))
+                    for row in polynomial.coefficients
+                ],
+                v_low,
+                v_high - v_low,
+            )
+        )
+        for T in ranges[2]
+    ]
+    return min(low for low, _ in ends), max(high for _, high in ends)
+
+
+def _allowed(posterior: Posterior, ranges: tuple[Range, Range, Range]) -> tuple[Fraction, Fraction]:
+    """Return the clearances that the day's polynomial may have: those of the port.
+
+    A sensor may leave them at temperatures at which nobody reads it, on any day; then the day's polynomial may do so,
+    too, and a little farther. To leave its own curve out would not help.
+    """
+    low, high = extremes(posterior.sensor_type.polynomial(posterior.deviations), ranges)
+    c_low, c_high = map(Fraction, ranges[0])
+    return min(c_low, low - FARTHER * (low < c_low)), max(c_high, high + FARTHER * (high > c_high))
 
 
 def lowest_slope(polynomial: Polynomial, region: CoveredRegion) -> Fraction:

@@ -23,7 +23,7 @@ def days_of(read: Values, error: float) -> list[DayReading]:
 
 
 def worn(days: int, error: float, seed: int, *, at: int = 0, step: float = 0.0, times: float = 1.0) -> Values:
-    """Readings of a wheel that wears by 0.05 mm a day; from the day `at` on with a step and another rate."""
+    """Read a wheel that wears by 0.05 mm a day; from the day `at` on with a step and another rate."""
     true = 3.0 + np.cumsum(np.where(np.arange(days) > at, 0.05 * times, 0.05)) + step * (np.arange(days) >= at)
     return np.asarray(true + np.random.default_rng(seed).normal(0, error, days))
 

@@ -59,8 +59,8 @@ same comparisons as the wear flags of the hardware.
 @click.option(
     "--day-error",
     type=float,
-    help="With --risk: standard uncertainty in mm of what is new each day in a reading.  [default: that of SPEC, or the "
-    "scatter of the days]",
+    help="With --risk: standard uncertainty in mm of what is new each day in a reading.  [default: that of SPEC, or "
+    "the scatter of the days]",
 )
 @plot_option("SVG or PNG file for a plot.")
 @JSON_OPTION
