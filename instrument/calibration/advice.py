@@ -36,7 +36,7 @@ PAIRS = 48
 """Pairs of scatters for which a plan is followed."""
 
 PROMISED = 1.15
-"""Factor by which intervals are planned narrower than wanted: scatters will be estimated anew from what is measured."""
+"""Factor by which planned intervals are promised wider than expected: scatters will be estimated anew."""
 
 GAIN_DIGITS = 12
 """Decimals to which gains are compared, so that rounding does not decide between equal ones."""
@@ -129,17 +129,17 @@ def advise(
     noise = np.full_like(plan.scatter, uncertainty**2) if uncertainty else plan.scatter**2
     before = after = plan.half_widths()
     chosen: Counter[tuple[float, float]] = Counter()
-    while PROMISED * float(after.max()) > within and chosen.total() < most:
+    while float(after.max()) > within and chosen.total() < most:
         pick = plan.best(noise)
         chosen[possible[pick]] += 1
         plan = plan.measured(pick, noise)
-        after = plan.half_widths()
+        after = PROMISED * plan.half_widths()
     return Advice(
         plan=tuple((d, T, chosen[d, T]) for d, T in sorted(chosen, key=lambda one: (one[1], one[0]))),
         targets=tuple(targets),
         before=tuple(before.tolist()),
         after=tuple(after.tolist()),
-        reached=bool(PROMISED * after.max() <= within),
+        reached=bool(after.max() <= within),
     )
 
 

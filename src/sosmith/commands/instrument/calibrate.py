@@ -530,6 +530,11 @@ def plot_command(store: Path, sensor: str, number: int | None, output: Path | No
     "[default: lowest, middle and highest one measured]",
 )
 @click.option("--most", type=click.IntRange(1, 1000), default=60, show_default=True, help="Most measurements.")
+@click.option(
+    "--uncertainty",
+    callback=_millimetres,
+    help="Standard uncertainty of what is measured, as of reference targets.  [default: it scatters as before]",
+)
 @_STORE
 @_SENSOR
 @_DATE
@@ -539,6 +544,7 @@ def advise_command(
     within: float,
     temperatures: tuple[float, ...],
     most: int,
+    uncertainty: float | None,
     store: Path,
     sensor: str,
     date: str,
@@ -551,13 +557,20 @@ def advise_command(
 
     \b
         sosmith calibrate advise 2mm 3mm 4mm --sensor left --within 0.2mm
+        sosmith calibrate advise 2mm 3mm 4mm --sensor left --within 0.1mm --uncertainty 0.02mm
     """
     from sosmith.interface.instrument.calibration_store import CalibrationStore
 
     with show_progress() as step:
         step(f"fitting {sensor}")
         advised = CalibrationStore(store).advice(
-            sensor, date, clearances, temperatures=temperatures, within=within, most=most
+            sensor,
+            date,
+            clearances,
+            temperatures=temperatures,
+            within=within,
+            most=most,
+            uncertainty=uncertainty or 0.0,
         )
     if as_json:
         print_json(advised.as_dict())

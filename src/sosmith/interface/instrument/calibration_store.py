@@ -39,7 +39,6 @@ from sosmith.instrument.calibration.measurement_store import MeasurementStore, S
 from sosmith.instrument.calibration.self_updating import (
     Addition,
     Calibration,
-    Withdrawn,
     add,
     advice_for,
     calibration_of,
@@ -47,12 +46,11 @@ from sosmith.instrument.calibration.self_updating import (
     health_for,
     refit,
     refused_first_file,
-    sources_of,
-    withdraw,
 )
 from sosmith.instrument.calibration.sensor_type_file import sensor_type_named
 from sosmith.instrument.calibration.store.measurement_files import Refusal, parse_date
 from sosmith.instrument.calibration.store.reference import Morning, by_hand, reference
+from sosmith.instrument.calibration.store.withdrawing import Withdrawn, sources_of, withdraw
 from sosmith.interface.certificate import Progress
 from sosmith.model.errors import ShortfallError, SpecificationError
 
