@@ -2,7 +2,8 @@
 
 The bench with reference targets on the morning of the run, 26 days of service with and without targets and filter, both
 in double precision and by the integers of the proven hardware; what is told of jumps and rates, and missed at the
-limit; whether plans of `advise` keep their promise. Takes about half an hour of processor time. With --document,
+limit; whether plans of `advise` keep their promise, and intervals for sensors that are not as
+their type. Takes about half an hour of processor time. With --document,
 records it in benchmarks/days.json and renews docs/days.md; --part measures one part anew and takes the others from
 the record.
 """
@@ -16,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from benchmarks.calibration_coverage import all_sensors
 from benchmarks.day_advice import all_cases
 from benchmarks.day_alarms import all_alarms
 from benchmarks.day_bench import all_runs
@@ -32,7 +34,10 @@ PAGE = HERE.parent / "docs" / "days.md"
 SEEDS = 40
 """Runs of each kind on the bench, and axles in service."""
 
-FIRST_SEEDS = {"bench": 9001, "service": 9101, "alarms": 9201, "advice": 9301}
+SENSORS = 20
+"""Sensors of each kind that is not as its type."""
+
+FIRST_SEEDS = {"bench": 9001, "service": 9101, "alarms": 9201, "advice": 9301, "coverage": 9401}
 """None of these seeds was used while building."""
 
 
@@ -48,6 +53,8 @@ def measured(parts: list[str], earlier: dict[str, Any], folder: Path, step: Call
         found["alarms"] = all_alarms(FIRST_SEEDS["alarms"], step)
     if "advice" in parts:
         found["advice"] = all_cases(FIRST_SEEDS["advice"], step)
+    if "coverage" in parts:
+        found["coverage"] = all_sensors(range(FIRST_SEEDS["coverage"], FIRST_SEEDS["coverage"] + SENSORS), step)
     return found
 
 

@@ -101,7 +101,7 @@ class BayesianFit:
     @cached_property
     def doubts(self) -> tuple[str, ...]:
         """Sentences about what explains the measurements far better than the type's errors of a day do."""
-        return doubts_of(self.model, self.posterior.curves, self.clearance, self.given)
+        return doubts_of(self.model, self.posterior.curves, self.clearance, self.given, of_day=not self.plain)
 
     @property
     def given(self) -> Values:

@@ -73,23 +73,26 @@ def nearest(
     """Return the polynomial nearest to the day's curve over the voltages of the port and the measured temperatures.
 
     The order in the voltage rises from `LEAST_ORDER` to that of the sensor's type, until the polynomial follows the
-    curve as `FOLLOWED` says. None if every one leaves what is `_allowed`, or falls with the voltage.
+    curve as `FOLLOWED` says. If that one leaves what is `_allowed`, or falls with the voltage, a lower order takes its
+    place; None if all do.
     """
     V, T = projected_at(ranges[1], temperatures_about(measurements.covered[1]))
     curve = posterior.curve(V, T)
     sums = Sums(curve, V, T, 1.0 / np.maximum(curve, SMALLEST) ** 2)
     variance = posterior.scatters.mean_of(posterior.predicted(V, T)[1])
-    found, allowed = None, _allowed(posterior, ranges)
+    made: list[Polynomial] = []
     for order in range(LEAST_ORDER, posterior.sensor_type.order + 1):
         solution = sums.solve(terms_up_to(order))
         assert solution is not None, "a grid determines the terms"
-        made = solution.polynomial
-        least, most = extremes(made, ranges)
-        if allowed[0] <= least and most <= allowed[1] and lowest_slope(made, region) > 0:
-            found = made
-            if float(np.mean((made(V, T) - curve) ** 2 / variance)) <= FOLLOWED**2:
-                break
-    return found
+        made.append(solution.polynomial)
+        if float(np.mean((made[-1](V, T) - curve) ** 2 / variance)) <= FOLLOWED**2:
+            break
+    low, high = _allowed(posterior, ranges)
+    for one in reversed(made):
+        least, most = extremes(one, ranges)
+        if low <= least and most <= high and lowest_slope(one, region) > 0:
+            return one
+    return None
 
 
 def projected_at(voltages: Range, temperatures: Range) -> tuple[Values, Values]:
