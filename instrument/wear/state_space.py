@@ -283,6 +283,10 @@ def _grown(now: Hypotheses, gap: float, model: WearModel) -> Hypotheses:
     return replace(now, mean=now.mean @ step.T, covariance=step @ now.covariance @ step.T + noise)
 
 
+_Branch = tuple[float, Values, Values, tuple[tuple[int, Happening], ...]]
+"""How likely it is, variance added to the states, variance of the readings, and what happened to which wheels."""
+
+
 @dataclass(frozen=True, eq=False)
 class _Branched:
     """Hypotheses with what may have happened on the day; `noise` is the variance of each reading, shape (k, wheels)."""
@@ -300,7 +304,7 @@ def _branched(now: Hypotheses, day: DayReading, model: WearModel, *, quiet: bool
         (Happening.JUMP, model.jumps, LEVEL, model.jump),
         (Happening.RATE, model.rate_changes, RATE, model.rate_change),
     )
-    branches = [(1.0, np.zeros(size), own, ())]
+    branches: list[_Branch] = [(1.0, np.zeros(size), own, ())]
     if not quiet:
         for (what, share, state, spread), some in itertools.product(each, several):
             added = np.zeros(size)
@@ -354,8 +358,8 @@ def _merged(now: Hypotheses, time: float) -> Hypotheses:
     """Forget what happened long ago, and merge hypotheses that differ in nothing else, with their moments."""
     alike: dict[tuple[tuple[float, int, Happening], ...], list[int]] = {}
     recent = [tuple(one for one in events if one.time > time - LOOK_BACK) for events in now.events]
-    for k, events in enumerate(recent):
-        alike.setdefault(tuple((one.time, one.wheel, one.what) for one in events), []).append(k)
+    for k, kept in enumerate(recent):
+        alike.setdefault(tuple((one.time, one.wheel, one.what) for one in kept), []).append(k)
     weights, means, covariances = [], [], []
     for some in alike.values():
         share = now.weight[some] / now.weight[some].sum()

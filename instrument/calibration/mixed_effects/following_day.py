@@ -1,7 +1,7 @@
 """The posterior of a later day from that of the days before and the measurements of its morning alone.
 
-It is what a fit of all measurements anew gives, but for the scatters, whose probabilities stay as they are: a few
-targets tell next to nothing of them after ten days or so. It takes a hundredth of the time, and goes on from day to day.
+It is what a fit of all measurements anew gives, but for the scatters, whose probabilities stay as they are: after ten
+days or so, a few targets tell next to nothing of them. It takes a hundredth of the time, and goes on from day to day.
 """
 
 from __future__ import annotations
