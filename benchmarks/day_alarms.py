@@ -18,6 +18,9 @@ from sosmith.model.arrays import Values
 ERRORS = (0.13, 0.05)
 """Standard deviations of the error of a day in mm."""
 
+SHARED = 0.1
+"""Standard deviation in mm of what all readings share where the calibration errs, too: near the limit only."""
+
 RATE, FIRST = 0.05, 2.5
 """Wear in mm a day, and clearance of the first day in mm."""
 
@@ -53,9 +56,9 @@ KINDS = (
 )
 
 
-def _states(read: Values, error: float) -> list[DayState]:
+def _states(read: Values, error: float, shared: float = 0.0) -> list[DayState]:
     days = [DayReading(time=float(k), clearance=(d,), uncertainty=(error,)) for k, d in enumerate(read.tolist())]
-    return filtered(days, WearModel())
+    return filtered(days, WearModel(shared=shared))
 
 
 def quiet(error: float, first: int, progress: Callable[[int], None]) -> dict[str, Any]:
@@ -95,14 +98,15 @@ def after(kind: Kind, error: float, first: int) -> dict[str, Any]:
     }
 
 
-def near_the_limit(error: float, first: int) -> list[dict[str, Any]]:
+def near_the_limit(error: float, first: int, shared: float = 0.0) -> list[dict[str, Any]]:
     """Return how often wear is called critical at some distances past the limit: by risks, and by the last reading."""
     past: dict[float, list[float]] = {offset: [] for offset in OFFSETS}
     read: dict[float, list[bool]] = {offset: [] for offset in OFFSETS}
     true = FIRST + RATE * np.arange(NEAR_DAYS)
     for k in range(NEAR_RECORDS):
-        values = true + np.random.default_rng([first, k, 3]).normal(0, error, NEAR_DAYS)
-        state = _states(values, error)[-1]
+        chance = np.random.default_rng([first, k, 3])
+        values = true + chance.normal(0, error, NEAR_DAYS) + chance.normal(0, shared)
+        state = _states(values, error, shared)[-1]
         for offset in OFFSETS:
             limit = float(true[-1]) - offset
             past[offset].append(state.beyond(limit))
@@ -110,6 +114,7 @@ def near_the_limit(error: float, first: int) -> list[dict[str, Any]]:
     return [
         {
             "error": error,
+            "shared": shared,
             "offset": offset,
             "reading": float(np.mean(read[offset])),
             "risks": {str(risk): float(np.mean(np.array(past[offset]) >= risk)) for risk in RISKS},
@@ -127,5 +132,6 @@ def all_alarms(first: int, progress: Callable[[str, int, int], None]) -> dict[st
             progress(f"alarms: {kind.name}", 0, 0)
             rows["happenings"].append(after(kind, error, first))
         progress("alarms: near the limit", 0, 0)
-        rows["limit"] += near_the_limit(error, first)
+        for shared in (0.0, SHARED):
+            rows["limit"] += near_the_limit(error, first, shared)
     return rows

@@ -191,6 +191,7 @@ def _alarms(found: dict[str, Any]) -> list[str]:
     limit = [
         (
             f"{row['error']:g}",
+            f"{row['shared']:g}",
             f"{row['offset']:+g}",
             f"{100 * row['reading']:.1f}",
             *(f"{100 * row['risks'][str(risk)]:.1f}" for risk in RISKS),
@@ -208,10 +209,11 @@ def _alarms(found: dict[str, Any]) -> list[str]:
         f"Called critical after 40 days of readings, in % of {NEAR_RECORDS} records, that far past the",
         "limit: by the last",
         "reading alone, as the hardware's flag has it, and by the probability of being past the limit. Past the limit,",
-        "what is not called is a missed alarm; before it, what is called is a false one.",
+        "what is not called is a missed alarm; before it, what is called is a false one. *Shared*: what the",
+        "calibration errs by on all days, which the filter is told of and cannot average.",
         "",
         *_table(
-            "error of a day, mm | past the limit, mm | by the reading | "
+            "error of a day, mm | shared, mm | past the limit, mm | by the reading | "
             + " | ".join(f"risk {risk:g}" for risk in RISKS),
             limit,
         ),
