@@ -33,7 +33,7 @@ def test_a_morning_gives_what_a_fit_of_everything_gives() -> None:
     both = Measurements(d, V, T, "all.csv", before.days + targets.days, known)
     every = bayesian_fit(both, TYPE, last + 2, RANGES).posterior
     V, T = np.linspace(1.0, 9.0, 9), np.full(9, 40.0)
-    assert so_far.posterior.curve(V, T) == pytest.approx(every.curve(V, T), abs=0.01)
+    assert so_far.posterior.curve(V, T) == pytest.approx(every.curve(V, T), abs=0.002)
     here, there = (one.half_width(V, T, one.curve(V, T), 0.95) for one in (so_far.posterior, every))
     assert here == pytest.approx(there, rel=0.1)
     assert so_far.day == last + 2
