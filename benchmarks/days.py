@@ -48,7 +48,7 @@ def measured(parts: list[str], earlier: dict[str, Any], folder: Path, step: Call
     if "bench" in parts:
         found["bench"] = summed(all_runs(seeds["bench"], folder, step), ("run", "targets"))
     if "service" in parts:
-        found["service"] = summed(all_services(seeds["service"], folder, step), ("targets", "by", "way"))
+        found["service"] = of_services(all_services(seeds["service"], folder, step))
     if "alarms" in parts:
         found["alarms"] = all_alarms(FIRST_SEEDS["alarms"], step)
     if "advice" in parts:
@@ -81,6 +81,24 @@ def summed(rows: list[dict[str, Any]], keys: tuple[str, ...]) -> list[dict[str, 
         else:
             one["refused"] = sum(row["refused"] for row in some)
         found.append(one)
+    return found
+
+
+def of_services(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return the figures of the services in double precision, with those of the axles that the hardware read, too."""
+    found = summed([row for row in rows if row["by"] == "double"], ("targets", "way"))
+    for one in found:
+        alike = [row for row in rows if (row["targets"], row["way"]) == (one["targets"], one["way"])]
+        by_hardware = {row["seed"]: row for row in alike if row["by"] == "hardware"}
+        both = [
+            (row, by_hardware[row["seed"]]) for row in alike if row["by"] == "double" and row["seed"] in by_hardware
+        ]
+        one["axles"] = len(both)
+        one["same"], one["hardware"] = (
+            round(float(np.mean([pair[k]["accuracy"] for pair in both])), 4) for k in (0, 1)
+        )
+        one["inside_hardware"] = round(float(np.mean([own["inside"] for _, own in both])), 4)
+        one["off"] = round(max(abs(own["accuracy"] - row["accuracy"]) for row, own in both), 4)
     return found
 
 
