@@ -9,12 +9,13 @@ from tempfile import TemporaryDirectory
 
 from sosmith.model.errors import ToolError
 from sosmith.verify.certificate_file import Certificate, Operation, StageEntry
-from sosmith.verify.rocq.bound import bound_claim, why_no_bound
+from sosmith.verify.rocq.bound import bound_claims, why_no_bound
 from sosmith.verify.rocq.cascade import cascade_of
 from sosmith.verify.rocq.claims import Claim, gain_claims
 from sosmith.verify.rocq.flat import flattened
 from sosmith.verify.rocq.kernel import LIBRARY, THEORIES, run_kernel, theory_texts
 from sosmith.verify.rocq.ranges import graph_definitions, range_claims
+from sosmith.verify.rocq.start import start_of
 
 DATA = "Claims"
 """Name of the file with a certificate's own theorems."""
@@ -121,7 +122,8 @@ def theorems(certificate: Certificate) -> tuple[str, list[Claim], tuple[str, ...
         return "", claims, (f"ranges: {why}", "error bound: no ranges are proven")
     graph = flattened(certificate)
     cascade = cascade_of(graph) if certificate.claims.sections else None
-    claims += range_claims(graph, cascade)
+    start = start_of(graph)
+    claims += range_claims(graph, cascade, start)
     unchecked = [
         "parts of the error budget, each on its own",
         "the ideal filter: its coefficients are those of the certificate",
@@ -130,7 +132,7 @@ def theorems(certificate: Certificate) -> tuple[str, list[Claim], tuple[str, ...
     if why is not None or cascade is None:
         unchecked = [f"error bound: {why}", *unchecked[1:]]
     else:
-        claims.append(bound_claim(certificate, cascade))
+        claims += bound_claims(certificate, cascade, start)
     if certificate.decimation is not None:
         unchecked.append("decimator and what is before it")
     return graph_definitions(graph), claims, tuple(unchecked)
@@ -139,9 +141,7 @@ def theorems(certificate: Certificate) -> tuple[str, list[Claim], tuple[str, ...
 def _why_no_ranges(stages: Sequence[StageEntry]) -> str | None:
     """Why theorems cannot be written for the ranges of these stages; None if they can."""
     for stage in stages:
-        if stage.role == "start":
-            return "a filter that starts from its first sample"
-        for node in stage.nodes if stage.role != "section" else ():
+        for node in stage.nodes if stage.role not in {"section", "start"} else ():
             of = stage.nodes[node.operands[0]] if node.op is Operation.BOUND else node
             if of.low < node.low or of.high > node.high:
                 return f"{stage.name} limits a range by something else than peak gains"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -37,6 +38,20 @@ class FlatGraph:
         """Ranges of the inputs of the first stage."""
         first = self.stages[0]
         return [(first.nodes[i].low, first.nodes[i].high) for i in inputs_of(first)]
+
+    def node(self, index: int) -> NodeEntry:
+        """Return a node by its place in the whole graph."""
+        stage, at = self._at(index)
+        return self.stages[stage].nodes[at]
+
+    def fed_by(self, index: int) -> int:
+        """Return the node that an input of a later stage takes."""
+        stage, at = self._at(index)
+        return self.feeds[stage][inputs_of(self.stages[stage]).index(at)]
+
+    def _at(self, index: int) -> tuple[int, int]:
+        stage = bisect_right(self.offsets, index) - 1
+        return stage, index - self.offsets[stage]
 
     def term(self) -> str:
         """Write it as a list of nodes."""

@@ -17,7 +17,20 @@ from sosmith.model.errors import ToolError
 from sosmith.verify.graph import RejectedError
 from sosmith.verify.rocq.claims import Claim
 
-THEORIES = ("Streams", "PeakGain", "Graph", "Ranges", "Linear", "Bound")
+THEORIES = (
+    "Definitions",
+    "Streams",
+    "Responses",
+    "Gains",
+    "Graph",
+    "Ranges",
+    "Linear",
+    "Cascade",
+    "Start",
+    "Calibration",
+    "Exact",
+    "Bound",
+)
 """The general theories, in the order in which they are compiled."""
 
 LIBRARY = "Sosmith"

@@ -3,11 +3,8 @@
    Most ranges follow from those of the operands by interval arithmetic: induction over time and graph. Where recursion
    makes intervals grow without end, a node's range is given from elsewhere (`given`): from a peak gain. *)
 Require Import Bool ZArith List Lia. Import ListNotations.
-From Sosmith Require Import Graph.
+From Sosmith Require Import Definitions Graph.
 Open Scope Z_scope.
-
-Definition in_range (g : graph) (x : nat -> nat -> Z) (i n : nat) : Prop :=
-  low (nth i g blank) <= code g x i n <= high (nth i g blank).
 
 (* The smallest and the largest code that an operation makes of codes within their ranges. *)
 Definition interval (g : graph) (ports : list (Z * Z)) (v : node) : Z * Z :=
@@ -31,8 +28,6 @@ Definition interval (g : graph) (ports : list (Z * Z)) (v : node) : Z * Z :=
   | Clamp _ => (low v, high v)
   | Delay a => (Z.min 0 (lo a), Z.max 0 (hi a))
   end.
-Definition inputs_within (ports : list (Z * Z)) (x : nat -> nat -> Z) : Prop :=
-  forall n p, (p < length ports)%nat -> fst (nth p ports (0, 0)) <= x n p <= snd (nth p ports (0, 0)).
 Definition has_port (ports : list (Z * Z)) (v : node) : bool :=
   match op v with Input p => Nat.ltb p (length ports) | _ => true end.
 Definition follows (g : graph) (ports : list (Z * Z)) (given : list nat) (i : nat) (v : node) : bool :=
@@ -141,6 +136,17 @@ Proof.
   - rewrite before_code. destruct n as [|m]; [lia|].
     assert (H : in_range g x a m) by (apply Past; [lia|apply (closed_spec k g i a C Hi Eo)]).
     unfold in_range in H. lia.
+Qed.
+
+(* The same, where the first nodes are known already. *)
+Theorem ranges_further (known k : nat) (g : graph) (ports : list (Z * Z)) (given : list nat) (x : nat -> nat -> Z) :
+  ordered g = true -> closed k g = true -> every (follows g ports (seq 0 known ++ given)) 0 (firstn k g) = true ->
+  inputs_within ports x -> (forall n i, (i < known)%nat -> in_range g x i n) ->
+  (forall i n, In i given -> in_range g x i n) ->
+  forall n i, (i < k)%nat -> in_range g x i n.
+Proof.
+  intros G C F X K Y. apply (ranges k g ports (seq 0 known ++ given) x G C F X).
+  intros i n H. apply in_app_or in H. destruct H as [H|H]; [apply in_seq in H; apply K; lia|apply Y, H].
 Qed.
 
 (* Nodes whose range needs nothing of the others: constants, and those that are known already, the first k. *)
