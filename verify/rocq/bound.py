@@ -10,11 +10,11 @@ from flint import fmpz_poly
 
 from sosmith.verify.certificate_file import Certificate, Operation
 from sosmith.verify.rocq.calibration import Calibration, calibration_of
-from sosmith.verify.rocq.cascade import Cascade, Rows
+from sosmith.verify.rocq.cascade import Cascade, Row, Rows
 from sosmith.verify.rocq.claims import Claim
 from sosmith.verify.rocq.exact import ExactRow, exact_row, sections_of, sections_term
 from sosmith.verify.rocq.polynomials import number
-from sosmith.verify.rocq.ranges import negative, windows_of
+from sosmith.verify.rocq.ranges import Windows, negative, windows_of
 from sosmith.verify.rocq.start import StartNodes
 
 _MORE_BITS = (4, 12, 28, 60, 124)
@@ -78,17 +78,18 @@ def bound_claims(certificate: Certificate, cascade: Cascade, start: StartNodes |
     calibration = calibration_of(certificate, cascade.graph, task.taken)
     words = f"the input of the filter is within {float(calibration.error):.9g} of the exact one"
     yield Claim("calibrated_input", words, _calibrated(task, calibration))
+    parts = ", ".join(f"{name} {float(value):.3g}" for name, value in certificate.claims.budget.items())
+    words = f"the output is that of the exact filter and errors, each within its part of the budget, limited: {parts}"
+    yield Claim("error_in_parts", words, _parts(task, calibration))
     bound = certificate.claims.bound
     words = f"for all inputs the output is within {float(bound):.9g} of its last place of the exact filter, limited"
-    yield Claim("error_is_bounded", words, _theorem(task, calibration))
+    yield Claim("error_is_bounded", words, _bound(task))
 
 
 def _calibrated(task: _Task, calibration: Calibration) -> str:
-    second = "x m 1%nat" if len(task.certificate.inputs) > 1 else "0"
-    codes = "x m 0%nat" if second == "0" else "x m 0%nat) (x m 1%nat"
-    names = "a" if second == "0" else "a b"
-    cases = " | ".join(["[|m]"] if second == "0" else ["[|[|m]]"])
-    del cases
+    two = len(task.certificate.inputs) > 1
+    second = "x m 1%nat" if two else "0"
+    codes, names = ("x m 0%nat) (x m 1%nat", "a b") if two else ("x m 0%nat", "a")
     error = calibration.error
     return f"""\
 (* The exact input of the filter from the codes x of the inputs, in units of the output's last place. *)
@@ -114,46 +115,65 @@ Qed.
 """
 
 
-def _theorem(task: _Task, calibration: Calibration) -> str:
+_PARTS = (("calibration", "input scaling"), ("filter coefficients",), ("filter rounding",), ("start",), ("output rounding",))
+"""Names of the parts of the budget, in the order of the theories."""
+
+
+def _claimed(certificate: Certificate) -> list[Fraction]:
+    """Return the claimed parts of the budget; 0 for those that it does not have."""
+    budget = certificate.claims.budget
+    return [sum((budget.get(name, Fraction(0)) for name in names), Fraction(0)) for names in _PARTS]
+
+
+def _statement(task: _Task) -> tuple[str, str]:
+    """Return how both theorems begin, and the exact filter's output in them."""
+    begins = "from_zero" if task.start is None else "from_first"
+    over = f"IZR {number(task.offset.numerator)} / IZR {task.offset.denominator}"
+    value = f"(y (Z.of_nat n) - {over})" if task.offset else "(y (Z.of_nat n))"
+    head = f"""\
+forall x, inputs_within ports x ->
+  forall y, exact_filter exact_sections ({begins} (fun n => calibrated (x n))) y -> forall n,"""
+    return head, value
+
+
+def _parts(task: _Task, calibration: Calibration) -> str:
     certificate, cascade, start = task.certificate, task.cascade, task.start
-    port, bound, offset = certificate.output, certificate.claims.bound, task.offset
+    port, offset = certificate.output, task.offset
     rows, exact, more = _decided(task, calibration)
-    steady = start is not None
-    begins = "from_first" if steady else "from_zero"
     held = "None" if task.held is None else f"(Some {task.held}%nat)"
-    limits = f"{number(port.lowest)} {number(port.highest)}"
+    limits = f"{number(port.lowest)} {number(port.highest)} {number(offset.numerator)} {offset.denominator}"
     if start is None:
         entry = "intros n. rewrite Rminus_0_r. reflexivity"
     else:
         entry = (
-            f"intros n. apply (start_entry core x begin {task.wire} n core_is_ordered "
-            f"(start_fits_starts _ _ start_fits_core)). apply (wire_code core x {task.wire} {start.change} n "
-            "core_is_ordered). vm_cast_no_check (eq_refl true)"
+            f"intros n. apply (start_entry core x begin {task.wire} n core_is_ordered start_is). "
+            f"apply (wire_code core x {task.wire} {start.change} n core_is_ordered). vm_cast_no_check (eq_refl true)"
         )
-    first = (
-        "intros n. exact (proj2 (started_from core x begin core_is_ordered (start_fits_starts _ _ start_fits_core) n))"
-        if task.held is not None
-        else "exact I"
-    )
-    zero = f"(code core x {task.taken} 0)" if steady else "0"
-    value = "(calibrated (x 0%nat))" if steady else "0%R"
+    first = "exact I"
+    if task.held is not None:
+        first = "intros n. exact (proj2 (started_from core x begin core_is_ordered start_is n))"
+    zero = "0" if start is None else f"(code core x {task.taken} 0)"
+    value = "0%R" if start is None else "(calibrated (x 0%nat))"
+    parts = " ".join(f"({number(part.numerator)}, {part.denominator})" for part in _claimed(certificate))
+    head, exactly = _statement(task)
+    places = f"Parts {task.out} {task.last} ({rows.plan}) {cascade.sections[0].wires[0]} {task.taken} {held}"
+    error = calibration.error
+    rewritten = "" if offset else "rewrite <- (Rminus_0_r (y (Z.of_nat n))). replace 0%R with (IZR 0 / IZR 1)%R by field. "
     return f"""\
 (* The sections of the exact filter, numerators and denominators. *)
 Definition exact_sections : list (list Z * list Z) :=
   [{sections_term(sections_of(certificate.ideal.sections))[1:]}.
-Definition details : parts_ := Parts {task.out} {task.last} ({rows.plan}) {cascade.sections[0].wires[0]} {task.taken} {held}
-  {"true" if steady else "false"}
+(* The claimed parts of the bound: at the input, by the coefficients, by roundings, at the start, and of the last rounding. *)
+Definition claimed : budget := Budget {parts}.
+Definition details : parts_ := {places} {"false" if start is None else "true"}
   {exact.parts}
-  {calibration.most} (2 ^ 64) {more} {calibration.error.numerator} {calibration.error.denominator}.
-Theorem error_is_bounded : forall x, inputs_within ports x ->
-  forall y, exact_filter exact_sections ({begins} (fun n => calibrated (x n))) y ->
-  forall n, (Rabs (IZR (code core x {task.out} n)
-      - limited (IZR {number(port.lowest)}) (IZR {number(port.highest)}) (y (Z.of_nat n) - IZR {number(offset.numerator)} / IZR {offset.denominator}))
-    <= IZR {number(bound.numerator)} / IZR {bound.denominator})%R.
+  {calibration.most} (2 ^ 64) {more} {error.numerator} {error.denominator}.
+Theorem error_in_parts : {head} exists e, in_parts claimed e
+    /\\ IZR (code core x {task.out} n) = limited (IZR {number(port.lowest)}) (IZR {number(port.highest)}) ({exactly} + e).
 Proof.
-  intros x X. apply (error_bound core x sources forms {cascade.last} window details exact_sections {limits}
-    {number(offset.numerator)} {offset.denominator} {number(bound.numerator)} {bound.denominator} (fun n => calibrated (x n)) {zero} {value}
-    core_is_ordered sections_are_closed forms_fit).
+  intros x X y Y n. {rewritten}revert n. revert y Y.
+  apply (error_parts core x sources forms {cascade.last} window details exact_sections {limits} claimed
+    (fun n => calibrated (x n)) {zero} {value} core_is_ordered sections_are_closed forms_fit).
   - vm_cast_no_check (eq_refl true).
   - exact (every_code_in_range x X).
   - exact (window_is x X).
@@ -162,6 +182,21 @@ Proof.
   - reflexivity.
   - {first}.
   - exact (calibrated_input x X).
+Qed.
+"""
+
+
+def _bound(task: _Task) -> str:
+    port, bound = task.certificate.output, task.certificate.claims.bound
+    head, exactly = _statement(task)
+    return f"""\
+Theorem error_is_bounded : {head}
+  (Rabs (IZR (code core x {task.out} n) - limited (IZR {number(port.lowest)}) (IZR {number(port.highest)}) {exactly})
+    <= IZR {number(bound.numerator)} / IZR {bound.denominator})%R.
+Proof.
+  intros x X y Y n. destruct (error_in_parts x X y Y n) as [e [P E]].
+  eapply Rle_trans; [exact (within_sum claimed _ _ _ _ _ P E)|].
+  unfold sum_of, real, claimed. cbn [fst snd of_input of_coefficients of_roundings of_start of_output]. lra.
 Qed.
 """
 
@@ -184,24 +219,31 @@ def _decided(task: _Task, calibration: Calibration) -> tuple[Rows, ExactRow, int
 
 
 def _fits(task: _Task, calibration: Calibration, rows: Rows, exact: ExactRow, more: int) -> bool:
-    """Whether `error_holds` of the theories holds, but for the last stage, which is taken for what it should be."""
+    """Whether `parts_hold` of the theories holds, but for the last stage, which is taken for what it should be."""
     graph, windows = task.cascade.graph, windows_of(task.cascade, task.start)
     taken, last = graph.node(task.taken), graph.node(task.last)
     entry = task.cascade.sections[0].wires[0]
-    f, unit = taken.frac, last.frac
-    both = {place: over * (1 << f + more) for place, over in rows.row.items()}
-    both[entry] = both.get(entry, fmpz_poly()) - exact.row * (1 << unit)
-    whole = rows.whole << more
-    total = max(windows.most(both), windows.most(negative(both)))
-    if task.start is not None:
-        gain = _gain(task) if task.held is not None else Fraction(0)
-        at_rest = abs(whole * gain - sum(int(value) for value in exact.row.coeffs()))
-        total += int(at_rest * (1 << unit)) * max(abs(taken.low), abs(taken.high))
-    total += (rows.rest << f + more)
+    f, point, whole = taken.frac, last.frac, rows.whole << more
+    others = {place: over * (1 << f + more) for place, over in rows.row.items()}
+    entering = {entry: others.pop(entry, fmpz_poly()) - exact.row * (1 << point)}
     size = sum(abs(int(value)) for value in exact.row.coeffs())
     error = calibration.error
-    total += (size * error.numerator // error.denominator + 1 + exact.rest // _FINE + 1) << unit + f
-    return Fraction(total, whole << unit + f) + Fraction(1, 2) <= task.certificate.claims.bound
+    at_rest = Fraction(0)
+    if task.start is not None:
+        gain = _gain(task) if task.held is not None else Fraction(0)
+        at_rest = abs(whole * gain - sum(int(value) for value in exact.row.coeffs())) * (1 << point)
+    values = [
+        -(-size * error.numerator // error.denominator) << point + f,
+        _either(windows, entering) + ((exact.rest // _FINE + 1) << point + f),
+        _either(windows, others) + (rows.rest << f + more),
+        at_rest * max(abs(taken.low), abs(taken.high)),
+    ]
+    unit = whole << point + f
+    return all(value <= claim * unit for value, claim in zip(values, _claimed(task.certificate), strict=False))
+
+
+def _either(windows: Windows, row: Row) -> int:
+    return max(windows.most(row), windows.most(negative(row)))
 
 
 def _gain(task: _Task) -> Fraction:

@@ -108,7 +108,7 @@ def head(theories: Sequence[str] = THEORIES) -> str:
     """Return how a file of theorems begins that requires these theories."""
     return f"""\
 (* Written from a certificate: its claims as theorems. The theories beside it say what they mean. *)
-Require Import ZArith Reals List. Import ListNotations.
+Require Import ZArith Reals List Lra. Import ListNotations.
 From {LIBRARY} Require Import {" ".join(theories)}.
 Open Scope Z_scope.
 """

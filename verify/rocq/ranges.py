@@ -158,6 +158,7 @@ def _definitions(cascade: Cascade, start: StartNodes | None) -> str:
 Definition begin : start := {start.term}.
 Lemma start_fits_core : start_fits core begin = true.
 Proof. vm_cast_no_check (eq_refl true). Qed.
+Definition start_is : starts core begin = true := start_fits_starts _ _ start_fits_core.
 """
     window = "None" if start is None else f"windows_of core begin {wire}"
     return f"""\
@@ -178,7 +179,7 @@ def _window(cascade: Cascade, start: StartNodes | None) -> str:
     return f"""\
 {statement}\
 Proof.
-  intros x X. apply (start_windows core x begin {wire} core_is_ordered (start_fits_starts _ _ start_fits_core)).
+  intros x X. apply (start_windows core x begin {wire} core_is_ordered start_is).
   - intros n. exact (ranges_before_start x X n {start.sample} (le_n _)).
   - intros n. apply (wire_code core x {wire} {start.change} n core_is_ordered). vm_cast_no_check (eq_refl true).
 Qed.

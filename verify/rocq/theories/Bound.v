@@ -105,10 +105,35 @@ Definition rounding_node (g : graph) (out : nat) (lo hi : Z) : option nat :=
    filter is followed with `more` bits than the graph, and the limits of its signals in units of 1 / fine. *)
 Record parts_ := Parts { out : nat; last_ : nat; plan_ : plan; entry : nat; taken : nat; held_ : option nat; steady : bool;
   exact : list part; least_ : Z; fine : Z; more : Z; in_p : Z; in_q : Z }.
-Definition error_holds (g : graph) (S : list source) (forms : list (option form)) (k : nat) (W : windows) (d : parts_)
-    (sections : list (list Z * list Z)) (lo hi off_p off_q p q : Z) : bool :=
+Definition ratio := (Z * Z)%type.
+Definition real (a : ratio) : R := (IZR (fst a) / IZR (snd a))%R.
+(* The parts of the bound: of calibration, coefficients, roundings, first sample, and of the last rounding. *)
+Record budget := Budget { of_input : ratio; of_coefficients : ratio; of_roundings : ratio; of_start : ratio; of_output : ratio }.
+Definition at_most_ (value unit : Z) (a : ratio) : bool := (0 <? snd a) && (value * snd a <=? fst a * unit).
+Lemma at_most_spec value unit a : 0 < unit -> at_most_ value unit a = true -> (IZR value / IZR unit <= real a)%R.
+Proof.
+  unfold at_most_, real. intros U H. apply andb_prop in H. destruct H as [H1 H2]. apply Z.ltb_lt in H1. apply Z.leb_le in H2.
+  apply IZR_le in H2. rewrite !mult_IZR in H2. assert (A : (0 < IZR unit)%R) by (apply IZR_lt; exact U).
+  assert (B : (0 < IZR (snd a))%R) by (apply IZR_lt; exact H1).
+  apply Rmult_le_reg_r with (IZR unit * IZR (snd a))%R; [apply Rmult_lt_0_compat; assumption|].
+  replace (IZR value / IZR unit * (IZR unit * IZR (snd a)))%R with (IZR value * IZR (snd a))%R by (field; lra).
+  replace (IZR (fst a) / IZR (snd a) * (IZR unit * IZR (snd a)))%R with (IZR (fst a) * IZR unit)%R by (field; lra). exact H2.
+Qed.
+Lemma part_small e value unit a : 0 < unit -> (Rabs (IZR unit * e) <= IZR value)%R -> at_most_ value unit a = true -> (Rabs e <= real a)%R.
+Proof.
+  intros U H A. apply Rle_trans with (2 := at_most_spec value unit a U A). assert (P : (0 < IZR unit)%R) by (apply IZR_lt; exact U).
+  rewrite Rabs_mult, (Rabs_pos_eq (IZR unit)) in H by lra. apply Rmult_le_reg_l with (IZR unit); [exact P|].
+  replace (IZR unit * (IZR value / IZR unit))%R with (IZR value) by (field; lra). exact H.
+Qed.
+
+Definition either (g : graph) (S : list source) (W : windows) (row : list (list Z)) : Z :=
+  Z.max (most_of g S W row) (most_of g S W (scale_rows (-1) row)).
+(* The parts as numbers, in units of 1 / (2^F 2^f K) but for the last one, which is in units of 1 / (2 2^F off_q). *)
+Record values := Values { input_ : Z; coefficients_ : Z; roundings_ : Z; start_ : Z; output_ : Z; unit_ : Z; unit_out : Z }.
+Definition parts_of (g : graph) (S : list source) (forms : list (option form)) (k : nat) (W : windows) (d : parts_)
+    (sections : list (list Z * list Z)) (lo hi off_p off_q : Z) : option values :=
   match rounding_node g (out d) lo hi with
-  | None => false
+  | None => None
   | Some a =>
     match op (nth a g blank), rows_of g S forms k (length g) (last_ d) (plan_ d) with
     | Floor b, Some (row, R, K0) =>
@@ -118,27 +143,41 @@ Definition error_holds (g : graph) (S : list source) (forms : list (option form)
         let F := frac_of g b in
         let f := frac_of g (taken d) in
         let both := add_rows (scale_rows (2 ^ f * (2 ^ more d * alpha)) row) (place (entry d) (scale (- 2 ^ F) E)) in
+        let entering := place (entry d) (nth (entry d) both []) in
+        let others := without (entry d) both in
         let from_first := if steady d
           then Z.abs (2 ^ f * K * match held_ d with Some _ => beta | None => 0 end - 2 ^ F * sum E) * size g (taken d) else 0 in
-        let all := Z.max (most_of g S W both) (most_of g S W (scale_rows (-1) both)) + from_first
-          + 2 ^ f * (2 ^ more d * Z.abs alpha) * R + 2 ^ F * 2 ^ f * (norm1 E * in_p d / in_q d + 1 + (Re / fine d + 1)) in
-        let unit := 2 ^ F * 2 ^ f * K in
-        let off := Z.abs (2 * off_q * gamma - 2 ^ F * off_q + 2 * 2 ^ F * off_p) in
-        Nat.ltb (out d) (length g) && Nat.ltb a (length g) && Nat.ltb (last_ d) k && Nat.ltb (taken d) (length g)
-        && forallb (known_source g (length g)) (used S both)
-        && (frac_of g a =? 0) && (0 <=? F) && (0 <=? f) && (0 <? K) && (0 <? off_q) && (0 <? in_q d) && (0 <=? in_p d) && (0 <? q)
-        && (0 <? fine d) && (0 <=? more d)
-        && (steady d || match held_ d with None => true | Some _ => false end)
-        && (q * (2 * (2 ^ F * off_q) * all + off * unit + 2 ^ F * off_q * unit) <=? p * (2 * (2 ^ F * off_q) * unit))
-      | _, _ => false
+        if Nat.ltb (out d) (length g) && Nat.ltb a (length g) && Nat.ltb (last_ d) k && Nat.ltb (taken d) (length g)
+           && forallb (known_source g (length g)) (used S entering) && forallb (known_source g (length g)) (used S others)
+           && (frac_of g a =? 0) && (0 <=? F) && (0 <=? f) && (0 <? K) && (0 <? off_q) && (0 <? in_q d) && (0 <=? in_p d)
+           && (0 <? fine d) && (0 <=? more d)
+           && (steady d || match held_ d with None => true | Some _ => false end)
+        then Some (Values (2 ^ F * 2 ^ f * ((norm1 E * in_p d + in_q d - 1) / in_q d))
+               (either g S W entering + 2 ^ F * 2 ^ f * (Re / fine d + 1))
+               (either g S W others + 2 ^ f * (2 ^ more d * Z.abs alpha) * R) from_first
+               (Z.abs (2 * off_q * gamma - 2 ^ F * off_q + 2 * 2 ^ F * off_p) + 2 ^ F * off_q)
+               (2 ^ F * 2 ^ f * K) (2 * (2 ^ F * off_q)))
+        else None
+      | _, _ => None
       end
-    | _, _ => false
+    | _, _ => None
     end
   end.
+Definition parts_hold (v : option values) (c : budget) : bool :=
+  match v with
+  | Some v => at_most_ (input_ v) (unit_ v) (of_input c) && at_most_ (coefficients_ v) (unit_ v) (of_coefficients c)
+      && at_most_ (roundings_ v) (unit_ v) (of_roundings c) && at_most_ (start_ v) (unit_ v) (of_start c)
+      && at_most_ (output_ v) (unit_out v) (of_output c)
+  | None => false
+  end.
 
-Theorem error_bound g x S forms k W d sections lo hi off_p off_q p q (c : nat -> R) (w0 : Z) (c0 : R) :
+(* The code is that of the exact filter and five errors, limited. *)
+Definition in_parts (c : budget) (e : R) : Prop := exists a b r s o : R, e = (a + b + r + s + o)%R
+  /\ (Rabs a <= real (of_input c))%R /\ (Rabs b <= real (of_coefficients c))%R /\ (Rabs r <= real (of_roundings c))%R
+  /\ (Rabs s <= real (of_start c))%R /\ (Rabs o <= real (of_output c))%R.
+Theorem error_parts g x S forms k W d sections lo hi off_p off_q bud (c : nat -> R) (w0 : Z) (c0 : R) :
   ordered g = true -> closed k g = true -> every (fits_node g S forms) 0 (firstn k g) = true ->
-  error_holds g S forms k W d sections lo hi off_p off_q p q = true ->
+  parts_hold (parts_of g S forms k W d sections lo hi off_p off_q) bud = true ->
   (forall n i, (i < length g)%nat -> in_range g x i n) -> window_holds g x W ->
   (forall n, nth (entry d) (map (drive g x) S) (fun _ => 0%R) n = (IZR (code g x (taken d) n) - IZR w0)%R) ->
   w0 = (if steady d then code g x (taken d) 0 else 0) -> c0 = (if steady d then c O else 0%R) ->
@@ -146,9 +185,10 @@ Theorem error_bound g x S forms k W d sections lo hi off_p off_q p q (c : nat ->
   (forall n, (Rabs (c n - IZR (code g x (taken d) n) / IZR (2 ^ frac_of g (taken d))%Z) <= IZR (in_p d) / IZR (in_q d))%R
     /\ (Rabs (c n) <= IZR (least_ d))%R) ->
   forall y, exact_filter sections (after c0 c) y ->
-  forall n, (Rabs (IZR (code g x (out d) n) - limited (IZR lo) (IZR hi) (y (Z.of_nat n) - IZR off_p / IZR off_q)) <= IZR p / IZR q)%R.
+  forall n, exists e, in_parts bud e
+    /\ IZR (code g x (out d) n) = limited (IZR lo) (IZR hi) (y (Z.of_nat n) - IZR off_p / IZR off_q + e).
 Proof.
-  intros G C E H Known Wh Entry W0 C0 Held Near y Y n. unfold error_holds in H.
+  intros G C E H Known Wh Entry W0 C0 Held Near y Y n. unfold parts_hold, parts_of in H.
   destruct (rounding_node g (out d) lo hi) as [a|] eqn:Er; [|discriminate].
   destruct (op (nth a g blank)) as [| | | | | | |b| | | | | |] eqn:Ea; try discriminate.
   destruct (rows_of g S forms k (length g) (last_ d) (plan_ d)) as [[[row R] K1]|] eqn:Erow; [|discriminate].
@@ -157,22 +197,25 @@ Proof.
   destruct (exact_row sections (exact d) (least_ d * fine d) K) as [[Ex Re]|] eqn:Eex; [|discriminate].
   set (F := frac_of g b) in *. set (f := frac_of g (taken d)) in *.
   set (both := add_rows (scale_rows (2 ^ f * (2 ^ more d * alpha)) row) (place (entry d) (scale (- 2 ^ F) Ex))) in *.
+  set (entering := place (entry d) (nth (entry d) both [])) in *. set (others := without (entry d) both) in *.
   set (beta' := match held_ d with Some _ => beta | None => 0 end) in *.
   set (from_first := if steady d then Z.abs (2 ^ f * K * beta' - 2 ^ F * sum Ex) * size g (taken d) else 0) in *.
-  set (cal := norm1 Ex * in_p d / in_q d + 1) in *.
+  set (cal := (norm1 Ex * in_p d + in_q d - 1) / in_q d) in *.
   set (re := Re / fine d + 1) in *.
-  set (m := Z.max (most_of g S W both) (most_of g S W (scale_rows (-1) both))) in *.
-  set (all := m + from_first + 2 ^ f * (2 ^ more d * Z.abs alpha) * R + 2 ^ F * 2 ^ f * (cal + re)) in *.
-  set (off := Z.abs (2 * off_q * gamma - 2 ^ F * off_q + 2 * 2 ^ F * off_p)) in *.
+  set (unit := 2 ^ F * 2 ^ f * K) in *.
+  match type of H with match (if ?b then _ else _) with Some _ => _ | None => _ end = _ => destruct b eqn:Hc; [|discriminate] end.
+  cbn [input_ coefficients_ roundings_ start_ output_ unit_ unit_out] in H.
+  apply andb_prop in H. destruct H as [H P5]. apply andb_prop in H. destruct H as [H P4].
+  apply andb_prop in H. destruct H as [H P3]. apply andb_prop in H. destruct H as [P1 P2].
+  rename Hc into H.
   repeat match type of H with _ && _ = true => let X := fresh "X" in apply andb_prop in H; destruct H as [H X] end.
-  rename X1 into More. rename X2 into Fine. apply Z.leb_le in More. apply Z.ltb_lt in Fine.
-  apply Nat.ltb_lt in H. apply Nat.ltb_lt in X14. apply Nat.ltb_lt in X13. apply Nat.ltb_lt in X12. apply Z.eqb_eq in X10.
-  apply Z.leb_le in X9. apply Z.leb_le in X8. apply Z.ltb_lt in X7. apply Z.ltb_lt in X6. apply Z.ltb_lt in X5. apply Z.leb_le in X4.
-  apply Z.ltb_lt in X3. apply Z.leb_le in X.
-  assert (Lb : (b < a)%nat) by (apply (operands_before g G a b X14); rewrite Ea; left; reflexivity).
+  rename X0 into More. rename X1 into Fine. apply Z.leb_le in More. apply Z.ltb_lt in Fine.
+  apply Nat.ltb_lt in H. apply Nat.ltb_lt in X13. apply Nat.ltb_lt in X12. apply Nat.ltb_lt in X11. apply Z.eqb_eq in X8.
+  apply Z.leb_le in X7. apply Z.leb_le in X6. apply Z.ltb_lt in X5. apply Z.ltb_lt in X4. apply Z.ltb_lt in X3. apply Z.leb_le in X2.
+  assert (Lb : (b < a)%nat) by (apply (operands_before g G a b X13); rewrite Ea; left; reflexivity).
   set (u := map (drive g x) S) in *.
   (* The parts, all of them real numbers. *)
-  destruct (rows_spec g x S forms k (length g) G C E Known (last_ d) (plan_ d) row R K1 n X13 Erow
+  destruct (rows_spec g x S forms k (length g) G C E Known (last_ d) (plan_ d) row R K1 n X12 Erow
     (fun m' _ => Known m' (last_ d) ltac:(pose proof (closed_length k g C); lia))) as [e1 [B1 H1]].
   fold u in H1. set (v := trace g x (last_ d) n) in *.
   set (mm := 2 ^ more d) in *. assert (M0 : 0 < mm) by (apply Z.pow_pos_nonneg; lia).
@@ -198,7 +241,8 @@ Proof.
     apply Rmult_le_reg_r with (IZR (in_q d)); [exact iq0|].
     replace (IZR (norm1 Ex) * (IZR (in_p d) / IZR (in_q d)) * IZR (in_q d))%R with (IZR (norm1 Ex * in_p d)) by (rewrite mult_IZR; field; lra).
     rewrite <- mult_IZR. apply IZR_le. unfold cal.
-    pose proof (Z.div_mod (norm1 Ex * in_p d) (in_q d) ltac:(lia)). pose proof (Z.mod_pos_bound (norm1 Ex * in_p d) (in_q d) X5). lia. }
+    pose proof (Z.div_mod (norm1 Ex * in_p d + in_q d - 1) (in_q d) ltac:(lia)).
+    pose proof (Z.mod_pos_bound (norm1 Ex * in_p d + in_q d - 1) (in_q d) X3). lia. }
   assert (H3 : (taps Ex (after c0 c) (Z.of_nat n) = (conv Ex (fun j => wcode j - IZR w0) n + IZR (sum Ex) * IZR w0) / ff + e3)%R).
   { unfold e3.
     rewrite (taps_ext Ex (after c0 c) (fun j => 1 * after (IZR w0 / ff) (fun i => wcode i / ff) j + eps j)%R)
@@ -211,18 +255,20 @@ Proof.
   assert (Hboth : (total both u n = ff * (IZR mm * IZR alpha) * total row u n - FF * conv Ex (fun j => wcode j - IZR w0)%R n)%R).
   { unfold both. rewrite total_add_rows, total_scale_rows, total_place, conv_scale, !mult_IZR, opp_IZR.
     rewrite (conv_ext Ex (nth (entry d) u (fun _ => 0%R)) (fun j => wcode j - IZR w0)%R) by (intros; apply Entry). fold FF. fold ff. ring. }
-  assert (Bboth : (Rabs (total both u n) <= IZR m)%R).
-  { pose proof (most_of_spec g x S (length g) W G Known Wh both n X11) as U1.
-    pose proof (most_of_spec g x S (length g) W G Known Wh (scale_rows (-1) both) n) as U2.
-    rewrite used_scaled in U2. specialize (U2 X11). rewrite total_scale_rows in U2. fold u in U1, U2.
-    assert (M1 : (IZR (most_of g S W both) <= IZR m)%R) by (apply IZR_le; lia).
-    assert (M2 : (IZR (most_of g S W (scale_rows (-1) both)) <= IZR m)%R) by (apply IZR_le; lia).
+  assert (Apart : total both u n = (total others u n + total entering u n)%R).
+  { unfold others, entering. rewrite (total_without (entry d) both), total_place. ring. }
+  assert (Either : forall l, forallb (known_source g (length g)) (used S l) = true -> (Rabs (total l u n) <= IZR (either g S W l))%R).
+  { intros l Hl. pose proof (most_of_spec g x S (length g) W G Known Wh l n Hl) as U1.
+    pose proof (most_of_spec g x S (length g) W G Known Wh (scale_rows (-1) l) n) as U2.
+    rewrite used_scaled in U2. specialize (U2 Hl). rewrite total_scale_rows in U2. fold u in U1, U2.
+    assert (M1 : (IZR (most_of g S W l) <= IZR (either g S W l))%R) by (apply IZR_le; unfold either; lia).
+    assert (M2 : (IZR (most_of g S W (scale_rows (-1) l)) <= IZR (either g S W l))%R) by (apply IZR_le; unfold either; lia).
     apply Rabs_le. lra. }
   set (e4 := ((ff * IZR K * IZR beta' - FF * IZR (sum Ex)) * IZR w0)%R).
   assert (B4 : (Rabs e4 <= IZR from_first)%R).
   { unfold e4, from_first. rewrite W0. destruct (steady d) eqn:Es.
     - rewrite mult_IZR, Rabs_mult, abs_IZR, minus_IZR, !mult_IZR. apply Rmult_le_compat_l; [apply Rabs_pos|].
-      pose proof (size_spec g x (taken d) 0) as Sz. apply Sz, Known, X12.
+      pose proof (size_spec g x (taken d) 0) as Sz. apply Sz, Known, X11.
     - rewrite Rmult_0_r, Rabs_R0. lra. }
   set (s := (IZR (code g x b n) / FF)%R).
   assert (Main : (FF * ff * IZR K * (s - IZR gamma / FF - y (Z.of_nat n))
@@ -233,41 +279,33 @@ Proof.
     assert (Hv : (IZR K * v = IZR mm * (total row u n + e1))%R) by (rewrite <- H1; unfold K; rewrite mult_IZR; ring).
     rewrite Hv, H2, H3. field. lra. }
   assert (R0 : (0 <= IZR R)%R) by (apply Rle_trans with (Rabs e1); [apply Rabs_pos|exact B1]).
-  assert (Size : (Rabs (FF * ff * IZR K * (s - IZR gamma / FF - y (Z.of_nat n))) <= IZR all)%R).
-  { rewrite Main. unfold all. rewrite !plus_IZR, !mult_IZR, !plus_IZR, abs_IZR. fold ff. fold FF.
-    assert (A1 : (Rabs (ff * (IZR mm * IZR alpha) * e1) <= ff * (IZR mm * Rabs (IZR alpha)) * IZR R)%R).
-    { rewrite !Rabs_mult, (Rabs_pos_eq ff), (Rabs_pos_eq (IZR mm)) by lra. apply Rmult_le_compat_l; [|exact B1].
-      apply Rmult_le_pos; [lra|apply Rmult_le_pos; [lra|apply Rabs_pos]]. }
-    assert (A2 : (Rabs (FF * ff * (e3 + e2)) <= FF * ff * (IZR cal + IZR re))%R).
-    { assert (Pos : (0 < FF * ff)%R) by (apply Rmult_lt_0_compat; assumption).
-      rewrite Rabs_mult, (Rabs_pos_eq (FF * ff)) by lra. apply Rmult_le_compat_l; [lra|]. eapply Rle_trans; [apply Rabs_triang|lra]. }
-    unfold Rminus. eapply Rle_trans; [apply Rabs_triang|]. rewrite Rabs_Ropp. apply Rplus_le_compat; [|exact A2].
-    eapply Rle_trans; [apply Rabs_triang|]. apply Rplus_le_compat; [|exact A1].
-    eapply Rle_trans; [apply Rabs_triang|]. lra. }
-  set (unit := 2 ^ F * 2 ^ f * K) in *.
   assert (Unit : IZR unit = (FF * ff * IZR K)%R) by (unfold unit; rewrite !mult_IZR; reflexivity).
-  assert (Unit0 : (0 < IZR unit)%R) by (rewrite Unit; repeat apply Rmult_lt_0_compat; assumption).
-  assert (oq0 : (0 < IZR off_q)%R) by (apply IZR_lt; lia). assert (q0 : (0 < IZR q)%R) by (apply IZR_lt; lia).
-  assert (T1 : (Rabs (s - IZR gamma / FF - y (Z.of_nat n)) <= IZR all / IZR unit)%R).
-  { apply Rmult_le_reg_l with (IZR unit); [exact Unit0|]. rewrite <- (Rabs_pos_eq (IZR unit)) at 1 by lra. rewrite <- Rabs_mult, Unit.
-    replace (FF * ff * IZR K * (IZR all / (FF * ff * IZR K)))%R with (IZR all) by (field; lra). exact Size. }
-  assert (T2 : (Rabs (IZR gamma / FF - 1 / 2 + IZR off_p / IZR off_q) = IZR off / (2 * (FF * IZR off_q)))%R).
-  { unfold off. rewrite abs_IZR, plus_IZR, minus_IZR, !mult_IZR. fold FF.
-    replace (IZR gamma / FF - 1 / 2 + IZR off_p / IZR off_q)%R
-      with ((2 * IZR off_q * IZR gamma - FF * IZR off_q + 2 * FF * IZR off_p) * / (2 * (FF * IZR off_q)))%R by (field; lra).
-    rewrite Rabs_mult. unfold Rdiv. f_equal. apply Rabs_pos_eq. left. apply Rinv_0_lt_compat.
-    apply Rmult_lt_0_compat; [lra|apply Rmult_lt_0_compat; assumption]. }
-  assert (T3 : (IZR all / IZR unit + IZR off / (2 * (FF * IZR off_q)) + 1 / 2 <= IZR p / IZR q)%R).
-  { apply IZR_le in X. rewrite !mult_IZR, !plus_IZR, !mult_IZR in X. fold FF in X.
-    set (o := (FF * IZR off_q)%R) in *. assert (o0 : (0 < o)%R) by (apply Rmult_lt_0_compat; assumption).
-    assert (P0 : (0 < IZR q * (2 * o * IZR unit))%R) by (apply Rmult_lt_0_compat; [exact q0|apply Rmult_lt_0_compat; lra]).
-    apply Rmult_le_reg_r with (IZR q * (2 * o * IZR unit))%R; [exact P0|].
-    replace ((IZR all / IZR unit + IZR off / (2 * o) + 1 / 2) * (IZR q * (2 * o * IZR unit)))%R
-      with (IZR q * (2 * o * IZR all + IZR off * IZR unit + o * IZR unit))%R by (field; lra).
-    replace (IZR p / IZR q * (IZR q * (2 * o * IZR unit)))%R with (IZR p * (2 * o * IZR unit))%R by (field; lra). exact X. }
+  assert (unit0 : 0 < unit) by (unfold unit; apply Z.mul_pos_pos; [apply Z.mul_pos_pos; apply Z.pow_pos_nonneg; lia|exact Kp]).
+  assert (Unit0 : (0 < IZR unit)%R) by (apply IZR_lt; exact unit0).
+  assert (oq0 : (0 < IZR off_q)%R) by (apply IZR_lt; lia). assert (Pos : (0 < FF * ff)%R) by (apply Rmult_lt_0_compat; assumption).
+  set (ea := (- (FF * ff * e3) / IZR unit)%R). set (eb := ((total entering u n - FF * ff * e2) / IZR unit)%R).
+  set (er := ((total others u n + ff * (IZR mm * IZR alpha) * e1) / IZR unit)%R). set (es := (e4 / IZR unit)%R).
+  assert (Split : (s - IZR gamma / FF - y (Z.of_nat n) = ea + eb + er + es)%R).
+  { apply Rmult_eq_reg_l with (IZR unit); [|lra]. rewrite Unit at 1. rewrite Main, Apart. unfold ea, eb, er, es. field. lra. }
+  assert (Ba : (Rabs ea <= real (of_input bud))%R).
+  { apply (part_small ea _ unit _ unit0) with (2 := P1). replace (IZR unit * ea)%R with (- (FF * ff * e3))%R by (unfold ea; field; lra).
+    rewrite Rabs_Ropp, Rabs_mult, (Rabs_pos_eq (FF * ff)), !mult_IZR by lra. fold FF. fold ff. apply Rmult_le_compat_l; [lra|exact B3]. }
+  assert (Bb : (Rabs eb <= real (of_coefficients bud))%R).
+  { apply (part_small eb _ unit _ unit0) with (2 := P2).
+    replace (IZR unit * eb)%R with (total entering u n - FF * ff * e2)%R by (unfold eb; field; lra).
+    rewrite plus_IZR, !mult_IZR. fold FF. fold ff. unfold Rminus. eapply Rle_trans; [apply Rabs_triang|]. rewrite Rabs_Ropp.
+    apply Rplus_le_compat; [apply Either; exact X10|]. rewrite Rabs_mult, (Rabs_pos_eq (FF * ff)) by lra. apply Rmult_le_compat_l; [lra|exact B2]. }
+  assert (Br : (Rabs er <= real (of_roundings bud))%R).
+  { apply (part_small er _ unit _ unit0) with (2 := P3).
+    replace (IZR unit * er)%R with (total others u n + ff * (IZR mm * IZR alpha) * e1)%R by (unfold er; field; lra).
+    rewrite plus_IZR, !mult_IZR, abs_IZR. fold ff. fold mm. eapply Rle_trans; [apply Rabs_triang|].
+    apply Rplus_le_compat; [apply Either; exact X9|]. rewrite !Rabs_mult, (Rabs_pos_eq ff), (Rabs_pos_eq (IZR mm)) by lra.
+    apply Rmult_le_compat_l; [|exact B1]. apply Rmult_le_pos; [lra|apply Rmult_le_pos; [lra|apply Rabs_pos]]. }
+  assert (Bs : (Rabs es <= real (of_start bud))%R).
+  { apply (part_small es _ unit _ unit0) with (2 := P4). replace (IZR unit * es)%R with e4 by (unfold es; field; lra). exact B4. }
   (* The last rounding. *)
   assert (Ca : code g x a n = code g x b n / 2 ^ F).
-  { rewrite (code_spec g x G a n X14). unfold compute. rewrite Ea. change (frac (nth a g blank)) with (frac_of g a). rewrite X10.
+  { rewrite (code_spec g x G a n X13). unfold compute. rewrite Ea. change (frac (nth a g blank)) with (frac_of g a). rewrite X8.
     fold F. rewrite Z.sub_0_r. reflexivity. }
   assert (Rounded : (Rabs (IZR (code g x a n) - (s - 1 / 2)) <= 1 / 2)%R).
   { rewrite Ca. unfold s, FF. apply floor_near. apply Z.pow_pos_nonneg; lia. }
@@ -279,8 +317,31 @@ Proof.
     - destruct ((low (nth (out d) g blank) =? lo) && (high (nth (out d) g blank) =? hi)) eqn:Ec; [|discriminate]. injection Er as <-.
       apply andb_prop in Ec. destruct Ec as [Ec1 Ec2]. apply Z.eqb_eq in Ec1. apply Z.eqb_eq in Ec2.
       rewrite (code_spec g x G (out d) n H). unfold compute. rewrite Eo, Ec1, Ec2. reflexivity. }
-  rewrite Out. eapply Rle_trans; [apply limited_near|].
-  replace (IZR (code g x a n) - (y (Z.of_nat n) - IZR off_p / IZR off_q))%R
-    with ((IZR (code g x a n) - (s - 1 / 2)) + ((s - IZR gamma / FF - y (Z.of_nat n)) + (IZR gamma / FF - 1 / 2 + IZR off_p / IZR off_q)))%R by ring.
-  eapply Rle_trans; [apply Rabs_triang|]. eapply Rle_trans; [apply Rplus_le_compat_l, Rabs_triang|]. rewrite T2. lra.
+  set (shift := (IZR gamma / FF - 1 / 2 + IZR off_p / IZR off_q)%R).
+  set (eo := (IZR (code g x a n) - (s - 1 / 2) + shift)%R).
+  assert (Bo : (Rabs eo <= real (of_output bud))%R).
+  { assert (o0 : 0 < 2 * (2 ^ F * off_q)) by (apply Z.mul_pos_pos; [lia|apply Z.mul_pos_pos; [apply Z.pow_pos_nonneg; lia|lia]]).
+    apply (part_small eo _ _ _ o0) with (2 := P5). rewrite plus_IZR, abs_IZR, plus_IZR, minus_IZR, !mult_IZR. fold FF.
+    set (h := (IZR (code g x a n) - (s - 1 / 2))%R) in *.
+    replace (2 * (FF * IZR off_q) * eo)%R with ((2 * (FF * IZR off_q)) * h
+      + (2 * IZR off_q * IZR gamma - FF * IZR off_q + 2 * FF * IZR off_p))%R by (unfold eo, shift; field; lra).
+    eapply Rle_trans; [apply Rabs_triang|]. rewrite Rplus_comm. apply Rplus_le_compat_l.
+    assert (W2 : (0 < FF * IZR off_q)%R) by (apply Rmult_lt_0_compat; assumption).
+    rewrite Rabs_mult, (Rabs_pos_eq (2 * (FF * IZR off_q))) by lra.
+    replace (FF * IZR off_q)%R with (2 * (FF * IZR off_q) * (1 / 2))%R at 2 by field. apply Rmult_le_compat_l; [lra|exact Rounded]. }
+  exists (ea + eb + er + es + eo)%R. split; [exists ea, eb, er, es, eo; repeat split; assumption|].
+  rewrite Out. f_equal. rewrite <- Split. unfold eo, shift. ring.
+Qed.
+
+(* So the code is within the sum of the parts of that of the exact filter. *)
+Definition sum_of (c : budget) : R :=
+  (real (of_input c) + real (of_coefficients c) + real (of_roundings c) + real (of_start c) + real (of_output c))%R.
+Theorem within_sum c code lo hi y e : in_parts c e -> code = limited lo hi (y + e) -> (Rabs (code - limited lo hi y) <= sum_of c)%R.
+Proof.
+  intros [a [b [r [s [o [-> [Ba [Bb [Br [Bs Bo]]]]]]]]]] ->. eapply Rle_trans; [apply limited_near|]. unfold sum_of.
+  replace (y + (a + b + r + s + o) - y)%R with (a + b + r + s + o)%R by ring.
+  eapply Rle_trans; [apply Rabs_triang|]. apply Rplus_le_compat; [|exact Bo].
+  eapply Rle_trans; [apply Rabs_triang|]. apply Rplus_le_compat; [|exact Bs].
+  eapply Rle_trans; [apply Rabs_triang|]. apply Rplus_le_compat; [|exact Br].
+  eapply Rle_trans; [apply Rabs_triang|]. apply Rplus_le_compat; [exact Ba|exact Bb].
 Qed.
