@@ -20,6 +20,9 @@ from sosmith.verify.rocq.start import StartNodes
 _MORE_BITS = (4, 12, 28, 60, 124)
 """Precision beside what the certificate's grid needs, tried in this order."""
 
+_GAIN_BITS = (96, 128, 192)
+"""Precision of the coefficients for the gain of the exact filter, tried in this order."""
+
 _FINE = 1 << 64
 """Limits of the exact filter's signals are in units of 1 over this."""
 
@@ -84,6 +87,11 @@ def bound_claims(certificate: Certificate, cascade: Cascade, start: StartNodes |
     bound = certificate.claims.bound
     words = f"for all inputs the output is within {float(bound):.9g} of its last place of the exact filter, limited"
     yield Claim("error_is_bounded", words, _bound(task))
+    error, unit = certificate.max_error, f" {certificate.output.unit}".rstrip()
+    yield Claim("error_is_allowed", f"the bound is at most {float(error):.9g}{unit}", _allowed(certificate))
+    gain = certificate.claims.peak_gain
+    if gain is not None:
+        yield Claim("peak_gain", f"gain of the exact filter at most {float(gain):.9g}", _peak_gain(certificate, gain))
 
 
 def _calibrated(task: _Task, calibration: Calibration) -> str:
@@ -197,6 +205,36 @@ Proof.
   intros x X y Y n. destruct (error_in_parts x X y Y n) as [e [P E]].
   eapply Rle_trans; [exact (within_sum claimed _ _ _ _ _ P E)|].
   unfold sum_of, real, claimed. cbn [fst snd of_input of_coefficients of_roundings of_start of_output]. lra.
+Qed.
+"""
+
+
+def _allowed(certificate: Certificate) -> str:
+    def real(value: Fraction) -> str:
+        return f"IZR {number(value.numerator)} / IZR {value.denominator}"
+
+    parts = [real(value) for value in (certificate.claims.bound, certificate.output.lsb, certificate.max_error)]
+    return f"""\
+Theorem error_is_allowed : ({parts[0]} * ({parts[1]}) <= {parts[2]})%R.
+Proof. lra. Qed.
+"""
+
+
+def _peak_gain(certificate: Certificate, claimed: Fraction) -> str:
+    sections = sections_of(certificate.ideal.sections)
+    for bits in _GAIN_BITS:
+        whole = 1 << 2 * bits
+        made = exact_row(sections, _FINE, whole, bits)
+        total = sum(abs(int(value)) for value in made.row.coeffs()) * _FINE + made.rest
+        if total <= claimed * whole * _FINE:
+            break
+    p, q = number(claimed.numerator), claimed.denominator
+    return f"""\
+Theorem peak_gain : forall x y M, (0 <= M)%R -> exact_filter exact_sections x y -> (forall k, (Rabs (x k) <= M)%R) ->
+  forall k, (Rabs (y k) <= IZR {p} / IZR {q} * M)%R.
+Proof.
+  apply (filter_gain exact_sections {made.parts} (2 ^ 64) (2 ^ {2 * bits})).
+  vm_cast_no_check (eq_refl true).
 Qed.
 """
 

@@ -85,7 +85,7 @@ def run_kernel(
     ----------
     folder : Path
     claims : sequence of Claim
-        The theorems in `name`.v, in order, each followed by the command that prints its axioms.
+        The theorems in `name`.v, in order, each followed by `mark`; behind all of them what prints their axioms.
     seconds : float
         Time that all of it may take, in s; 0 for any.
     progress : callable
@@ -110,11 +110,11 @@ def run_kernel(
         if status:
             raise ToolError(f"coqc must compile the theory {theory}.v, and says: {_brief(said)}")
     said, status = _compile(compiler, folder, f"{name}.v", end, lambda text: progress(_count(text), len(claims)))
-    blocks = _blocks(said)
-    if status or len(blocks) != len(claims):
-        refused = claims[min(len(blocks), len(claims) - 1)]
+    accepted, printed = _count(said), _HEADS.split(said)[1:]
+    if status or accepted != len(claims) or not printed:
+        refused = claims[min(accepted, len(claims) - 1)]
         raise RejectedError(f"Rocq must accept {refused.name} ({refused.words}), and says: {_brief(said)}")
-    axioms = sorted({axiom for block in blocks for axiom in block})
+    axioms = sorted({axiom for block in printed for axiom in _AXIOM.findall(block)})
     others = [axiom for axiom in axioms if axiom not in STANDARD]
     if others:
         raise RejectedError(f"the theorems must rest on the axioms of the real numbers alone, not on {others[0]}")
@@ -153,20 +153,24 @@ def _compile(
     return text, process.returncode
 
 
-_CLOSED = "Closed under the global context"
+_ACCEPTED = "accepted by the kernel:"
+_HEADS = re.compile("^(?:Axioms:|Closed under the global context)$", re.MULTILINE)
 _AXIOM = re.compile(r"^([A-Za-z_][\w.']*)(?: :|$)", re.MULTILINE)
 
 
+def mark(claim: Claim) -> str:
+    """Write what tells behind a theorem that it was accepted: nothing that fails is followed by anything."""
+    return f'Goal True. idtac "{_ACCEPTED} {claim.name}". Abort.\n'
+
+
+def ending(claims: Sequence[Claim]) -> str:
+    """Write what prints the axioms that all theorems rest on."""
+    together = ", ".join(claim.name for claim in claims)
+    return f"(* The axioms that all of this rests on. *)\nDefinition all_claims := ({together}).\nPrint Assumptions all_claims.\n"
+
+
 def _count(said: str) -> int:
-    return len(re.findall(f"^(?:Axioms:|{_CLOSED})$", said, re.MULTILINE))
-
-
-def _blocks(said: str) -> list[list[str]]:
-    """Return the axioms of each theorem that was accepted."""
-    parts = re.split(f"^(Axioms:|{_CLOSED})$", said.partition("\nFile ")[0], flags=re.MULTILINE)
-    return [
-        _AXIOM.findall(text) if head == "Axioms:" else [] for head, text in zip(parts[1::2], parts[2::2], strict=True)
-    ]
+    return len(re.findall(f"^{_ACCEPTED}", said, re.MULTILINE))
 
 
 def _brief(said: str) -> str:
