@@ -84,6 +84,7 @@ def bound_claims(certificate: Certificate, cascade: Cascade, start: StartNodes |
     parts = ", ".join(f"{name} {float(value):.3g}" for name, value in certificate.claims.budget.items())
     words = f"the output is that of the exact filter and errors, each within its part of the budget, limited: {parts}"
     yield Claim("error_in_parts", words, _parts(task, calibration))
+    yield Claim("bound_is_sum_of_parts", "the bound is the sum of the parts of the budget", _sum(certificate))
     bound = certificate.claims.bound
     words = f"for all inputs the output is within {float(bound):.9g} of its last place of the exact filter, limited"
     yield Claim("error_is_bounded", words, _bound(task))
@@ -204,8 +205,16 @@ Theorem error_is_bounded : {head}
 Proof.
   intros x X y Y n. destruct (error_in_parts x X y Y n) as [e [P E]].
   eapply Rle_trans; [exact (within_sum claimed _ _ _ _ _ P E)|].
-  unfold sum_of, real, claimed. cbn [fst snd of_input of_coefficients of_roundings of_start of_output]. lra.
+  rewrite bound_is_sum_of_parts. apply Rle_refl.
 Qed.
+"""
+
+
+def _sum(certificate: Certificate) -> str:
+    bound = certificate.claims.bound
+    return f"""\
+Theorem bound_is_sum_of_parts : sum_of claimed = (IZR {number(bound.numerator)} / IZR {bound.denominator})%R.
+Proof. unfold sum_of, real, claimed. cbn [fst snd of_input of_coefficients of_roundings of_start of_output]. lra. Qed.
 """
 
 

@@ -49,7 +49,7 @@ def calibration_of(certificate: Certificate, graph: FlatGraph, node: int) -> Cal
     RejectedError
         If a node before it is of a kind that no polynomial is known for.
     """
-    sizes = [max(abs(low), abs(high)) for low, high in graph.ports] + [0]
+    sizes = [1 << max(max(abs(low), abs(high)) - 1, 0).bit_length() for low, high in graph.ports] + [1]
     exact = _exact(certificate)
     denominator = 1
     for value in exact.values():

@@ -14,7 +14,7 @@ from sosmith.verify.rocq.cascade import cascade_of
 from sosmith.verify.rocq.claims import Claim, gain_claims
 from sosmith.verify.rocq.flat import flattened
 from sosmith.verify.rocq.kernel import LIBRARY, THEORIES, ending, mark, run_kernel, theory_texts
-from sosmith.verify.rocq.ranges import graph_definitions, range_claims
+from sosmith.verify.rocq.ranges import graph_definitions, range_claims, tight_claim
 from sosmith.verify.rocq.start import start_of
 
 DATA = "Claims"
@@ -155,6 +155,7 @@ def theorems(certificate: Certificate) -> Theorems:
     graph = flattened(certificate)
     cascade = cascade_of(graph) if certificate.claims.sections else None
     start = start_of(graph)
+    claims.append(tight_claim())
     claims += range_claims(graph, cascade, start)
     why = why_no_bound(certificate)
     if why is not None or cascade is None:

@@ -86,7 +86,7 @@ def _gain(name: str, words: str, model: LinearStage, over: Sequence[Sequence[Fra
     text = f"""\
 Theorem {name} : gain_at_most {numbers(under)} {rows(numerators)} {number(claimed.numerator)} {claimed.denominator}.
 Proof.
-  apply (gain _ _ ({_decided(under, numerators, claimed)})).
+  apply (claimed_gain _ _ ({_decided(under, numerators, claimed)})).
   vm_cast_no_check (eq_refl true).
 Qed.
 """

@@ -22,22 +22,19 @@ class FlatGraph:
         Place of the first node of each stage, and behind them the number of all nodes.
     feeds : list of list of int
         For each stage but the first one, the nodes that its inputs take, in order.
+    ports : list of pairs of int
+        Ranges of the inputs of the first stage.
     """
 
     stages: Sequence[StageEntry]
     offsets: list[int]
     feeds: list[list[int]]
+    ports: list[tuple[int, int]]
 
     @property
     def size(self) -> int:
         """Number of nodes."""
         return self.offsets[-1]
-
-    @property
-    def ports(self) -> list[tuple[int, int]]:
-        """Ranges of the inputs of the first stage."""
-        first = self.stages[0]
-        return [(first.nodes[i].low, first.nodes[i].high) for i in inputs_of(first)]
 
     def node(self, index: int) -> NodeEntry:
         """Return a node by its place in the whole graph."""
@@ -74,7 +71,7 @@ def flattened(certificate: Certificate) -> FlatGraph:
     Raises
     ------
     RejectedError
-        If a stage has not as many inputs as the one before it has outputs.
+        If a stage has not as many inputs as the one before it has outputs, or the first one as there are.
     """
     offsets: list[int] = [0]
     feeds: list[list[int]] = [[]]
@@ -86,7 +83,19 @@ def flattened(certificate: Certificate) -> FlatGraph:
             require(count == len(taken), f"{stage.name} must have {len(taken)} inputs, not {count}")
             feeds.append(taken)
         offsets.append(offsets[-1] + len(stage.nodes))
-    return FlatGraph(certificate.stages, offsets, feeds)
+    return FlatGraph(certificate.stages, offsets, feeds, _ports(certificate))
+
+
+def _ports(certificate: Certificate) -> list[tuple[int, int]]:
+    """Return the ranges of the inputs: of the certificate's own, or of what a decimator hands on."""
+    first = certificate.stages[0]
+    entries = [first.nodes[index] for index in inputs_of(first)]
+    if certificate.decimation is not None:
+        return [(entry.low, entry.high) for entry in entries]
+    require(
+        len(entries) == len(certificate.inputs), f"{first.name} must have {len(certificate.inputs)} inputs, not {len(entries)}"
+    )
+    return [(port.lowest, port.highest) for port in certificate.inputs]
 
 
 _NAMES = {

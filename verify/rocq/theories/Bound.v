@@ -105,7 +105,6 @@ Definition rounding_node (g : graph) (out : nat) (lo hi : Z) : option nat :=
    filter is followed with `more` bits than the graph, and the limits of its signals in units of 1 / fine. *)
 Record parts_ := Parts { out : nat; last_ : nat; plan_ : plan; entry : nat; taken : nat; held_ : option nat; steady : bool;
   exact : list part; least_ : Z; fine : Z; more : Z; in_p : Z; in_q : Z }.
-Definition ratio := (Z * Z)%type.
 Definition real (a : ratio) : R := (IZR (fst a) / IZR (snd a))%R.
 (* The parts of the bound: of calibration, coefficients, roundings, first sample, and of the last rounding. *)
 Record budget := Budget { of_input : ratio; of_coefficients : ratio; of_roundings : ratio; of_start : ratio; of_output : ratio }.
@@ -168,6 +167,9 @@ Definition parts_hold (v : option values) (c : budget) : bool :=
   | Some v => at_most_ (input_ v) (unit_ v) (of_input c) && at_most_ (coefficients_ v) (unit_ v) (of_coefficients c)
       && at_most_ (roundings_ v) (unit_ v) (of_roundings c) && at_most_ (start_ v) (unit_ v) (of_start c)
       && at_most_ (output_ v) (unit_out v) (of_output c)
+      && (close (input_ v) (unit_ v) (of_input c) && close (coefficients_ v) (unit_ v) (of_coefficients c)
+          && close (roundings_ v) (unit_ v) (of_roundings c) && close (start_ v) (unit_ v) (of_start c)
+          && close (output_ v) (unit_out v) (of_output c))
   | None => false
   end.
 
@@ -205,7 +207,7 @@ Proof.
   set (unit := 2 ^ F * 2 ^ f * K) in *.
   match type of H with match (if ?b then _ else _) with Some _ => _ | None => _ end = _ => destruct b eqn:Hc; [|discriminate] end.
   cbn [input_ coefficients_ roundings_ start_ output_ unit_ unit_out] in H.
-  apply andb_prop in H. destruct H as [H P5]. apply andb_prop in H. destruct H as [H P4].
+  apply andb_prop in H. destruct H as [H _]. apply andb_prop in H. destruct H as [H P5]. apply andb_prop in H. destruct H as [H P4].
   apply andb_prop in H. destruct H as [H P3]. apply andb_prop in H. destruct H as [P1 P2].
   rename Hc into H.
   repeat match type of H with _ && _ = true => let X := fresh "X" in apply andb_prop in H; destruct H as [H X] end.

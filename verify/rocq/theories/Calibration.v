@@ -48,13 +48,13 @@ Variables (g : graph) (ports : list (Z * Z)) (x : nat -> nat -> Z).
 Hypothesis G : ordered g = true.
 Hypothesis X : inputs_within ports x.
 
-Definition largest_at (p : nat) : Z := Z.max (Z.abs (fst (nth p ports (0, 0)))) (Z.abs (snd (nth p ports (0, 0)))).
+Definition largest_at (p : nat) : Z := 2 ^ Z.log2_up (Z.max (Z.abs (fst (nth p ports (0, 0)))) (Z.abs (snd (nth p ports (0, 0))))).
 Definition at_input (p : nat) (n : nat) : Z := if Nat.ltb p (length ports) then x n p else 0.
 Lemma at_input_spec p n : Z.abs (at_input p n) <= largest_at p.
 Proof.
-  unfold at_input, largest_at. destruct (Nat.ltb_spec p (length ports)) as [H|H].
-  - specialize (X n p H). lia.
-  - lia.
+  unfold at_input, largest_at. set (m := Z.max _ _).
+  assert (M : m <= 2 ^ Z.log2_up m) by (destruct (Z.le_gt_cases m 1) as [O|O]; [rewrite Z.log2_up_eqn0 by exact O; exact O|apply Z.log2_up_spec; exact O]).
+  destruct (Nat.ltb_spec p (length ports)) as [H|H]; [specialize (X n p H)|]; unfold m in *; lia.
 Qed.
 
 Definition bound_of (e : enclosure) : Z := size2 (poly e) (largest_at 0) (largest_at 1).

@@ -116,13 +116,14 @@ Qed.
 Definition filter_gain_holds (sections : list (list Z * list Z)) (parts : list part) (least K p q : Z) : bool :=
   match exact_row sections parts least K with
   | Some (E, R) => (0 <? least) && (0 <? K) && (0 <? q) && ((norm1 E * least + R) * q <=? p * (K * least))
+      && close (norm1 E * least + R) (K * least) (p, q)
   | None => false
   end.
 Theorem filter_gain sections parts least K p q : filter_gain_holds sections parts least K p q = true -> forall x y M, (0 <= M)%R ->
   exact_filter sections x y -> (forall k, (Rabs (x k) <= M)%R) -> forall k, (Rabs (y k) <= IZR p / IZR q * M)%R.
 Proof.
   unfold filter_gain_holds. destruct (exact_row sections parts least K) as [[E R]|] eqn:Er; [|discriminate].
-  intros H x y M HM Ex Hx k. apply andb_prop in H. destruct H as [H H4]. apply andb_prop in H. destruct H as [H H3].
+  intros H x y M HM Ex Hx k. apply andb_prop in H. destruct H as [H _]. apply andb_prop in H. destruct H as [H H4]. apply andb_prop in H. destruct H as [H H3].
   apply andb_prop in H. destruct H as [H1 H2]. apply Z.ltb_lt in H1. apply Z.ltb_lt in H2. apply Z.ltb_lt in H3. apply Z.leb_le in H4.
   assert (L : (0 < IZR least)%R) by (apply IZR_lt; lia). assert (K0 : (0 < IZR K)%R) by (apply IZR_lt; lia).
   assert (Q0 : (0 < IZR q)%R) by (apply IZR_lt; lia).

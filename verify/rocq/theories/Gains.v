@@ -43,15 +43,26 @@ Qed.
 (* With how many samples of 1 / D', D' = [2^k; a1; ...], s D being nearly c D'; the first sample is `one`. *)
 Record witness := Witness { samples : N; bits : Z; tail : list Z; times : Z; share : Z; one : Z }.
 Definition near (w : witness) : list Z := monic (bits w) (tail w).
-Definition gain_holds (D : list Z) (N : list (list Z)) (w : witness) (p q : Z) : bool :=
+(* What the sums come to, and in which units. *)
+Definition gain_figures (D : list Z) (N : list (list Z)) (w : witness) : Z * Z :=
   let (Q, r) := impulse (samples w) (bits w) (tail w) (one w) in
-  let left := share w * (one w * 2 ^ bits w) - share w * r - norm1 Q * norm1 (drift (times w) (share w) D (near w)) in
-  (0 <=? bits w) && (0 <? times w) && (0 <? share w) && (0 <? left) && (0 <? q)
-  && (times w * norms N Q * q <=? p * left).
+  (times w * norms N Q,
+   share w * (one w * 2 ^ bits w) - share w * r - norm1 Q * norm1 (drift (times w) (share w) D (near w))).
+Definition gain_holds (D : list Z) (N : list (list Z)) (w : witness) (p q : Z) : bool :=
+  let (value, left) := gain_figures D N w in
+  (0 <=? bits w) && (0 <? times w) && (0 <? share w) && (0 <? left) && (0 <? q) && (value * q <=? p * left).
+
+(* A claim p / q is also refused if it is more than a unit of the certificate's grid, 2^-64, above value / unit. *)
+Definition ratio := (Z * Z)%type.
+Definition close (value unit : Z) (a : ratio) : bool := (fst a * 2 ^ 64 - snd a) * unit <=? value * 2 ^ 64 * snd a.
+Definition claimed_gain_holds (D : list Z) (N : list (list Z)) (w : witness) (p q : Z) : bool :=
+  let (value, left) := gain_figures D N w in
+  (0 <=? bits w) && (0 <? times w) && (0 <? share w) && (0 <? left) && (0 <? q) && (value * q <=? p * left)
+  && close value left (p, q).
 
 Theorem gain D N w p q : gain_holds D N w p q = true -> gain_at_most D N p q.
 Proof.
-  unfold gain_holds. destruct (impulse (samples w) (bits w) (tail w) (one w)) as [Q r] eqn:E.
+  unfold gain_holds, gain_figures. destruct (impulse (samples w) (bits w) (tail w) (one w)) as [Q r] eqn:E.
   set (d := drift (times w) (share w) D (near w)). set (K := one w * 2 ^ bits w).
   set (left := share w * K - share w * r - norm1 Q * norm1 d). intros H y u M HM Y Eq Hu k.
   apply andb_prop in H. destruct H as [H H6]. apply andb_prop in H. destruct H as [H H5].
@@ -98,4 +109,9 @@ Proof.
   replace (Rabs (y m) * (IZR q * IZR left))%R with (IZR q * (Rabs (y m) * IZR left))%R by ring.
   replace (IZR (times w) * IZR (norms N Q) * IZR q * M)%R with (IZR q * (IZR (times w) * (IZR (norms N Q) * M)))%R by ring.
   apply Rmult_le_compat_l; lra.
+Qed.
+Corollary claimed_gain D N w p q : claimed_gain_holds D N w p q = true -> gain_at_most D N p q.
+Proof.
+  intros H. apply (gain D N w p q). unfold claimed_gain_holds, gain_holds in *. destruct (gain_figures D N w) as [value left].
+  apply andb_prop in H. apply H.
 Qed.

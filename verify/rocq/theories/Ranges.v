@@ -166,3 +166,25 @@ Proof.
   destruct (op (nth i g blank)); try discriminate. apply andb_prop in E. destruct E as [E1 E2].
   apply Z.leb_le in E1. apply Z.leb_le in E2. lia.
 Qed.
+
+(* That no range is wider than those of its operands make it: nothing that is proven of a filter rests on this. *)
+(* Delays may be wider where their source has all of its operand's range. *)
+Definition delay_is_tight (g : graph) (a : nat) (v : node) : bool :=
+  let s := nth a g blank in
+  let least := Z.min (low s) 0 in let most := Z.max (high s) 0 in
+  let plain := (low v =? least) && (high v =? most) in
+  let against i := let of := nth i g blank in
+    ((low v =? least) || ((low s =? low of) && (low v <=? least))) && ((high v =? most) || ((high s =? high of) && (most <=? high v))) in
+  match op s with
+  | Input _ | Wire _ | Delay _ => plain
+  | Bound b => against b
+  | _ => against a
+  end.
+Definition tight (g : graph) (ports : list (Z * Z)) (i : nat) (v : node) : bool :=
+  match op v with
+  | Bound a => (low (nth a g blank) <=? low v) && (high v <=? high (nth a g blank)) && (low v <=? high v)
+  | Clamp _ => low v <=? high v
+  | Delay a => delay_is_tight g a v
+  | _ => (low v =? fst (interval g ports v)) && (high v =? snd (interval g ports v)) && has_port ports v
+  end.
+Definition ranges_are_tight (g : graph) (ports : list (Z * Z)) : bool := every (tight g ports) 0 g.
