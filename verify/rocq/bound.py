@@ -110,7 +110,7 @@ Lemma calibrated_in_codes : forall x m,
 Proof.
   intros x m. change (at_input ports x 0 m) with (x m 0%nat). change (at_input ports x 1 m) with ({second}).
   unfold calibrated. generalize ({codes}). intros {names}. unfold in_codes. cbn [ev2 ev1].
-  rewrite ?plus_IZR, ?mult_IZR. cbv zeta. rewrite ?plus_IZR, ?mult_IZR. field.
+  cbv zeta. repeat (rewrite plus_IZR || rewrite mult_IZR). field.
 Qed.
 Theorem calibrated_input : forall x, inputs_within ports x -> forall m,
   (Rabs (calibrated (x m) - IZR (code core x {task.taken} m) / IZR (2 ^ frac_of core {task.taken})%Z)
@@ -167,7 +167,7 @@ def _parts(task: _Task, calibration: Calibration) -> str:
     head, exactly = _statement(task)
     places = f"Parts {task.out} {task.last} ({rows.plan}) {cascade.sections[0].wires[0]} {task.taken} {held}"
     error = calibration.error
-    rewritten = "" if offset else "rewrite <- (Rminus_0_r (y (Z.of_nat n))). replace 0%R with (IZR 0 / IZR 1)%R by field. "
+    rewritten = "" if offset else "replace (y (Z.of_nat n)) with (y (Z.of_nat n) - IZR 0 / IZR 1)%R by field. "
     return f"""\
 (* The sections of the exact filter, numerators and denominators. *)
 Definition exact_sections : list (list Z * list Z) :=
@@ -187,8 +187,8 @@ Proof.
   - exact (every_code_in_range x X).
   - exact (window_is x X).
   - {entry}.
-  - reflexivity.
-  - reflexivity.
+  - unfold details. cbn [steady taken]. reflexivity.
+  - unfold details. cbn [steady taken]. reflexivity.
   - {first}.
   - exact (calibrated_input x X).
 Qed.

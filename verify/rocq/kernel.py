@@ -91,7 +91,7 @@ def run_kernel(
     progress : callable
         Called with the number of theorems accepted so far, and of all.
     theories : sequence of str
-        Those that `name`.v requires, in the order in which they are compiled.
+        Those that are compiled before it, in this order; none if all that it requires are.
 
     Raises
     ------
@@ -100,15 +100,10 @@ def run_kernel(
     ToolError
         If `coqc` is missing, or does not compile a theory.
     """
-    compiler = shutil.which("coqc")
-    if compiler is None:
-        raise ToolError(_MISSING)
+    compiler = _compiler()
     end = time.monotonic() + seconds if seconds else None
     shown = subprocess.run([compiler, "--print-version"], capture_output=True, text=True, check=False).stdout.split()
-    for theory in theories:
-        said, status = _compile(compiler, folder, f"{theory}.v", end)
-        if status:
-            raise ToolError(f"coqc must compile the theory {theory}.v, and says: {_brief(said)}")
+    compile_theories(folder, theories, end)
     said, status = _compile(compiler, folder, f"{name}.v", end, lambda text: progress(_count(text), len(claims)))
     accepted, printed = _count(said), _HEADS.split(said)[1:]
     if status or accepted != len(claims) or not printed:
@@ -119,6 +114,29 @@ def run_kernel(
     if others:
         raise RejectedError(f"the theorems must rest on the axioms of the real numbers alone, not on {others[0]}")
     return Accepted(shown[0] if shown else "", tuple(axioms))
+
+
+def compile_theories(folder: Path, theories: Sequence[str] = THEORIES, end: float | None = None) -> None:
+    """Compile theories in a folder that holds them, until the monotonic time `end`.
+
+    Raises
+    ------
+    RejectedError
+        If it takes longer.
+    ToolError
+        If `coqc` is missing, or does not compile one.
+    """
+    for theory in theories:
+        said, status = _compile(_compiler(), folder, f"{theory}.v", end)
+        if status:
+            raise ToolError(f"coqc must compile the theory {theory}.v, and says: {_brief(said)}")
+
+
+def _compiler() -> str:
+    found = shutil.which("coqc")
+    if found is None:
+        raise ToolError(_MISSING)
+    return found
 
 
 def _compile(
@@ -153,14 +171,16 @@ def _compile(
     return text, process.returncode
 
 
-_ACCEPTED = "accepted by the kernel:"
+ACCEPTED = "accepted by the kernel:"
+"""What is printed behind each theorem, before its name."""
+
 _HEADS = re.compile("^(?:Axioms:|Closed under the global context)$", re.MULTILINE)
 _AXIOM = re.compile(r"^([A-Za-z_][\w.']*)(?: :|$)", re.MULTILINE)
 
 
 def mark(claim: Claim) -> str:
     """Write what tells behind a theorem that it was accepted: nothing that fails is followed by anything."""
-    return f'Goal True. idtac "{_ACCEPTED} {claim.name}". Abort.\n'
+    return f'Goal True. idtac "{ACCEPTED} {claim.name}". Abort.\n'
 
 
 def ending(claims: Sequence[Claim]) -> str:
@@ -170,7 +190,7 @@ def ending(claims: Sequence[Claim]) -> str:
 
 
 def _count(said: str) -> int:
-    return len(re.findall(f"^{_ACCEPTED}", said, re.MULTILINE))
+    return len(re.findall(f"^{ACCEPTED}", said, re.MULTILINE))
 
 
 def _brief(said: str) -> str:
