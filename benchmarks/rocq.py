@@ -88,7 +88,7 @@ class Kernel:
 
 def edit_counts(kernel: Kernel, count: int) -> tuple[Counter[str], list[str]]:
     """Try edits that our verifier rejects; return counts, and what Rocq accepted."""
-    quantized = plain(butterworth(3, 0.2), "df1", steady=True)
+    quantized = plain(butterworth(1, 0.2), "df1", steady=True)
     tree: Any = json.loads(certificate_text(certificate(quantized, quantized.datapath.output.lsb)))
     every = all_edits(tree)
     random.Random(39).shuffle(every)

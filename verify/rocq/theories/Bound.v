@@ -105,9 +105,6 @@ Definition rounding_node (g : graph) (out : nat) (lo hi : Z) : option nat :=
    filter is followed with `more` bits than the graph, and the limits of its signals in units of 1 / fine. *)
 Record parts_ := Parts { out : nat; last_ : nat; plan_ : plan; entry : nat; taken : nat; held_ : option nat; steady : bool;
   exact : list part; least_ : Z; fine : Z; more : Z; in_p : Z; in_q : Z }.
-Definition real (a : ratio) : R := (IZR (fst a) / IZR (snd a))%R.
-(* The parts of the bound: of calibration, coefficients, roundings, first sample, and of the last rounding. *)
-Record budget := Budget { of_input : ratio; of_coefficients : ratio; of_roundings : ratio; of_start : ratio; of_output : ratio }.
 Definition at_most_ (value unit : Z) (a : ratio) : bool := (0 <? snd a) && (value * snd a <=? fst a * unit).
 Lemma at_most_spec value unit a : 0 < unit -> at_most_ value unit a = true -> (IZR value / IZR unit <= real a)%R.
 Proof.
@@ -174,9 +171,6 @@ Definition parts_hold (v : option values) (c : budget) : bool :=
   end.
 
 (* The code is that of the exact filter and five errors, limited. *)
-Definition in_parts (c : budget) (e : R) : Prop := exists a b r s o : R, e = (a + b + r + s + o)%R
-  /\ (Rabs a <= real (of_input c))%R /\ (Rabs b <= real (of_coefficients c))%R /\ (Rabs r <= real (of_roundings c))%R
-  /\ (Rabs s <= real (of_start c))%R /\ (Rabs o <= real (of_output c))%R.
 Theorem error_parts g x S forms k W d sections lo hi off_p off_q bud (c : nat -> R) (w0 : Z) (c0 : R) :
   ordered g = true -> closed k g = true -> every (fits_node g S forms) 0 (firstn k g) = true ->
   parts_hold (parts_of g S forms k W d sections lo hi off_p off_q) bud = true ->
@@ -336,8 +330,6 @@ Proof.
 Qed.
 
 (* So the code is within the sum of the parts of that of the exact filter. *)
-Definition sum_of (c : budget) : R :=
-  (real (of_input c) + real (of_coefficients c) + real (of_roundings c) + real (of_start c) + real (of_output c))%R.
 Theorem within_sum c code lo hi y e : in_parts c e -> code = limited lo hi (y + e) -> (Rabs (code - limited lo hi y) <= sum_of c)%R.
 Proof.
   intros [a [b [r [s [o [-> [Ba [Bb [Br [Bs Bo]]]]]]]]]] ->. eapply Rle_trans; [apply limited_near|]. unfold sum_of.

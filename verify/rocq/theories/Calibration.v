@@ -130,9 +130,9 @@ Proof.
         rewrite <- A1, <- A2. ring. }
     set (d1 := code g x a m * 2 ^ up e0 - ev2 (poly e0) (at_input 0 m) (at_input 1 m)) in *.
     set (d2 := code g x b m * 2 ^ up f0 - ev2 (poly f0) (at_input 0 m) (at_input 1 m)) in *.
-    assert (Z.abs (M * d1) <= M * radius e0) by (rewrite Z.abs_mul, (Z.abs_eq M) by lia; apply Z.mul_le_mono_nonneg_l; lia).
-    assert (Z.abs (N * d2) <= N * radius f0) by (rewrite Z.abs_mul, (Z.abs_eq N) by lia; apply Z.mul_le_mono_nonneg_l; lia).
-    destruct Hs; subst s; lia. }
+    assert (Y1 : Z.abs (M * d1) <= M * radius e0) by (rewrite Z.abs_mul, (Z.abs_eq M) by lia; apply Z.mul_le_mono_nonneg_l; lia).
+    assert (Y2 : Z.abs (N * d2) <= N * radius f0) by (rewrite Z.abs_mul, (Z.abs_eq N) by lia; apply Z.mul_le_mono_nonneg_l; lia).
+    clear - Hs Y1 Y2. destruct Hs; subst s; lia. }
   assert (Opp : forall z, Z.opp z = -1 * z) by (intros; lia).
   destruct (op v) as [p|c|a b|a b|a b|a c bits|a s|a|a kept|a|a|a|a|a]; try discriminate.
   - apply Nat.ltb_lt in HP. destruct p as [|[|p]]; try discriminate; intros Q; injection Q as <-; unfold encloses; cbn [up poly radius ev2 ev1].

@@ -95,3 +95,14 @@ Definition gain_at_most (D : list Z) (N : list (list Z)) (p q : Z) : Prop :=
   forall (y : signal) (u : list signal) (M : R), (0 <= M)%R -> constant_before y ->
     (forall k, taps D y k = together N u k) -> Forall (fun x : signal => forall k, (Rabs (x k) <= M)%R) u ->
     forall k, (Rabs (y k) <= IZR p / IZR q * M)%R.
+
+(* 4. The budget: claimed bounds of five errors, as rational numbers p / q. *)
+Definition ratio := (Z * Z)%type.
+Definition real (a : ratio) : R := (IZR (fst a) / IZR (snd a))%R.
+(* Of the calibration at the input, the coefficients, the roundings, the first sample, and the last rounding. *)
+Record budget := Budget { of_input : ratio; of_coefficients : ratio; of_roundings : ratio; of_start : ratio; of_output : ratio }.
+Definition sum_of (c : budget) : R :=
+  (real (of_input c) + real (of_coefficients c) + real (of_roundings c) + real (of_start c) + real (of_output c))%R.
+Definition in_parts (c : budget) (e : R) : Prop := exists a b r s o : R, e = (a + b + r + s + o)%R
+  /\ (Rabs a <= real (of_input c))%R /\ (Rabs b <= real (of_coefficients c))%R /\ (Rabs r <= real (of_roundings c))%R
+  /\ (Rabs s <= real (of_start c))%R /\ (Rabs o <= real (of_output c))%R.
