@@ -59,13 +59,14 @@ def board_top(design: CoreDesign, *, clock: Fraction, rate: int = RATE, core: st
     schedule = schedule_of(design, clock) if design.spec.converters else None
     text = core or core_verilog(design)
     source: Literal["link", "converter"] = "link" if schedule is None else "converter"
-    memory = identity(design, text, baud=rate, clock=float(clock), source=source).memory
+    about = identity(design, text, baud=rate, clock=float(clock), source=source)
     return BoardTop(
         design.architecture.component(),
-        memory,
+        about.memory,
         ratio=clock / rate,
         channels=design.spec.channels,
         schedule=schedule,
+        packing=about.packing,
     )
 
 

@@ -40,6 +40,7 @@ from sosmith.hdl.bus.link import LEDS, Link
 from sosmith.hdl.converters.front_end import FrontEnd
 from sosmith.hdl.converters.pins import converter_pins
 from sosmith.model.converters.schedule import Schedule
+from sosmith.model.link.packing import Packing
 
 
 class BoardTop(wiring.Component):
@@ -57,6 +58,8 @@ class BoardTop(wiring.Component):
         Channels of the core, 1 to 256.
     schedule : Schedule or None
         When the front-end reads which converter; None for a core that is fed over the link.
+    packing : Packing or None
+        The form of packed results; None for a link without them.
 
     Members
     -------
@@ -84,6 +87,7 @@ class BoardTop(wiring.Component):
         ratio: Fraction,
         channels: int = 1,
         schedule: Schedule | None = None,
+        packing: Packing | None = None,
     ) -> None:
         self.core, self.memory, self.ratio, self.schedule = core, memory, ratio, schedule
         self.face = Face(
@@ -92,6 +96,7 @@ class BoardTop(wiring.Component):
             channels=channels,
             address_bits=len(core.s_axil_awaddr) if hasattr(core, "s_axil_awaddr") else 0,
             readings=0 if schedule is None else channels * len(schedule.readings),
+            packing=packing,
         )
         members: dict[str, In | Out] = {"clk": In(1), "rst": In(1), "rx": In(1), "tx": Out(1), "leds": Out(LEDS)}
         if schedule is not None:
