@@ -18,7 +18,6 @@ from sosmith.model.link.packing import Packing
 from sosmith.model.link.protocol import VERSION, results_per_second, samples_per_message
 from sosmith.model.port import Port
 
-
 _ROOM = 1.1
 """What of the line must be free for other requests, as a factor of what results need."""
 
@@ -84,7 +83,7 @@ def _identity(
 
 
 def _packed(design: CoreDesign, made: Identity) -> tuple[int, ...] | None:
-    """Flags of packed results, if the line carries results at the sample rate with them, and not without."""
+    """Return the flags of packed results, if the line carries the sample rate with them, and not without."""
     needed = _ROOM * made.sample_rate * made.channels
     flags = _possible(design, made.source)
     count = Packing(made.output_port, flags).per_message(1 if made.source == "converter" else made.sample_bytes)
@@ -105,7 +104,7 @@ def _possible(design: CoreDesign, source: str) -> tuple[int, ...]:
         Flag.WEAR_WARNING: bool(datapath.wear),
         Flag.WEAR_CRITICAL: bool(datapath.wear),
         Flag.SETTLING: datapath.settles,
-        Flag.FAULT: source == "converter" or design.spec.protect != "none",
+        Flag.FAULT: source == "converter" or design.spec.hardware.protect != "none",
     }
     return tuple(int(flag) for flag in Flag if can[flag])
 

@@ -176,8 +176,8 @@ class Identity(BaseModel):
         SpecificationError
             If the text is too long, as it is for very long names.
         """
-        unsaid = {"packed"} if self.packed is None else set()
-        text = json.dumps(self.model_dump(mode="json", exclude=unsaid), ensure_ascii=False, separators=(",", ":")).encode()
+        about = self.model_dump(mode="json", exclude={"packed"} if self.packed is None else None)
+        text = json.dumps(about, ensure_ascii=False, separators=(",", ":")).encode()
         if len(text) >= MAX_IDENTITY:
             raise SpecificationError(
                 f"the identity of the board must have fewer than {MAX_IDENTITY} bytes, not {len(text)}; "

@@ -298,7 +298,7 @@ class Board:
         return self._polled(self._session.request(self._poll_kind, check=self._polled_sound))
 
     def poll_all(self, most: int) -> Iterator[tuple[int, Results]]:
-        """Fetch what `poll` fetches, until there are no more results or `most` have come; never pauses between requests.
+        """Fetch what `poll` fetches, until there are no more results or `most` have come, without a pause in between.
 
         Whoever stops earlier loses what was asked for meanwhile.
         """
