@@ -66,8 +66,9 @@ class BoardTop(wiring.Component):
     clk : In(1)
         Clock, rising edge.
     rst : In(1)
-        Reset of the core, synchronous, active high. It may be tied to 0: registers have initial values, and the first
-        request resets the core, or the front-end does at the beginning.
+        Reset of all there is, synchronous, active high; it is to be high until the clock has its frequency. It may be
+        tied to 0: registers have initial values, and the first request resets the core, or the front-end does at the
+        beginning.
     rx : In(1)
         Line from the host, 8N1; asynchronous.
     tx : Out(1)

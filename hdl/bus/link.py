@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from amaranth.hdl import Cat, ClockDomain, ClockSignal, Module, Signal
+from amaranth.hdl import Cat, ClockDomain, ClockSignal, Module, ResetSignal, Signal
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
@@ -54,7 +54,7 @@ class Link(wiring.Component):
     Members
     -------
     clk, rst, rx, tx, leds
-        As those of `sosmith.hdl.boards.board_top.BoardTop`.
+        As those of `sosmith.hdl.boards.board_top.BoardTop`. While `rst` is high, nothing is received or sent.
     aresetn : Out(1)
         Reset of the core, active low.
     s_axis_*, m_axis_*, s_axil_*
@@ -69,8 +69,8 @@ class Link(wiring.Component):
     def elaborate(self, platform: object) -> Module:
         """Connect everything."""
         m = Module()
-        m.domains.sync = ClockDomain(local=True, reset_less=True)
-        m.d.comb += ClockSignal("sync").eq(self.clk)
+        m.domains.sync = ClockDomain(local=True)
+        m.d.comb += [ClockSignal("sync").eq(self.clk), ResetSignal("sync").eq(self.rst)]
         m.submodules.uart_receiver = line_in = UartReceiver(self.ratio)
         m.submodules.uart_transmitter = line_out = UartTransmitter(self.ratio)
         m.submodules.frame_receiver = receiver = FrameReceiver()
