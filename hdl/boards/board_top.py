@@ -60,15 +60,16 @@ class BoardTop(wiring.Component):
         When the front-end reads which converter; None for a core that is fed over the link.
     packing : Packing or None
         The form of packed results; None for a link without them.
+    waits : bool
+        Whether `rst` is high until the clock has its frequency, and nothing may come over the line before.
 
     Members
     -------
     clk : In(1)
         Clock, rising edge.
     rst : In(1)
-        Reset of all there is, synchronous, active high; it is to be high until the clock has its frequency. It may be
-        tied to 0: registers have initial values, and the first request resets the core, or the front-end does at the
-        beginning.
+        Reset of the core, and with `waits` of the link, synchronous, active high. It may be tied to 0: registers have
+        initial values, and the first request resets the core, or the front-end does at the beginning.
     rx : In(1)
         Line from the host, 8N1; asynchronous.
     tx : Out(1)
@@ -89,8 +90,9 @@ class BoardTop(wiring.Component):
         channels: int = 1,
         schedule: Schedule | None = None,
         packing: Packing | None = None,
+        waits: bool = False,
     ) -> None:
-        self.core, self.memory, self.ratio, self.schedule = core, memory, ratio, schedule
+        self.core, self.memory, self.ratio, self.schedule, self.waits = core, memory, ratio, schedule, waits
         self.face = Face(
             sample_bytes=len(core.s_axis_tdata) // 8,
             result_bytes=len(core.m_axis_tdata) // 8,
@@ -108,7 +110,7 @@ class BoardTop(wiring.Component):
         """Connect the link and the core."""
         m = Module()
         m.submodules.core = core = self.core
-        m.submodules.link = link = Link(self.face, self.memory, ratio=self.ratio)
+        m.submodules.link = link = Link(self.face, self.memory, ratio=self.ratio, waits=self.waits)
         m.d.comb += [
             link.clk.eq(self.clk),
             link.rst.eq(self.rst),

@@ -51,26 +51,31 @@ class Link(wiring.Component):
     ratio : Fraction
         Clocks per bit of the line, at least `sosmith.hdl.bus.uart.MIN_CLOCKS`.
 
+    waits : bool
+        Whether the link, too, is in reset while `rst` is high, as its clock has another frequency until then.
+
     Members
     -------
     clk, rst, rx, tx, leds
-        As those of `sosmith.hdl.boards.board_top.BoardTop`. While `rst` is high, nothing is received or sent.
+        As those of `sosmith.hdl.boards.board_top.BoardTop`.
     aresetn : Out(1)
         Reset of the core, active low.
     s_axis_*, m_axis_*, s_axil_*
         The core's faces, or those of a front-end, as those of a `CommandEngine`.
     """
 
-    def __init__(self, face: Face, memory: bytes, *, ratio: Fraction) -> None:
-        self.face, self.memory, self.ratio = face, memory, ratio
+    def __init__(self, face: Face, memory: bytes, *, ratio: Fraction, waits: bool = False) -> None:
+        self.face, self.memory, self.ratio, self.waits = face, memory, ratio, waits
         outside = {"clk": In(1), "rst": In(1), "rx": In(1), "tx": Out(1), "leds": Out(LEDS), "aresetn": Out(1)}
         super().__init__(outside | core_side(face))
 
     def elaborate(self, platform: object) -> Module:
         """Connect everything."""
         m = Module()
-        m.domains.sync = ClockDomain(local=True)
-        m.d.comb += [ClockSignal("sync").eq(self.clk), ResetSignal("sync").eq(self.rst)]
+        m.domains.sync = ClockDomain(local=True, reset_less=not self.waits)
+        m.d.comb += ClockSignal("sync").eq(self.clk)
+        if self.waits:
+            m.d.comb += ResetSignal("sync").eq(self.rst)
         m.submodules.uart_receiver = line_in = UartReceiver(self.ratio)
         m.submodules.uart_transmitter = line_out = UartTransmitter(self.ratio)
         m.submodules.frame_receiver = receiver = FrameReceiver()
