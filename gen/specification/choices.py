@@ -12,6 +12,9 @@ AUTO = "auto"
 """Value of a key that leaves the choice to the design."""
 
 FAMILIES = ("butterworth", "chebyshev1", "chebyshev2", "elliptic", "bessel")
+FIR = "fir"
+"""Family of filters that are given by their taps."""
+
 KINDS = ("lowpass", "highpass", "bandpass", "bandstop")
 LOSSES = {
     "chebyshev1": ("passband_loss",),

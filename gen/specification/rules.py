@@ -29,9 +29,10 @@ coefficients would have that many leading bits without information.
 _BY_ORDER = ("order", "cutoff")
 _BY_EDGES = ("passband_edge", "stopband_edge", "passband_loss", "stopband_loss")
 _BY_SECTIONS = ("sos", "sos_file")
+_BY_TAPS = ("taps", "taps_file")
 _FORMS = (
     "given by order and cutoff, by passband_edge, stopband_edge, passband_loss and stopband_loss, "
-    "or by one of sos and sos_file"
+    "by one of sos and sos_file, or by one of taps and taps_file"
 )
 
 
@@ -159,14 +160,16 @@ def _check_uncertainty(document: Document) -> None:
 
 def _check_filter(document: Document) -> None:
     table, sample_rate = document.filter, document.sample_rate
-    given = [key for key in (*_BY_ORDER, *_BY_EDGES, *_BY_SECTIONS) if getattr(table, key) is not None]
-    match [any(key in given for key in form) for form in (_BY_ORDER, _BY_EDGES[:2], _BY_SECTIONS)]:
-        case [True, False, False]:
+    given = [key for key in (*_BY_ORDER, *_BY_EDGES, *_BY_SECTIONS, *_BY_TAPS) if getattr(table, key) is not None]
+    match [any(key in given for key in form) for form in (_BY_ORDER, _BY_EDGES[:2], _BY_SECTIONS, _BY_TAPS)]:
+        case [True, False, False, False]:
             _check_by_order(table, given, sample_rate)
-        case [False, True, False]:
+        case [False, True, False, False]:
             _check_by_edges(table, given, sample_rate)
-        case [False, False, True]:
+        case [False, False, True, False]:
             _check_sections(table, given)
+        case [False, False, False, True]:
+            _check_taps(table, given)
         case _:
             raise UnfitError(_FORMS, f"by {listed(given) if given else 'none of them'}", where="filter")
 
@@ -238,10 +241,7 @@ def _check_impulse_invariant(table: FilterTable, family: str, kind: str) -> None
 
 
 def _check_sections(table: FilterTable, given: Sequence[str]) -> None:
-    form = "sos" if table.sos is not None else "sos_file"
-    for key in given:
-        if key != form:
-            raise UnfitError(f"left out with {form}", literal(getattr(table, key)), where=f"filter.{key}")
+    _check_alone(table, given, "sos" if table.sos is not None else "sos_file")
     for k, (b0, b1, b2, a0, a1, a2) in enumerate(table.sos or ()):
         where = f"filter.sos[{k}]"
         if a0 != 1:
@@ -255,6 +255,21 @@ def _check_sections(table: FilterTable, given: Sequence[str]) -> None:
                 f"a1 = {literal(a1)}, a2 = {literal(a2)}",
                 where=where,
             )
+
+
+def _check_taps(table: FilterTable, given: Sequence[str]) -> None:
+    form = "taps" if table.taps is not None else "taps_file"
+    labels = [key for key in ("family", "kind", "method") if getattr(table, key) is not None]
+    _check_alone(table, [*labels, *given], form)
+    if table.taps is not None and not any(table.taps):
+        raise UnfitError("a list of numbers that are not all 0", "zeros only", where="filter.taps")
+
+
+def _check_alone(table: FilterTable, given: Sequence[str], form: str) -> None:
+    """Check that no other key is given beside the one that gives all of the filter."""
+    for key in given:
+        if key != form:
+            raise UnfitError(f"left out with {form}", literal(getattr(table, key)), where=f"filter.{key}")
 
 
 def _family_and_kind(table: FilterTable) -> tuple[str, str]:

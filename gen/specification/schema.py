@@ -66,6 +66,9 @@ MAX_MULTIPLIERS = 9999
 LOSS_LIMITS = (Fraction(1, 10**6), Fraction(200))
 """Limits in dB: double precision can design ripples down to the first; the range of 32 bits is below the second."""
 
+MAX_TAPS = 256
+"""Most taps of an FIR filter."""
+
 Rows = tuple[tuple[Fraction, ...], ...]
 Loss = Annotated[Fraction | None, PlainValidator(between(*LOSS_LIMITS, "dB"))]
 Freedom = Annotated[Fraction | None, PlainValidator(between(Fraction(1), Fraction(10**9), "degrees of freedom"))]
@@ -169,7 +172,7 @@ class CalibrationTable(Table):
 
 
 class FilterTable(Table):
-    """``[filter]``: given by order and cutoff, by edges and losses, or by sections."""
+    """``[filter]``: given by order and cutoff, by edges and losses, by sections, or by taps."""
 
     family: Annotated[str | None, PlainValidator(choice(FAMILIES))] = None
     kind: Annotated[str | None, PlainValidator(choice(KINDS))] = None
@@ -185,6 +188,8 @@ class FilterTable(Table):
         PlainValidator(list_of(list_of(number, 6, 6), 1, MAX_ORDER // 2, "rows [b0, b1, b2, 1.0, a1, a2]")),
     ] = None
     sos_file: Annotated[str | None, PlainValidator(file_name)] = None
+    taps: Annotated[tuple[Fraction, ...] | None, PlainValidator(list_of(number, 1, MAX_TAPS))] = None
+    taps_file: Annotated[str | None, PlainValidator(file_name)] = None
     decimate: Annotated[int | str | None, PlainValidator(read_decimate)] = None
     hold: Annotated[bool, PlainValidator(flag)] = False
 

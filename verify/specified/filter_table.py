@@ -35,7 +35,7 @@ class FilterTable:
     losses : mapping of str to Fraction
         "passband_loss" and "stopband_loss" in dB, above 0, as far as they are stated.
     rows : tuple of tuples of Fraction
-        Sections (b0, b1, b2, 1, a1, a2), or empty.
+        Sections (b0, b1, b2, 1, a1, a2), or one of an FIR filter: its taps, and as many of 1, 0, 0, ...; or empty.
     """
 
     family: str = ""
@@ -61,7 +61,7 @@ def read_filter_table(table: Mapping[str, object], sample_rate: Fraction) -> Fil
     ----------
     table : mapping
         Keys as in the file. Numbers are int, Fraction or Decimal, frequencies one number or a list of two, `sos` a
-        list of rows.
+        list of rows, `taps` one of numbers.
     sample_rate : Fraction
         In Hz, above 0.
 
@@ -76,6 +76,9 @@ def read_filter_table(table: Mapping[str, object], sample_rate: Fraction) -> Fil
     >>> read_filter_table(stated, Fraction(100)).cutoff
     (Fraction(3, 1000),)
     """
+    if "taps" in table:
+        _require_only(table, ("taps",), "with taps")
+        return FilterTable(rows=(_taps(table["taps"]),))
     if "sos" in table:
         _require_only(table, (*_LABELS, "sos"), "with sos")
         return FilterTable(rows=_rows(table["sos"]))
@@ -191,6 +194,14 @@ def _check_sides(kind: str, passband: tuple[Fraction, ...], stopband: tuple[Frac
         "bandstop": ("around", low_pass < low_stop and high_stop < high_pass),
     }[kind]
     _require(holds, "passband_edge", f"{relation} stopband_edge for {kind}", "elsewhere")
+
+
+def _taps(value: object) -> tuple[Fraction, ...]:
+    """Read taps, as the row of a section without poles."""
+    if not isinstance(value, list | tuple) or not value:
+        raise SpecificationError("filter.taps must be a list of numbers, not another value")
+    taps = tuple(_number(number, f"taps[{k}]") for k, number in enumerate(value))
+    return (*taps, Fraction(1), *[Fraction(0)] * (len(taps) - 1))
 
 
 def _rows(value: object) -> tuple[tuple[Fraction, ...], ...]:

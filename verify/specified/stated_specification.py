@@ -22,7 +22,7 @@ from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.specified.exact_form import exact_sections
 from sosmith.verify.specified.filter_distance import distance
 from sosmith.verify.specified.ideal_filter import stated_filter
-from sosmith.verify.specified.sections_file import sections_in
+from sosmith.verify.specified.sections_file import sections_in, taps_in
 from sosmith.verify.specified.words import words_of
 
 _CALIBRATED = {"voltage": "V", "temperature": "degC"}
@@ -130,6 +130,8 @@ def _filter_distance(certificate: Certificate, tree: Mapping[str, Any], margin: 
         rate, correction = rate / entry.factor, entry.correction
     if "sos_file" in table:
         table["sos"] = sections_in(folder / table.pop("sos_file"))
+    if "taps_file" in table:
+        table["taps"] = taps_in(folder / table.pop("taps_file"))
     try:
         wanted = stated_filter(table, rate, correction)
         apart = distance(wanted, certificate.ideal.sections)
