@@ -61,7 +61,7 @@ class Realization:
         Turns the ideal sections into one part for each stage: the rows themselves for a cascade. Raises
         ShortfallError if the filter has no such realization.
     cascade : bool
-        Whether every stage is one of the ideal sections, in any order.
+        Whether every stage is one of several ideal sections, in any order, for which words are searched together.
     not_decimated : str
         Why a filter that corrects a decimator's droop is not made so, half a sentence; empty if it is.
     """
@@ -131,7 +131,12 @@ SECTIONS: dict[str, Realization] = {
 """Realizations of second-order sections, by name, in the order in which lists show them."""
 
 FIR: dict[str, Realization] = {
-    each.name: Realization(terms=each, build=partial(fir_section, structure=form))
+    each.name: Realization(
+        terms=each,
+        build=partial(fir_section, structure=form),
+        cascade=False,
+        not_decimated="filters behind a decimator have poles",
+    )
     for each, form in zip(terms.FIR, Form, strict=True)
 }
 """Realizations of FIR filters, likewise."""

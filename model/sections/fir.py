@@ -114,18 +114,21 @@ class FirSection:
         line = [x]
         for k in range(1, self.length):
             line.append(g.previous(line[-1], f"x{k}"))
-        terms: list[tuple[int, Wire]] = []
+        terms: list[Wire] = []
         for p in self.products:
             if self.form is Form.SYMMETRIC:
                 operand = g.combine([(sign, line[delay]) for delay, sign in p.taps])
-                terms.append((1, g.scale(operand, p.coefficient, p.frac, f"product_{p.name}")))
+                terms.append(g.scale(operand, p.coefficient, p.frac, f"product_{p.name}"))
             else:
                 # One coefficient, several products: all but the first are named after their taps.
                 terms += [
-                    (1, g.scale(line[delay], sign * p.coefficient, p.frac, f"product_b{delay}"))
+                    g.scale(line[delay], sign * p.coefficient, p.frac, f"product_b{delay}")
                     for delay, sign in p.taps
                 ]
-        return g.combine(terms)
+        while len(terms) > 1:  # a balanced tree
+            pairs = zip(terms[::2], terms[1::2], strict=False)
+            terms = [*(g.add(a, b) for a, b in pairs), *terms[len(terms) // 2 * 2 :]]
+        return terms[0]
 
     def _transposed(self, g: GraphBuilder, x: Wire) -> Wire:
         products = {
