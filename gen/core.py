@@ -190,8 +190,8 @@ def _check_realization(spec: Specification, asked: AskedRealization, response: R
     Raises
     ------
     SpecificationError
-        If it is not for such a filter, has none behind a decimator, stands beside look-ahead, which has its own, or has no other one's
-        word lengths.
+        If it is not for such a filter, has none behind a decimator, stands beside look-ahead, which has its own, or has
+        no other one's word lengths.
     """
     named = [name for name in (asked.name, asked.widths_of) if name in REALIZATIONS]
     fir = response.ideal is not None and response.ideal.is_fir

@@ -153,7 +153,7 @@ def decay_length(sos: Array) -> int:
     """Count the samples after which the slowest mode has decayed to 1e-12, with a margin for repeated poles."""
     taps = sos.shape[1] // 2
     if taps > 3:
-        return taps * len(sos)
+        return int(taps * len(sos))
     radius = max((_radius(float(row[4]), float(row[5])) for row in sos), default=0.0)
     samples = 64.0 if radius < 1e-3 else 64 + 1.5 * math.log(_DECAY) / math.log(min(radius, 1 - 1e-15))
     if samples > _MAX_RESPONSE:
@@ -388,7 +388,7 @@ def _normalized(rows: Sequence[Row]) -> tuple[str, tuple[Row, ...]]:
 
 
 def _kind_and_reference(rows: Sequence[Row]) -> tuple[str, acb]:
-    """Kind of given sections, by the frequency of the largest gain, and the point on the unit circle to normalise at."""
+    """Kind of given sections, by the frequency of their largest gain, and the point on the unit circle to scale at."""
     # cos and sin of the grid from 0 to just below half the sample rate
     grid = [acb(arb.cos_pi_fmpq(fmpq(k, _GRID)), arb.sin_pi_fmpq(fmpq(k, _GRID))) for k in range(_GRID)]
     gains = [nearest_double(abs(_response(rows, z))) for z in grid]

@@ -43,8 +43,9 @@ class FilterFacts:
     sample_rate : float
         Sampling frequency of one channel in Hz.
     ideal_sos, quantized_sos : ndarray, shape (n_sections, 2 * (order + 1))
-        Rows ``[b0, b1, b2, a0, a1, a2]``, or of an FIR filter its taps and as many of 1, 0, 0, ..., with scipy's signs, ``a0 != 0``; the second holds the integer
-        coefficients of the hardware as numbers. The order of the rows may differ between the two.
+        Rows ``[b0, b1, b2, a0, a1, a2]`` with scipy's signs, ``a0 != 0``, or of an FIR filter its taps and as many of
+        1, 0, 0, ...; the second holds the integer coefficients of the hardware as numbers. The order of the rows may
+        differ between the two.
     kind : str
         ``"lowpass"``, ``"highpass"``, ``"bandpass"`` or ``"bandstop"``.
     passband_edge, stopband_edge : tuple of float or None

@@ -58,7 +58,9 @@ def fir_section(row: Row, form: SectionFormat, name: str, *, structure: Form) ->
     ideal = coefficients_of(row)
     if not ideal:
         raise ShortfallError(f"numerator of {name} must not be zero")
-    chosen = form.coefficients or on_grid(ideal, form.coefficient_bits - math.frexp(max(abs(c.value) for c in ideal))[1])
+    chosen = form.coefficients or on_grid(
+        ideal, form.coefficient_bits - math.frexp(max(abs(c.value) for c in ideal))[1]
+    )
     products = tuple(TapProduct(c.name, *chosen[c.name], c.taps) for c in ideal if chosen.get(c.name, (0, 0))[0])
     if not products:
         raise ShortfallError(f"coefficients of {name} must not all be rounded to zero")

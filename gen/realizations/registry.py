@@ -145,7 +145,6 @@ REALIZATIONS = SECTIONS | FIR
 """All realizations that a specification can name, by name, in the order in which lists show them."""
 
 
-
 def realizations_for(*, fir: bool) -> dict[str, Realization]:
     """Return the realizations of FIR filters, or those of second-order sections."""
     return FIR if fir else SECTIONS

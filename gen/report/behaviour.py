@@ -122,7 +122,9 @@ def behaviour_entry(found: Behaviour) -> dict[str, Any]:
 
 def _step(facts: FilterFacts, lsb: float, span: float, before: DecimationFacts | None) -> StepResponse | None:
     factor, stages = (1, 0) if before is None else (before.factor, before.stages)
-    return _cached_step(facts.quantized_sos.tobytes(), len(facts.quantized_sos), facts.sample_rate, lsb / 2 / span, factor, stages)
+    return _cached_step(
+        facts.quantized_sos.tobytes(), len(facts.quantized_sos), facts.sample_rate, lsb / 2 / span, factor, stages
+    )
 
 
 @lru_cache(maxsize=8)

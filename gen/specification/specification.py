@@ -100,6 +100,11 @@ class FilterSpec:
     decimate: int | str | None = None
     hold: bool = False
 
+    @property
+    def is_fir(self) -> bool:
+        """Whether it is an FIR filter, whose realizations are others than those of second-order sections."""
+        return self.taps is not None
+
 
 @dataclass(frozen=True, kw_only=True)
 class HardwareSpec:

@@ -103,14 +103,14 @@ def _of_few_digits(
     allowed: Fraction,
 ) -> Codes:
     """Give coefficients fewer signed digits, one by one, each time where a digit costs the least error."""
-    codes = dict(nearest)
+    codes = nearest
     error = _error(_deviations(ideal, wanted, codes), windows)
     while True:
         best: tuple[Fraction, Codes, Fraction] | None = None
         for c in wanted:
             integer, frac = codes[c.name]
             for near in with_fewer_digits(integer, math.ldexp(c.value, frac)) if integer else ():
-                candidate = codes | {c.name: (near, frac)}
+                candidate = {**codes, c.name: (near, frac)}
                 after = _error(_deviations(ideal, wanted, candidate), windows)
                 saved = len(signed_digits(integer)) - len(signed_digits(near))
                 merit = (after - error) / saved

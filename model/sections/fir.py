@@ -122,8 +122,7 @@ class FirSection:
             else:
                 # One coefficient, several products: all but the first are named after their taps.
                 terms += [
-                    g.scale(line[delay], sign * p.coefficient, p.frac, f"product_b{delay}")
-                    for delay, sign in p.taps
+                    g.scale(line[delay], sign * p.coefficient, p.frac, f"product_b{delay}") for delay, sign in p.taps
                 ]
         while len(terms) > 1:  # a balanced tree
             pairs = zip(terms[::2], terms[1::2], strict=False)

@@ -7,8 +7,8 @@ A realization's name is a claim about the graphs. It is decided here by what the
 - df2t, delta: the output is the first state and what the input adds; the second state feeds the first, and is itself
   fed by the second (delta) or not (df2t);
 - state_space, normal: any others, with input weights that are powers of two; normal if states are truncated;
-- fir_direct, fir_symmetric, fir_transposed: no state is in a loop; the states hold earlier inputs, of which each product
-  has one or several, or sums;
+- fir_direct, fir_symmetric, fir_transposed: no state is in a loop. The states hold earlier inputs, and a product takes
+  one of them or several; or each product takes the new input;
 - lattice_wdf: outputs of allpass functions, which the last section, without a past, adds up.
 """
 

@@ -200,7 +200,9 @@ class Specification(View):
         )
 
     @classmethod
-    def from_taps(cls, taps: npt.ArrayLike, sample_rate: float, *, name: str = "fir_filter", **keys: Any) -> Specification:
+    def from_taps(
+        cls, taps: npt.ArrayLike, sample_rate: float, *, name: str = "fir_filter", **keys: Any
+    ) -> Specification:
         """Specify hardware for an FIR filter with given taps, such as those from scipy.
 
         Parameters
@@ -299,6 +301,20 @@ class Specification(View):
         (('passband_loss', 'stopband_loss'), ())
         """
         return LOSSES.get(family, ())
+
+    @property
+    def realizations(self) -> tuple[str, ...]:
+        """Names of the realizations that there are for a filter of this kind.
+
+        Examples
+        --------
+        >>> import sosmith
+        >>> sosmith.Specification.from_taps([0.5, 0.5], 1000).realizations
+        ('fir_direct', 'fir_symmetric', 'fir_transposed')
+        """
+        from sosmith.gen.realizations.registry import realizations_for
+
+        return tuple(realizations_for(fir=self.checked.filter.is_fir))
 
     @property
     def filter(self) -> Filter:
