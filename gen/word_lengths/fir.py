@@ -102,20 +102,40 @@ def _of_few_digits(
     windows: Sequence[tuple[Fraction, Fraction]],
     allowed: Fraction,
 ) -> Codes:
-    """Give coefficients fewer signed digits, one by one, each time where a digit costs the least error."""
-    codes = nearest
-    error = _error(_deviations(ideal, wanted, codes), windows)
+    """Give coefficients fewer signed digits, one by one, each time where a digit costs the least error.
+
+    Errors of several coefficients are added up as if each were the worst, and always of the same sign.
+    """
+    largest = max(abs(end) for window in windows for end in window)
+    ways = [_near(c, *nearest[c.name], largest) for c in wanted]
+    left = allowed - _error(_deviations(ideal, wanted, nearest), windows)
+    taken = [0] * len(ways)
     while True:
-        best: tuple[Fraction, Codes, Fraction] | None = None
-        for c in wanted:
-            integer, frac = codes[c.name]
-            for near in with_fewer_digits(integer, math.ldexp(c.value, frac)) if integer else ():
-                candidate = {**codes, c.name: (near, frac)}
-                after = _error(_deviations(ideal, wanted, candidate), windows)
-                saved = len(signed_digits(integer)) - len(signed_digits(near))
-                merit = (after - error) / saved
-                if after <= allowed and (best is None or merit < best[0]):
-                    best = merit, candidate, after
-        if best is None:
-            return codes
-        _, codes, error = best
+        steps = []
+        for k, way in enumerate(ways):
+            digits, _, error = way[taken[k]]
+            for j in range(taken[k] + 1, len(way)):
+                more = way[j][2] - error
+                if more <= left:
+                    steps.append((more / (digits - way[j][0]), k, j))
+        if not steps:
+            break
+        _, k, j = min(steps)
+        left -= ways[k][j][2] - ways[k][taken[k]][2]
+        taken[k] = j
+    return {c.name: (ways[k][taken[k]][1], nearest[c.name][1]) for k, c in enumerate(wanted)}
+
+
+def _near(c: Coefficient, integer: int, frac: int, largest: Fraction) -> list[tuple[int, int, Fraction]]:
+    """Return integers near a coefficient with ever fewer signed digits: their digits, they, and the error of each."""
+    unit = len(c.taps) * largest * Fraction(2) ** -frac
+    scaled = Fraction(c.value) * Fraction(2) ** frac
+    found = [(len(signed_digits(integer)), integer, abs(integer - scaled) * unit)]
+    near = {
+        value: len(signed_digits(value)) for value in (with_fewer_digits(integer, float(scaled)) if integer else ())
+    }
+    for digits in range(found[0][0] - 1, 0, -1):
+        best = min((value for value in near if near[value] == digits), key=lambda v: (abs(v - scaled), v), default=None)
+        if best is not None:
+            found.append((digits, best, abs(best - scaled) * unit))
+    return found
