@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 
@@ -25,7 +25,7 @@ from sosmith.gen.filter.prototypes import Prototype, prototype
 from sosmith.gen.filter.sections import Row, rounded, sections
 from sosmith.gen.filter.transformations import bilinear, unwarped, warped
 from sosmith.gen.quantity import frequency
-from sosmith.gen.specification.choices import FIR, MAX_DECIMATION
+from sosmith.gen.specification.choices import FIR, FIR_FAMILIES, MAX_DECIMATION
 from sosmith.gen.specification.specification import FilterSpec
 from sosmith.model.arithmetic.correct_rounding import evaluate, nearest_double, sign
 from sosmith.model.arithmetic.recursive_filters import dc_gain, sosfilt
@@ -102,8 +102,8 @@ class Filter:
 
     @property
     def is_fir(self) -> bool:
-        """Whether it was given by its taps, and is made by realizations for any number of them."""
-        return self.family == FIR
+        """Whether it has taps, and is made by realizations for any number of them."""
+        return self.family in {FIR, *FIR_FAMILIES}
 
     @property
     def cutoff_of_stopband(self) -> bool:
@@ -126,7 +126,8 @@ class Filter:
     def describe(self) -> str:
         """One-line description: family, kind, order, cutoff, sample rate, and what else is not the default."""
         if self.is_fir:
-            return f"FIR {self.kind}, {self.order + 1} taps at {frequency(self.sample_rate)}"
+            method = "" if self.family == FIR else f"{self.family} ".replace("_", " ")
+            return f"{method}FIR {self.kind}, {self.order + 1} taps at {frequency(self.sample_rate)}"
         if self.cutoff is None:
             return f"{len(self.rows)} given section{'s' * (len(self.rows) > 1)} at {frequency(self.sample_rate)}"
         method = "" if self.aliasing is None else ", impulse-invariant"
@@ -248,6 +249,8 @@ def design(spec: FilterSpec, sample_rate: Fraction | float) -> Filter:
         return _filter(spec, fs, "sections", kind, rows, exact, order=_poles(given))
     if spec.taps is not None:
         return _fir(spec, spec.taps, fs)
+    if spec.family in FIR_FAMILIES:
+        return replace(_fir(spec, _designed(spec, fs), fs), family=spec.family, kind=spec.kind)
     order, cutoff = evaluate(lambda: _order_and_cutoff(spec, fs))
     alias = None
     if spec.method == "impulse_invariant":
@@ -267,6 +270,18 @@ def _fir(spec: FilterSpec, taps: Sequence[Fraction], fs: Fraction) -> Filter:
     doubles = tuple(float(value) for value in row)
     kind, _ = evaluate(lambda: _kind_and_reference([doubles]))
     return _filter(spec, fs, FIR, kind, (doubles,), given_form([row]), order=len(taps) - 1)
+
+
+def _designed(spec: FilterSpec, fs: Fraction) -> tuple[Fraction, ...]:
+    from sosmith.gen.filter.fir_design import designed_taps, mask_of  # noqa: PLC0415 - seldom needed
+
+    # The specification has checked that these are given together.
+    assert spec.passband_edge is not None
+    assert spec.stopband_edge is not None
+    assert spec.passband_loss is not None
+    assert spec.stopband_loss is not None
+    passband, stopband = (tuple(edge / fs for edge in edges) for edges in (spec.passband_edge, spec.stopband_edge))
+    return designed_taps(spec.family, mask_of(spec.kind, passband, stopband, (spec.passband_loss, spec.stopband_loss)))
 
 
 def fir_row(taps: Sequence[Fraction]) -> tuple[Fraction, ...]:

@@ -15,6 +15,12 @@ FAMILIES = ("butterworth", "chebyshev1", "chebyshev2", "elliptic", "bessel")
 FIR = "fir"
 """Family of filters that are given by their taps."""
 
+FIR_FAMILIES = ("equiripple", "least_squares", "kaiser", "halfband")
+"""Methods by which an FIR filter is designed from its edges and losses."""
+
+MAX_TAPS = 256
+"""Most taps of an FIR filter."""
+
 KINDS = ("lowpass", "highpass", "bandpass", "bandstop")
 LOSSES = {
     "chebyshev1": ("passband_loss",),

@@ -9,7 +9,16 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 
-from sosmith.gen.specification.choices import AUTO, CALIBRATION_INPUTS, FAMILIES, KINDS, LOOK_AHEAD, LOSSES, MAX_RATIO
+from sosmith.gen.specification.choices import (
+    AUTO,
+    CALIBRATION_INPUTS,
+    FAMILIES,
+    FIR_FAMILIES,
+    KINDS,
+    LOOK_AHEAD,
+    LOSSES,
+    MAX_RATIO,
+)
 from sosmith.gen.specification.combinations import check_combinations
 from sosmith.gen.specification.converters import ADCS, DACS, OUTPUT
 from sosmith.gen.specification.schema import MAX_ORDER, ConverterTable, Document, FilterTable, InputTable
@@ -176,6 +185,8 @@ def _check_filter(document: Document) -> None:
 
 def _check_by_order(table: FilterTable, given: Sequence[str], sample_rate: Fraction) -> None:
     family, kind = _family_and_kind(table)
+    if family in FIR_FAMILIES:
+        raise UnfitError(f"given by {listed(_BY_EDGES)} for {family}", "by order and cutoff", where="filter")
     if table.method == "impulse_invariant":
         _check_impulse_invariant(table, family, kind)
     losses = LOSSES.get(family, ())
@@ -197,6 +208,8 @@ def _check_by_order(table: FilterTable, given: Sequence[str], sample_rate: Fract
 
 def _check_by_edges(table: FilterTable, given: Sequence[str], sample_rate: Fraction) -> None:
     family, kind = _family_and_kind(table)
+    if family in FIR_FAMILIES and table.method is not None:
+        raise UnfitError(f"left out for {family}", literal(table.method), where="filter.method")
     if table.method == "impulse_invariant":
         raise UnfitError(
             "given by order and cutoff with impulse_invariant, as no formula for the minimum order covers its aliasing",
@@ -220,6 +233,20 @@ def _check_by_edges(table: FilterTable, given: Sequence[str], sample_rate: Fract
             _frequencies(passband),
             where="filter.passband_edge",
         )
+    if family == "halfband":
+        _check_halfband(kind, passband, stopband, sample_rate)
+
+
+def _check_halfband(
+    kind: str, passband: tuple[Fraction, ...], stopband: tuple[Fraction, ...], sample_rate: Fraction
+) -> None:
+    """Check that a half-band filter is a low-pass, whose edges lie at equal distances from a quarter of the rate."""
+    if kind != "lowpass":
+        expected = "lowpass for halfband: the taps of a high-pass are the same with alternating signs"
+        raise UnfitError(expected, literal(kind), where="filter.kind")
+    if passband[0] + stopband[0] != sample_rate / 2:
+        expected = f"{literal(sample_rate / 2 - passband[0])} Hz for halfband, half the sample_rate less passband_edge"
+        raise UnfitError(expected, _frequencies(stopband), where="filter.stopband_edge")
 
 
 def _check_impulse_invariant(table: FilterTable, family: str, kind: str) -> None:
@@ -274,7 +301,7 @@ def _check_alone(table: FilterTable, given: Sequence[str], form: str) -> None:
 
 def _family_and_kind(table: FilterTable) -> tuple[str, str]:
     if table.family is None:
-        raise UnfitError(one_of(FAMILIES), "missing", where="filter.family")
+        raise UnfitError(one_of((*FAMILIES, *FIR_FAMILIES)), "missing", where="filter.family")
     if table.kind is None:
         raise UnfitError(one_of(KINDS), "missing", where="filter.kind")
     return table.family, table.kind

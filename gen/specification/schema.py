@@ -17,8 +17,10 @@ from sosmith.gen.specification.choices import (
     ARCHITECTURES,
     AUTO,
     FAMILIES,
+    FIR_FAMILIES,
     KINDS,
     MAX_DECIMATION,
+    MAX_TAPS,
     METHODS,
     PIPELINES,
     REALIZATIONS,
@@ -65,9 +67,6 @@ MAX_MULTIPLIERS = 9999
 
 LOSS_LIMITS = (Fraction(1, 10**6), Fraction(200))
 """Limits in dB: double precision can design ripples down to the first; the range of 32 bits is below the second."""
-
-MAX_TAPS = 256
-"""Most taps of an FIR filter."""
 
 Rows = tuple[tuple[Fraction, ...], ...]
 Loss = Annotated[Fraction | None, PlainValidator(between(*LOSS_LIMITS, "dB"))]
@@ -174,7 +173,7 @@ class CalibrationTable(Table):
 class FilterTable(Table):
     """``[filter]``: given by order and cutoff, by edges and losses, by sections, or by taps."""
 
-    family: Annotated[str | None, PlainValidator(choice(FAMILIES))] = None
+    family: Annotated[str | None, PlainValidator(choice((*FAMILIES, *FIR_FAMILIES)))] = None
     kind: Annotated[str | None, PlainValidator(choice(KINDS))] = None
     method: Annotated[str | None, PlainValidator(choice(METHODS))] = None
     order: Annotated[int | None, PlainValidator(whole(1, MAX_ORDER))] = None

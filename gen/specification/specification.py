@@ -11,7 +11,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sosmith.gen.specification.choices import CALIBRATION_INPUTS, FIR
+from sosmith.gen.specification.choices import CALIBRATION_INPUTS, FIR, FIR_FAMILIES
 from sosmith.gen.specification.converters import ConverterSpec, converters, dac
 from sosmith.gen.specification.toml_text import toml_text
 from sosmith.gen.specification.uncertainty import CoefficientsSpec, UncertaintySpec
@@ -63,7 +63,7 @@ class FilterSpec:
     ----------
     family, kind, method : str
         For example "butterworth", "lowpass", "bilinear". With `sos` they are only a label, "sections" by
-        default; with `taps` they are "fir".
+        default; with `taps` they are "fir", as is the method of a designed FIR filter.
     order : int or None
         Order of the prototype, 1 to 20; for bandpass and bandstop 1 to 10, as the filter has twice that order.
     cutoff, passband_edge, stopband_edge : tuple of Fraction or None
@@ -103,7 +103,7 @@ class FilterSpec:
     @property
     def is_fir(self) -> bool:
         """Whether it is an FIR filter, whose realizations are others than those of second-order sections."""
-        return self.taps is not None
+        return self.taps is not None or self.family in FIR_FAMILIES
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -346,7 +346,8 @@ def _filter(path: Path, table: FilterTable) -> FilterSpec:
 
         taps, origin = taps_of(path.parent / table.taps_file)
     label = SECTIONS if taps is None else FIR
-    method = label if sections is not None or taps is not None else "bilinear"
+    designed = table.family in FIR_FAMILIES
+    method = FIR if designed else label if sections is not None or taps is not None else "bilinear"
     return FilterSpec(
         family=table.family or label,
         kind=table.kind or label,

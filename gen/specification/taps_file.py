@@ -5,9 +5,9 @@ from __future__ import annotations
 from fractions import Fraction
 from pathlib import Path
 
+from sosmith.gen.specification.choices import MAX_TAPS
 from sosmith.gen.specification.coefficients.content import TransferFunction
 from sosmith.gen.specification.coefficients.filter_file import read_filter_file
-from sosmith.gen.specification.schema import MAX_TAPS
 from sosmith.model.errors import SpecificationError
 
 

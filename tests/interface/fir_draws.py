@@ -32,7 +32,7 @@ def draw(seed: int) -> FirDraw:
     words = _taps(rng, shape, rng.randint(2, 64))
     bits, output_bits = rng.randint(8, 24), rng.randint(8, 24)
     channels = rng.choice([1, 1, 1, 2, 5])
-    low, high = rng.choice([(-1.0, 1.0), (-1.0, 1.0), (0.0, 10.0), (-2.0, 6.0)])
+    low, high = rng.choice([(-1.0, 1.0), (-1.0, 1.0), (0.0, 10.0), (-3.0, 7.0)])
     gain = float(sum(map(abs, words))) * max(-low, high)
     reach = 2.0 ** np.ceil(np.log2(gain)) / rng.choice([1, 1, 4])
     tree: dict[str, Any] = {

@@ -10,6 +10,8 @@ from fractions import Fraction
 from sosmith.model.errors import SpecificationError
 
 _FAMILIES = ("butterworth", "chebyshev1", "chebyshev2", "elliptic", "bessel")
+FIR_FAMILIES = ("equiripple", "least_squares", "kaiser", "halfband")
+"""Families of FIR filters, of which edges and losses do not state all digits."""
 _KINDS = ("lowpass", "highpass", "bandpass", "bandstop")
 _METHODS = ("bilinear", "impulse_invariant")
 _LABELS = ("family", "kind", "method")
@@ -49,6 +51,11 @@ class FilterTable:
     rows: tuple[tuple[Fraction, ...], ...] = ()
 
     @property
+    def is_fir(self) -> bool:
+        """Whether edges and losses state no single filter, but what an FIR filter must keep to."""
+        return self.family in FIR_FAMILIES
+
+    @property
     def max_order(self) -> int:
         """Highest order of a prototype: band-pass and band-stop filters have twice its order."""
         return _MAX_ORDER // 2 if _is_band(self.kind) else _MAX_ORDER
@@ -82,9 +89,13 @@ def read_filter_table(table: Mapping[str, object], sample_rate: Fraction) -> Fil
     if "sos" in table:
         _require_only(table, (*_LABELS, "sos"), "with sos")
         return FilterTable(rows=_rows(table["sos"]))
-    family, kind = _word(table, "family", _FAMILIES), _word(table, "kind", _KINDS)
+    family, kind = _word(table, "family", (*_FAMILIES, *FIR_FAMILIES)), _word(table, "kind", _KINDS)
     method = _word({"method": _METHODS[0], **table}, "method", _METHODS)
-    if "order" in table or "cutoff" in table:
+    by_order = "order" in table or "cutoff" in table
+    if family in FIR_FAMILIES:
+        _require(not by_order, "family", "another one with order and cutoff", family)
+        _require("method" not in table, "method", f"left out for {family}", method)
+    if by_order:
         ripples = _RIPPLES.get(family, ())
         _require_only(table, (*_LABELS, "order", "cutoff", *ripples), f"with order and cutoff for {family}")
         read = FilterTable(

@@ -10,7 +10,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from sosmith.gen.facts.table import Table, View
-from sosmith.gen.specification.choices import ARCHITECTURES, FAMILIES, KINDS, LOSSES, METHODS, REALIZATIONS, STARTS
+from sosmith.gen.specification.choices import (
+    ARCHITECTURES,
+    FAMILIES,
+    FIR_FAMILIES,
+    KINDS,
+    LOSSES,
+    METHODS,
+    REALIZATIONS,
+    STARTS,
+)
 from sosmith.gen.specification.combinations import Combination, combinations
 from sosmith.gen.specification.exact_values import exact
 from sosmith.gen.specification.specification import Specification as Checked
@@ -266,7 +275,7 @@ class Specification(View):
         ('lowpass', 'highpass', 'bandpass', 'bandstop')
         """
         return {
-            "filter.family": FAMILIES,
+            "filter.family": (*FAMILIES, *FIR_FAMILIES),
             "filter.kind": KINDS,
             "filter.method": METHODS,
             "hardware.realization": REALIZATIONS,

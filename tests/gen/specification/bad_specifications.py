@@ -117,7 +117,7 @@ IDENTIFIER = "a Verilog identifier of at most 64 letters, digits and underscores
 IN_PROPORTION = "a number of at most 50 digits, zero or from 1e-30 to below 1e30 in size"
 
 
-FAMILIES = "one of butterworth, chebyshev1, chebyshev2, elliptic, bessel"
+FAMILIES = "one of butterworth, chebyshev1, chebyshev2, elliptic, bessel, equiripple, least_squares, kaiser, halfband"
 
 
 FORMS = (
