@@ -18,6 +18,7 @@ import warnings
 from collections.abc import Callable
 from fractions import Fraction
 from functools import lru_cache
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -35,6 +36,9 @@ _GRID_BITS = 36
 
 _SPARE = 2.0**-20
 """Part of the gain by which the largest one in the pass band is below 1."""
+
+_MISSES = 2
+"""Lengths in a row that do not keep to the losses, after which no shorter one is tried: odd and even ones differ."""
 
 _POINTS = 1 << 14
 """Frequencies up to half the sample rate at which the largest gain is looked for."""
@@ -67,7 +71,7 @@ class FirMask(NamedTuple):
     def transition(self) -> float:
         """Width of the narrowest transition band."""
         ends = sorted((*self.passbands, *self.stopbands))
-        return float(min(upper[0] - lower[1] for lower, upper in zip(ends, ends[1:], strict=False)))
+        return float(min(upper[0] - lower[1] for lower, upper in pairwise(ends)))
 
     @property
     def is_even_possible(self) -> bool:
@@ -80,16 +84,17 @@ def mask_of(
 ) -> FirMask:
     """Return what the edges of a kind of filter ask for; edges are in units of the sample rate, losses in dB."""
     zero, half = Fraction(0), Fraction(1, 2)
-    if kind in {"lowpass", "highpass"}:
-        low = (zero, (passband if kind == "lowpass" else stopband)[0])
-        high = ((stopband if kind == "lowpass" else passband)[0], half)
-        bands = ((low,), (high,)) if kind == "lowpass" else ((high,), (low,))
+    passing: tuple[Band, ...]
+    stopping: tuple[Band, ...]
+    if kind == "lowpass":
+        passing, stopping = ((zero, passband[0]),), ((stopband[0], half),)
+    elif kind == "highpass":
+        passing, stopping = ((passband[0], half),), ((zero, stopband[0]),)
+    elif kind == "bandpass":
+        passing, stopping = ((passband[0], passband[1]),), ((zero, stopband[0]), (stopband[1], half))
     else:
-        outer, inner = (stopband, passband) if kind == "bandpass" else (passband, stopband)
-        both = (zero, outer[0]), (outer[1], half)
-        middle = ((inner[0], inner[1]),)
-        bands = (middle, both) if kind == "bandpass" else (both, middle)
-    return FirMask(*bands, *losses)
+        passing, stopping = ((zero, passband[0]), (passband[1], half)), ((stopband[0], stopband[1]),)
+    return FirMask(passing, stopping, *losses)
 
 
 @lru_cache(maxsize=32)
@@ -103,12 +108,14 @@ def designed_taps(family: str, mask: FirMask) -> tuple[Fraction, ...]:
     """
     lengths = [length for length in range(3, MAX_TAPS + 1) if _FAMILIES[family].takes(length, mask)]
     at = min(range(len(lengths)), key=lambda k: abs(lengths[k] - _estimated(mask)))
-    best: tuple[Fraction, ...] | None = None
-    while at >= 0 and (found := _kept(family, lengths[at], mask)) is not None:
-        best, at = found, at - 1
-    while best is None and at + 1 < len(lengths):
-        at += 1
-        best = _kept(family, lengths[at], mask)
+    best, missed = _kept(family, lengths[at], mask), at
+    while best is None and missed + 1 < len(lengths):
+        missed += 1
+        best = _kept(family, lengths[missed], mask)
+    below = at - 1
+    while best is not None and below >= 0 and missed - below <= _MISSES:
+        found = _kept(family, lengths[below], mask)
+        best, missed, below = (best, missed, below - 1) if found is None else (found, below, below - 1)
     if best is None:
         raise SpecificationError(
             f"filter's edges and losses must be met by at most {MAX_TAPS} taps, and are not: widen the transition band "
@@ -134,12 +141,27 @@ def _kept(family: str, length: int, mask: FirMask) -> tuple[Fraction, ...] | Non
     if not np.isfinite(made).all():
         return None
     gain = np.abs(np.fft.rfft(made, 2 * _POINTS))
-    inside = np.zeros(len(gain), dtype=bool)
-    for low, high in mask.passbands:
-        inside[math.floor(low * 2 * _POINTS) : math.ceil(high * 2 * _POINTS) + 1] = True
+    inside = _points_in(mask.passbands)
     scaled = (made + made[::-1]) / 2 * (1 - _SPARE) / float(np.max(gain[inside]))
+    if not _may_keep(gain / float(np.max(gain[inside])), inside, mask):
+        return None
     taps = tuple(Fraction(round(tap * 2.0**_GRID_BITS), 1 << _GRID_BITS) for tap in scaled.tolist())
     return taps if keeps_to(taps, *mask) else None
+
+
+def _points_in(bands: tuple[Band, ...]) -> npt.NDArray[np.bool_]:
+    frequencies = np.arange(_POINTS + 1) / (2 * _POINTS)
+    inside = np.zeros(_POINTS + 1, dtype=bool)
+    for low, high in bands:
+        inside |= (frequencies >= float(low)) & (frequencies <= float(high))
+    return inside
+
+
+def _may_keep(gain: Array, inside: npt.NDArray[np.bool_], mask: FirMask) -> bool:
+    """Whether gains relative to the largest in a pass band show no loss that is not kept: a proof is worth it."""
+    least, most = (10 ** (-float(loss) / 20) for loss in (mask.passband_loss, mask.stopband_loss))
+    stopped = gain[_points_in(mask.stopbands)]
+    return bool(gain[inside].min() > least * (1 - _SPARE) and stopped.max() < most * (1 + _SPARE))
 
 
 def _edges_and_gains(mask: FirMask) -> tuple[list[float], list[float], list[float]]:

@@ -1,9 +1,8 @@
-"""Gains of linear-phase FIR filters, proven: the amplitude has its extremes where its derivative has real roots.
+"""Gains of FIR filters, proven: the squared gain has its extremes where its derivative has real roots.
 
-With taps that are symmetric about the middle, ``H = exp(-j w (N - 1) / 2) A(w)`` with a real amplitude A, a polynomial in
-``x = cos(w)`` where N is odd, and one times ``cos(w / 2)`` where N is even. Its square is therefore a polynomial P(x)
-with rational coefficients. On a band it is largest and smallest at an end or at a root of P', all of which are isolated
-in ball arithmetic. So every ripple is seen, however narrow.
+The squared magnitude of the gain of any taps is a polynomial P in ``x = cos(w)`` with rational coefficients. On a band
+it is largest and smallest at an end or at a root of P', all of which are isolated in ball arithmetic. So every ripple
+is seen, however narrow.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ def keeps_to(
     Parameters
     ----------
     taps : sequence of Fraction
-        Symmetric about the middle.
+        Coefficients of 1, 1/z and so on.
     passbands, stopbands : sequence of Band
         In units of the sample rate, from 0 to 1/2.
     passband_loss, stopband_loss : Fraction
@@ -47,7 +46,7 @@ def keeps_to(
     (True, False)
     """
     with ctx.workprec(_PRECISION + _BITS_OF_A_TAP * len(taps)):
-        square = squared_amplitude(taps)
+        square = squared_gain(taps)
         turns = _turning_points(square)
         least, most = (arb(10) ** (-_ball(loss) / 10) for loss in (passband_loss, stopband_loss))
         return all(
@@ -58,15 +57,15 @@ def keeps_to(
 def gains_in(taps: Sequence[Fraction], band: Band) -> tuple[float, float]:
     """Return the smallest and the largest magnitude of the gain in a band, enclosed and rounded outward a little."""
     with ctx.workprec(_PRECISION + _BITS_OF_A_TAP * len(taps)):
-        square = squared_amplitude(taps)
+        square = squared_gain(taps)
         low, high = _limits(square, _turning_points(square), band)
         return float(low.nonnegative_part().sqrt().lower()), float(high.sqrt().upper())
 
 
-def squared_amplitude(taps: Sequence[Fraction]) -> fmpq_poly:
+def squared_gain(taps: Sequence[Fraction]) -> fmpq_poly:
     """Return the squared magnitude of the gain as a polynomial in the cosine of the angle; exact.
 
-    >>> squared_amplitude([Fraction(1, 2), Fraction(1, 2)])
+    >>> squared_gain([Fraction(1, 2), Fraction(1, 2)])
     1/2*x + 1/2
     """
     exact = [fmpq(tap.numerator, tap.denominator) for tap in taps]

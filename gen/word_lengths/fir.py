@@ -2,7 +2,8 @@
 
 An FIR filter rounds nothing, and each coefficient's error adds ``|b - b'| max |x|``: the bound is a sum that an input
 attains. So there is nothing to search for but the grid, the same for all coefficients, as the longest fraction alone
-decides how wide the sums are. Where products are made of adders, what is left of the error allowed is spent on
+decides how wide the sums are. Large coefficients are cut to the bits that a multiplier takes, if a grid that is a
+little finer for the others makes up for it. Where products are made of adders, what is left of the error allowed is spent on
 coefficients with fewer signed digits, first where a digit costs least.
 """
 
@@ -24,11 +25,21 @@ from sosmith.model.dataflow.adder_graph import signed_digits
 from sosmith.model.dataflow.graph import Range
 from sosmith.model.errors import ShortfallError
 
+_FINER = 3
+"""Most fraction bits by which the grid may become finer where large coefficients are cut to fit a multiplier."""
+
 Codes = Mapping[str, tuple[int, int]]
 
 
 def fir_stages(
-    ideal: Filter, realization: str, x: Range, allowed: Fraction, *, steady: bool = False, few_digits: bool = False
+    ideal: Filter,
+    realization: str,
+    x: Range,
+    allowed: Fraction,
+    *,
+    steady: bool = False,
+    few_digits: bool = False,
+    factor_bits: int | None = None,
 ) -> tuple[Sequence[Section], CascadeProof]:
     """Choose the coefficients of an FIR filter, and prove the stage.
 
@@ -46,6 +57,8 @@ def fir_stages(
         As for `sosmith.gen.proof.cascade_proof.prove_cascade`.
     few_digits : bool
         Whether coefficients of fewer signed digits take less.
+    factor_bits : int or None
+        Bits, with a sign, to which coefficients are cut where the error allows it; None for no such limit.
 
     Raises
     ------
@@ -60,8 +73,10 @@ def fir_stages(
         nearest = on_grid(wanted, frac)
         if _error(_deviations(ideal, wanted, nearest), windows) > allowed:
             continue
-        codes = _of_few_digits(ideal, wanted, nearest, windows, allowed) if few_digits else nearest
-        for chosen in (codes, nearest):
+        fitting = [] if factor_bits is None else _fitting(ideal, wanted, frac, factor_bits, windows, allowed)
+        if few_digits:
+            fitting = [_of_few_digits(ideal, wanted, nearest, windows, allowed)]
+        for chosen in (*fitting, nearest):
             made = _proven(ideal, realization, chosen, x, steady=steady)
             if made[1].coefficients.magnitude <= allowed:
                 return made
@@ -69,6 +84,23 @@ def fir_stages(
         f"the filter's coefficients must keep their error below {float(allowed):.3g} output LSB with {MAX_BITS} bits, "
         "and do not: raise output.max_error or raise output.bits"
     )
+
+
+def _fitting(
+    ideal: Filter,
+    wanted: Sequence[Coefficient],
+    frac: int,
+    bits: int,
+    windows: Sequence[tuple[Fraction, Fraction]],
+    allowed: Fraction,
+) -> list[Codes]:
+    """Return coefficients of so many bits at most, with little more than `frac` fraction bits, if the error allows."""
+    for finer in range(frac, frac + _FINER + 1):
+        cut = [min(finer, bits - 1 - math.frexp(abs(c.value))[1]) for c in wanted]
+        codes = {c.name: on_grid([c], places)[c.name] for c, places in zip(wanted, cut, strict=True)}
+        if _error(_deviations(ideal, wanted, codes), windows) <= allowed:
+            return [codes]
+    return []
 
 
 def _proven(

@@ -111,7 +111,7 @@ class Plan:
         search = None if self.search is None else self.search.under(objective)
         other = replace(self, search=search, objective=objective)
         by_taps = self.ideal is not None and self.ideal.is_fir
-        return replace(other, made=_by_taps(other)) if by_taps and objective.few_digits else other
+        return replace(other, made=_by_taps(other)) if by_taps and objective != self.objective else other
 
     def trimmed(self) -> Plan:
         """Return a copy with formats trimmed until no step saves any more."""
@@ -273,6 +273,7 @@ def _by_taps(planned: Plan) -> Quantized:
         planned.allowed - spent,
         steady=planned.steady,
         few_digits=planned.objective.few_digits,
+        factor_bits=planned.objective.factor_bits,
     )
     return _assembled(planned, before, *stages)
 

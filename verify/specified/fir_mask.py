@@ -1,8 +1,8 @@
 """Whether an FIR filter keeps to the edges and losses of a specification, by bisection of its bands.
 
-Taps that are symmetric about their middle c have the gain ``|A(w)|`` with ``A(w) = sum b_k cos((k - c) w)``. Within r of an
-angle w, ``A`` differs from ``A(w)`` by at most ``|A'(w)| r + sum |b_k| (k - c)**2 r**2 / 2``. A band is halved until that
-shows of each part that its gains are allowed, or of one frequency that they are not.
+Taps that are symmetric about their middle c have the gain ``|A(w)|``, ``A(w) = sum b_k cos((k - c) w)``. Within r of an
+angle w, A differs from its value there by at most ``|A'(w)| r + sum |b_k| (k - c)**2 r**2 / 2``. A band is halved
+until that shows of each part that its gains are allowed, or of one frequency that they are not.
 """
 
 from __future__ import annotations

@@ -129,7 +129,7 @@ def _checked(certificate: Certificate, tree: Mapping[str, Any], margin: Fraction
 def _filter_distance(
     certificate: Certificate, tree: Mapping[str, Any], margin: Fraction, folder: Path
 ) -> Fraction | None:
-    """Return how far the filter is from the specified one; None of one that only has to keep to its losses, and does."""
+    """Return how far the filter is from the specified one; None if it has to keep to losses only, and does."""
     table, rate = dict(tree["filter"]), _number(tree["sample_rate"])
     decimates, entry = table.pop("decimate", None), certificate.decimation
     table.pop("hold", None)  # how often a result leaves, which changes none
@@ -164,7 +164,7 @@ def _filter_distance(
 def _check_losses(found: Sequence[SectionEntry], table: FilterTable) -> None:
     """Check that a filter is an FIR filter that keeps to edges and losses."""
     require(
-        len(found) == 1 and found[0].denominator == (1,) and keeps_to_losses(found[0].numerator, table),
+        len(found) == 1 and len(found[0].denominator) == 1 and keeps_to_losses(found[0].numerator, table),
         "the filter must keep to the edges and losses of the specification with symmetric taps",
     )
 
