@@ -3,8 +3,8 @@
 An FIR filter rounds nothing, and each coefficient's error adds ``|b - b'| max |x|``: the bound is a sum that an input
 attains. So there is nothing to search for but the grid, the same for all coefficients, as the longest fraction alone
 decides how wide the sums are. Large coefficients are cut to the bits that a multiplier takes, if a grid that is a
-little finer for the others makes up for it. Where products are made of adders, what is left of the error allowed is spent on
-coefficients with fewer signed digits, first where a digit costs least.
+little finer for the others makes up for it. Where products are made of adders, what is left of the error allowed is
+spent on coefficients with fewer signed digits, first where a digit costs least.
 """
 
 from __future__ import annotations

@@ -32,6 +32,9 @@ def draw(seed: int) -> FirDraw:
     words = _taps(rng, shape, rng.randint(2, 64))
     bits, output_bits = rng.randint(8, 24), rng.randint(8, 24)
     channels = rng.choice([1, 1, 1, 2, 5])
+    architecture = ARCHITECTURES[seed % len(ARCHITECTURES)]
+    if architecture != "parallel" and len(words) > 15:
+        channels = min(channels, 2)
     low, high = rng.choice([(-1.0, 1.0), (-1.0, 1.0), (0.0, 10.0), (-3.0, 7.0)])
     gain = float(sum(map(abs, words))) * max(-low, high)
     reach = 2.0 ** np.ceil(np.log2(gain)) / rng.choice([1, 1, 4])
@@ -43,14 +46,14 @@ def draw(seed: int) -> FirDraw:
         "filter": {"taps": words},
         "output": {"bits": output_bits, "range": [-reach, reach], "signed": True},
         "hardware": {
-            "architecture": ARCHITECTURES[seed % len(ARCHITECTURES)],
+            "architecture": architecture,
             "start": rng.choice(["zero", "steady"]),
             "clock": 48e6,
         },
     }
     if rng.random() < 0.5:
         tree["output"]["max_error"] = round(2 * reach / 2**output_bits * rng.uniform(0.6, 3), 12)
-    if tree["hardware"]["architecture"] == "parallel" and rng.random() < 0.3:
+    if architecture == "parallel" and rng.random() < 0.3:
         tree["hardware"]["multipliers"] = 0
     return FirDraw(sosmith.Specification.load(tree), tuple(map(Fraction, words)), shape)
 

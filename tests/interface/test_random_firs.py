@@ -14,7 +14,7 @@ from tests.interface.fir_draws import ARCHITECTURES, SHAPES, draw, largest_error
 import sosmith
 
 SEEDS = range(60)
-FEW = (1, 5, 12)
+FEW = (5, 15, 25)
 SAMPLES = 300
 
 
