@@ -26,8 +26,7 @@ from sosmith.gen.output.module_lines import module_lines
 from sosmith.gen.output.pins import pins
 from sosmith.gen.quantity import frequency
 from sosmith.gen.version import __version__
-from sosmith.model.ascii_text import in_comment
-from sosmith.model.templates import render
+from sosmith.model.templates import in_comment, render
 
 _LINE = 112
 """Characters of a line, without the comment sign, for equations of many terms."""

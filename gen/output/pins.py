@@ -11,8 +11,8 @@ from sosmith.gen.core import CoreDesign
 from sosmith.gen.output.core_facts import InterfaceFacts, StreamFacts
 from sosmith.hdl.axi_stream import core_members
 from sosmith.hdl.bus.axi_lite import slave_members
-from sosmith.model.ascii_text import in_comment
 from sosmith.model.reload.registers import ADDRESS_BITS
+from sosmith.model.templates import in_comment
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -278,7 +278,8 @@ class _Machine:
         self.gap = Signal()  # a result was given up since the channel of the first one was told
         self.target = Signal(8)  # channel, address of a register, or block of the identity
         # Of packed results, the bits of the byte that is being filled, and their number.
-        self.byte, self.bits = Signal(8, reset_less=True), Signal(3)
+        self.byte = Signal(8, reset_less=True)
+        self.bits = Signal(3)
         m.d.sync += self.address.eq(self.ahead)
         m.d.comb += [
             self.ahead.eq(self.address),

@@ -10,10 +10,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
-from sosmith.model.ascii_text import in_comment
 from sosmith.model.dataflow.graph import Graph, Node, Op
 from sosmith.model.dataflow.status import Flag
-from sosmith.model.templates import render
+from sosmith.model.templates import in_comment, render
 
 if TYPE_CHECKING:
     from sosmith.model.dataflow.datapath import Datapath

@@ -65,7 +65,7 @@ SPECIFICATIONS = [
     ('"lowpass"', '"lowpass', "line 9 must end its text with the quote that begins it"),
     ('"lowpass"', "lowpass", 'line 9 must be a text in quotes: kind = "lowpass"'),
     ('"lowpass"', '"bandpass"', "filter.cutoff must be two frequencies .low, high. for bandpass, not 1000"),
-    ('"butterworth"', '"FIR"', "filter.family must be one of .*, not 'FIR': FIR filters are not made, .*"),
+    ('"butterworth"', '"FIR"', "filter.family must be one of .*, not 'FIR' .did you mean equiripple or kaiser.."),
     ('"butterworth"', '"Butterworth"', "filter.family must be one of .*, not 'Butterworth' .did you mean butter.*"),
     ('"butterworth"', '"cheby1"', "filter.family must be one of .*, not 'cheby1' .did you mean chebyshev1.."),
     ('"butterworth"', '"elliptic"', "filter.passband_loss must be given in dB with order and cutoff for elliptic, .*"),

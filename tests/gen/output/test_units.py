@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 import sosmith
-from sosmith.model.ascii_text import in_ascii
+from sosmith.model.templates import in_ascii
 
 
 @pytest.mark.parametrize(

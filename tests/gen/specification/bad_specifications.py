@@ -1240,7 +1240,7 @@ BAD = [
         "syntax error",
         ORD,
         "order 7",
-        "line 17, column 7 must be valid TOML, not a syntax error: expected '=' after a key in a key/value pair",
+        "line 17 must be a key, an equals sign and a value: order = 7",
     ),
     (
         "key given twice",
