@@ -163,7 +163,7 @@ def main() -> None:
     parser.add_argument("--renew", action="store_true", help="count the quantities of all rows anew")
     options = parser.parse_args()
     if options.check:
-        sys.exit("\n".join(changed()))
+        sys.exit("\n".join(changed()) or None)
     if options.renew:
         write(renewed())
     measure(options.count)

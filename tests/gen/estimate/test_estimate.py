@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from benchmarks import cost_estimate
 from benchmarks.cost_draws import draw
 from benchmarks.cost_estimate_record import GOAL, Recorded, designed, nine_in_ten, recorded, rows_of
 from benchmarks.cost_fit import errors, fitted
@@ -111,6 +112,17 @@ def test_estimates_are_the_recorded_quantities_times_the_factors(row: Recorded) 
     assert told.luts == round(sum(factors["luts"].get(name, 0) * amount for name, amount in found.items()))
     assert told.luts == pytest.approx(row["luts"], rel=0.4)
     assert told.flip_flops == pytest.approx(row["flip_flops"], rel=0.4)
+
+
+@pytest.mark.parametrize(("added", "faults"), [(0, None), (1, "draw 3 must have the quantities recorded, not others")])
+def test_check_names_what_is_counted_otherwise(monkeypatch: pytest.MonkeyPatch, added: int, faults: str | None) -> None:
+    (row,) = (row for row in recorded() if row.get("seed") == 3)
+    quantities = {**row["quantities"], "words": row["quantities"]["words"] + added}
+    monkeypatch.setattr(cost_estimate, "recorded", lambda: [{**row, "quantities": quantities}])
+    monkeypatch.setattr("sys.argv", ["cost_estimate", "--check"])
+    with pytest.raises(SystemExit) as end:
+        cost_estimate.main()
+    assert end.value.code == faults
 
 
 @pytest.mark.parametrize("architecture", ["parallel", "folded", "serial", "online"])
