@@ -278,7 +278,7 @@ class _Machine:
         self.gap = Signal()  # a result was given up since the channel of the first one was told
         self.target = Signal(8)  # channel, address of a register, or block of the identity
         # Of packed results, the bits of the byte that is being filled, and their number.
-        self.byte = Signal(8, reset_less=True)
+        self.shifted = Signal(8, reset_less=True)
         self.bits = Signal(3)
         m.d.sync += self.address.eq(self.ahead)
         m.d.comb += [
@@ -552,8 +552,8 @@ class _Machine:
 
     def fill(self, bit: Value | int) -> None:
         """Append a bit."""
-        byte = Cat(self.byte[1:], bit)
-        self.m.d.sync += [self.byte.eq(byte), self.bits.eq(self.bits + 1)]
+        byte = Cat(self.shifted[1:], bit)
+        self.m.d.sync += [self.shifted.eq(byte), self.bits.eq(self.bits + 1)]
         with self.m.If(self.bits.all()):
             self.put(byte)
 
