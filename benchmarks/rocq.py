@@ -1,9 +1,9 @@
 """Has the kernel of Rocq check edited certificates and random designs: `python -m benchmarks.rocq`.
 
-Of a small certificate numbers are edited one by one, at random, and those edits are taken that our verifier rejects: Rocq
-must reject them too. Random designs of all families, kinds and realizations must be accepted. The counts go to
-benchmarks/rocq.json and into docs/assurance.md; `--edits` and `--designs` say how many, `--check` writes nothing. Seeds are
-fixed. Status 1 if an edit is accepted or a design is not. Needs coqc and coqtop.
+Of a small certificate numbers are edited one by one, at random, and those edits are taken that our verifier rejects:
+Rocq must reject them too. Random designs of all families, kinds and realizations must be accepted. The counts go to
+benchmarks/rocq.json and into docs/assurance.md; `--edits` and `--designs` say how many, `--check` writes nothing. Seeds
+are fixed. Status 1 if an edit is accepted or a design is not. Needs coqc and coqtop.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from benchmarks.random_designs import random_specification
 from pydantic import ValidationError
 from tests.gen.word_lengths.filters import butterworth, plain
 from tests.verify.certificate_edits import all_edits, edited, is_rejected
 
-from benchmarks.random_designs import random_specification
 from sosmith.gen.core import design_core
 from sosmith.gen.output.certificate import certificate
 from sosmith.gen.realizations.registry import REALIZATIONS
@@ -53,7 +53,9 @@ _ROWS = {
 
 def table(counts: dict[str, int]) -> str:
     """Return the counts as a table in Markdown."""
-    return "| | count |\n|---|---:|\n" + "".join(f"| {words} | {counts.get(key, 0)} |\n" for key, words in _ROWS.items())
+    return "| | count |\n|---|---:|\n" + "".join(
+        f"| {words} | {counts.get(key, 0)} |\n" for key, words in _ROWS.items()
+    )
 
 
 class Kernel:
@@ -72,7 +74,7 @@ class Kernel:
         for one in made:
             # What is refused leaves its proof open, so that nothing behind it is accepted; the reset ends that.
             body = "\n".join([one.definitions, *(claim.text + mark(claim) for claim in one.claims)])
-            parts.append(f"Definition fresh := 0.\n{body}\nReset fresh.\nGoal True. idtac \"next\". Abort.\n")
+            parts.append(f'Definition fresh := 0.\n{body}\nReset fresh.\nGoal True. idtac "next". Abort.\n')
         command = ["coqtop", "-q", "-w", "none", "-Q", ".", LIBRARY]
         run = subprocess.run(
             command, input="\n".join(parts), cwd=self._folder.name, capture_output=True, text=True, check=False

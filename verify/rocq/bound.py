@@ -106,7 +106,8 @@ Definition calibrated (x : nat -> Z) : R := (
 {calibration.physical})%R.
 Definition in_codes : list (list Z) := {calibration.whole}.
 Lemma calibrated_in_codes : forall x m,
-  calibrated (x m) = (IZR (ev2 in_codes (at_input ports x 0 m) (at_input ports x 1 m)) / IZR {calibration.denominator})%R.
+  calibrated (x m)
+  = (IZR (ev2 in_codes (at_input ports x 0 m) (at_input ports x 1 m)) / IZR {calibration.denominator})%R.
 Proof.
   intros x m. change (at_input ports x 0 m) with (x m 0%nat). change (at_input ports x 1 m) with ({second}).
   unfold calibrated. generalize ({codes}). intros {names}. unfold in_codes. cbn [ev2 ev1].
@@ -124,7 +125,13 @@ Qed.
 """
 
 
-_PARTS = (("calibration", "input scaling"), ("filter coefficients",), ("filter rounding",), ("start",), ("output rounding",))
+_PARTS = (
+    ("calibration", "input scaling"),
+    ("filter coefficients",),
+    ("filter rounding",),
+    ("start",),
+    ("output rounding",),
+)
 """Names of the parts of the budget, in the order of the theories."""
 
 
@@ -172,13 +179,14 @@ def _parts(task: _Task, calibration: Calibration) -> str:
 (* The sections of the exact filter, numerators and denominators. *)
 Definition exact_sections : list (list Z * list Z) :=
   [{sections_term(sections_of(certificate.ideal.sections))[1:]}.
-(* The claimed parts of the bound: at the input, by the coefficients, by roundings, at the start, and of the last rounding. *)
+(* The claimed parts of the bound: at the input, by coefficients, by roundings, at the start, of the last rounding. *)
 Definition claimed : budget := Budget {parts}.
 Definition details : parts_ := {places} {"false" if start is None else "true"}
   {exact.parts}
   {calibration.most} (2 ^ 64) {more} {error.numerator} {error.denominator}.
 Theorem error_in_parts : {head} exists e, in_parts claimed e
-    /\\ IZR (code core x {task.out} n) = limited (IZR {number(port.lowest)}) (IZR {number(port.highest)}) ({exactly} + e).
+    /\\ IZR (code core x {task.out} n)
+      = limited (IZR {number(port.lowest)}) (IZR {number(port.highest)}) ({exactly} + e).
 Proof.
   intros x X y Y n. {rewritten}revert n. revert y Y.
   apply (error_parts core x sources forms {cascade.last} window details exact_sections {limits} claimed
@@ -279,7 +287,7 @@ def _fits(task: _Task, calibration: Calibration, rows: Rows, exact: ExactRow, mo
     if task.start is not None:
         gain = _gain(task) if task.held is not None else Fraction(0)
         at_rest = abs(whole * gain - sum(int(value) for value in exact.row.coeffs())) * (1 << point)
-    values = [
+    values: list[Fraction | int] = [
         -(-size * error.numerator // error.denominator) << point + f,
         _either(windows, entering) + ((exact.rest // _FINE + 1) << point + f),
         _either(windows, others) + (rows.rest << f + more),

@@ -1,4 +1,4 @@
-"""The calibration for Rocq: its polynomial in the codes of the inputs, and how far the graph's result may be from it."""
+"""The calibration for Rocq: its polynomial in the codes of the inputs, and how far from it the graph may be."""
 
 from __future__ import annotations
 
@@ -56,9 +56,7 @@ def calibration_of(certificate: Certificate, graph: FlatGraph, node: int) -> Cal
         denominator = denominator * value.denominator // _gcd(denominator, value.denominator)
     made, radius = _followed(graph, node, sizes)
     unit = Fraction(2) ** -graph.node(node).frac
-    apart = {
-        key: made.get(key, Fraction(0)) * unit - exact.get(key, Fraction(0)) for key in made.keys() | exact.keys()
-    }
+    apart = {key: made.get(key, Fraction(0)) * unit - exact.get(key, Fraction(0)) for key in made.keys() | exact.keys()}
     width = max(i for i, _ in exact) + 1 if exact else 1
     whole = [
         [int(exact.get((i, j), Fraction(0)) * denominator) for j in range(max(k for _, k in exact) + 1)]
@@ -121,7 +119,10 @@ def _physical(certificate: Certificate) -> str:
         return text
 
     inner = [horner([f"({_rational(value)})" for value in row], "v") for row in _table(certificate)]
-    lines = [f"  let {name} := {_port(port, at)} in\n" for at, (name, port) in enumerate(zip("uv", certificate.inputs, strict=False))]
+    lines = [
+        f"  let {name} := {_port(port, at)} in\n"
+        for at, (name, port) in enumerate(zip("uv", certificate.inputs, strict=False))
+    ]
     return f"{''.join(lines)}  ({horner([f'({part})' for part in inner], 'u')}) / ({_rational(certificate.output.lsb)})"
 
 
@@ -138,7 +139,11 @@ def _followed(graph: FlatGraph, last: int, sizes: Sequence[int]) -> tuple[Polyno
             if offset + at > last:
                 return made[last]
             if node.op is Operation.INPUT:
-                made.append(({(1 - inputs, inputs): Fraction(1)}, Fraction(0)) if not stage else made[graph.feeds[stage][inputs]])
+                made.append(
+                    ({(1 - inputs, inputs): Fraction(1)}, Fraction(0))
+                    if not stage
+                    else made[graph.feeds[stage][inputs]]
+                )
                 inputs += 1
             else:
                 operands = [(graph.stages[stage].nodes[i], *made[offset + i]) for i in node.operands]
@@ -156,7 +161,9 @@ def _value(
         ((second, more, wider),) = others
         up = [Fraction(2) ** (node.frac - of.frac) for of in (first, second)]
         sign = 1 if node.op is Operation.ADD else -1
-        return _plus({key: up[0] * value for key, value in exact.items()}, more, sign * up[1]), up[0] * radius + up[1] * wider
+        return _plus({key: up[0] * value for key, value in exact.items()}, more, sign * up[1]), up[0] * radius + up[
+            1
+        ] * wider
     if node.op is Operation.MULTIPLY:
         ((_, more, wider),) = others
         return _times(exact, more), _size(exact, sizes) * wider + _size(more, sizes) * radius + radius * wider

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from fractions import Fraction
 
 from flint import fmpz_poly
 
@@ -52,7 +51,7 @@ class Section:
 
 @dataclass(frozen=True)
 class Rows:
-    """What Rocq's `rows_of` finds of a node: ``K code = row * sources``, within `rest`; and the plan that it follows."""
+    """What Rocq's `rows_of` finds of a node: ``K code = row * sources``, within `rest`; and the plan it follows."""
 
     row: Row
     rest: int
@@ -86,7 +85,7 @@ class Cascade:
                 if self.graph.node(node).op in _WRITTEN:
                     written.append(f"({node}%nat, Form {numbers(section.under)} {_row(form)})")
         return f"""\
-(* What drives the sections, and each node's code as a quotient to these, D * code = N1 * u1 + ...: a help, all checked. *)
+(* What drives the sections, and each code as a quotient to these, D * code = N1 * u1 + ...: a help, all checked. *)
 Definition sources : list source := [{"; ".join(map(_source, self.sources))}].
 Definition written : list (nat * form) := [
    {(";" + chr(10) + "   ").join(written)}].
@@ -127,7 +126,9 @@ def _times(form: Row, values: list[int]) -> Row:
 
 
 def _row(form: Row) -> str:
-    return rows([int(value) for value in form[k].coeffs()] if k in form else [] for k in range(max(form, default=-1) + 1))
+    return rows(
+        [int(value) for value in form[k].coeffs()] if k in form else [] for k in range(max(form, default=-1) + 1)
+    )
 
 
 def _source(source: Source) -> str:
@@ -184,6 +185,3 @@ def _section(graph: FlatGraph, place: int, sources: list[Source]) -> Section:
         and not node.low <= stage.nodes[node.operands[0]].low <= stage.nodes[node.operands[0]].high <= node.high
     ]
     return Section(integers(own, scale), forms, wires, targets, offset + max(inputs, default=-1) + 1)
-
-
-__all__ = ["Cascade", "Fraction", "Row", "Rows", "Section", "cascade_of", "used_inputs"]

@@ -39,9 +39,7 @@ def sections_term(sections: Sequence[tuple[Sequence[int], Sequence[int]]]) -> st
     return "[" + ";\n   ".join(f"({numbers(over)}, {numbers(under)})" for over, under in sections) + "]"
 
 
-def exact_row(
-    sections: Sequence[tuple[Sequence[int], Sequence[int]]], least: int, whole: int, bits: int
-) -> ExactRow:
+def exact_row(sections: Sequence[tuple[Sequence[int], Sequence[int]]], least: int, whole: int, bits: int) -> ExactRow:
     """Follow `exact_row` for inputs of magnitude at most `least`, with coefficients of near sections of `bits`."""
     limits, roughs = [least], []
     for over, under in sections:

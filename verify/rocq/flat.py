@@ -93,7 +93,8 @@ def _ports(certificate: Certificate) -> list[tuple[int, int]]:
     if certificate.decimation is not None:
         return [(entry.low, entry.high) for entry in entries]
     require(
-        len(entries) == len(certificate.inputs), f"{first.name} must have {len(certificate.inputs)} inputs, not {len(entries)}"
+        len(entries) == len(certificate.inputs),
+        f"{first.name} must have {len(certificate.inputs)} inputs, not {len(entries)}",
     )
     return [(port.lowest, port.highest) for port in certificate.inputs]
 

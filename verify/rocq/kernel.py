@@ -186,7 +186,8 @@ def mark(claim: Claim) -> str:
 def ending(claims: Sequence[Claim]) -> str:
     """Write what prints the axioms that all theorems rest on."""
     together = ", ".join(claim.name for claim in claims)
-    return f"(* The axioms that all of this rests on. *)\nDefinition all_claims := ({together}).\nPrint Assumptions all_claims.\n"
+    head = "(* The axioms that all of this rests on. *)"
+    return f"{head}\nDefinition all_claims := ({together}).\nPrint Assumptions all_claims.\n"
 
 
 def _count(said: str) -> int:

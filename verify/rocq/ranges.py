@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
-
-from flint import fmpz_poly
 
 from sosmith.verify.rocq.cascade import Cascade, Row, Rows
 from sosmith.verify.rocq.claims import Claim
@@ -51,14 +49,14 @@ class Windows:
         for place, over in row.items():
             low, high = self.of(place, second=second)
             for at, value in enumerate(over.coeffs()):
-                top = int(value) * (high if value > 0 else low)
+                extreme = int(value) * (high if value > 0 else low)
                 if at < len(total):
-                    total[at] += top
+                    total[at] += extreme
                 else:
-                    total.append(top)
+                    total.append(extreme)
         largest = summed = 0
-        for at, value in enumerate(total):
-            summed += value
+        for at, top in enumerate(total):
+            summed += top
             largest = max(summed, largest) if at else summed
         return largest
 
@@ -93,13 +91,13 @@ Proof. vm_cast_no_check (eq_refl true). Qed.
 
 def tight_claim() -> Claim:
     """Write that no range is wider than what its operands give."""
-    text = "Lemma ranges_are_tight_ : ranges_are_tight core ports = true.\nProof. vm_cast_no_check (eq_refl true). Qed.\n"
+    text = (
+        "Lemma ranges_are_tight_ : ranges_are_tight core ports = true.\nProof. vm_cast_no_check (eq_refl true). Qed.\n"
+    )
     return Claim("ranges_are_tight_", "no range is wider than what its operands give", text)
 
 
-def range_claims(
-    graph: FlatGraph, cascade: Cascade | None, start: StartNodes | None
-) -> Iterator[Claim]:
+def range_claims(graph: FlatGraph, cascade: Cascade | None, start: StartNodes | None) -> Iterator[Claim]:
     """Write the theorems: before the sections, section by section, and of all nodes."""
     if cascade is None:
         yield Claim("every_code_in_range", f"ranges of all {graph.size} nodes", _all(graph.size, None))
@@ -108,9 +106,11 @@ def range_claims(
     if start is not None:
         words = f"ranges of the {start.sample + 1} nodes up to the start"
         yield Claim("ranges_before_start", words, _through("ranges_before_start", start.sample + 1))
-    text = _definitions(cascade, start) + (
-        _through("ranges_before", known) if start is None else _start(start, known)
-    ) + _window(cascade, start)
+    text = (
+        _definitions(cascade, start)
+        + (_through("ranges_before", known) if start is None else _start(start, known))
+        + _window(cascade, start)
+    )
     yield Claim("ranges_before", f"ranges of the {known} nodes before the sections", text)
     windows = windows_of(cascade, start)
     before = "ranges_before"
@@ -160,12 +160,16 @@ Qed.
 def _definitions(cascade: Cascade, start: StartNodes | None) -> str:
     first = cascade.sections[0].wires
     wire = cascade.sources[first[0]][1]
-    begin = "" if start is None else f"""\
+    begin = (
+        ""
+        if start is None
+        else f"""\
 Definition begin : start := {start.term}.
 Lemma start_fits_core : start_fits core begin = true.
 Proof. vm_cast_no_check (eq_refl true). Qed.
 Definition start_is : starts core begin = true := start_fits_starts _ _ start_fits_core.
 """
+    )
     window = "None" if start is None else f"windows_of core begin {wire}"
     return f"""\
 {cascade.definitions()}\
@@ -213,7 +217,7 @@ Qed.
 
 
 def _all(size: int, before: str | None) -> str:
-    statement = f"""\
+    statement = """\
 Theorem every_code_in_range : forall x, inputs_within ports x ->
   forall n i, (i < length core)%nat -> in_range core x i n.
 """
@@ -245,6 +249,3 @@ def _fits(windows: Windows, made: Rows, within: Range) -> bool:
         windows.most(made.row) + made.rest <= made.whole * within[1]
         and windows.most(negative(made.row)) + made.rest <= -made.whole * within[0]
     )
-
-
-__all__ = ["Range", "Sequence", "Windows", "fmpz_poly", "graph_definitions", "negative", "range_claims", "reach", "windows_of"]

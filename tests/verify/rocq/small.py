@@ -10,9 +10,9 @@ from tempfile import TemporaryDirectory
 import pytest
 from tests.gen.word_lengths.filters import butterworth, plain
 
-from sosmith.model.polynomial import Polynomial
 from sosmith.gen.output.certificate import certificate
 from sosmith.gen.word_lengths.quantize import quantize
+from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
 from sosmith.verify.certificate_file import Certificate
 from sosmith.verify.rocq.check import DATA, head, theorems
@@ -58,7 +58,7 @@ def small(realization: str = "df1", order: int = 3, *, steady: bool = False) -> 
 
 
 def calibrated() -> Certificate:
-    """Return the certificate of a calibration of two inputs before a low-pass filter, with an output that begins at -8."""
+    """Return the certificate of a calibration of two inputs before a low-pass filter, its output from -8 on."""
     inputs = (
         Port.from_range("voltage", 12, Fraction(0), Fraction(10)),
         Port.from_range("temperature", 10, Fraction(-40), Fraction(215)),

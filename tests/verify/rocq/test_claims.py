@@ -13,6 +13,7 @@ from sosmith.verify.rocq.claims import Claim, gain_claims
 from sosmith.verify.rocq.kernel import STANDARD
 from sosmith.verify.rocq.linear import LinearStage
 
+
 def refusal(claim: Claim) -> str:
     return f"^Rocq must accept {re.escape(f'{claim.name} ({claim.words})')}, and says: .*$"
 
