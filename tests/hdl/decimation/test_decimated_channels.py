@@ -29,7 +29,7 @@ def made_in(name: str, before: str = "", *, core: str = "instrument", hold: bool
     assert other is not None
     ahead = replace(other, datapath=replace(other.datapath, calibrated=LIMITS))
     return replace(
-        made, datapath=replace(made.datapath, calibrated=LIMITS, ahead=ahead.datapath), ahead=ahead, hold=hold
+        made, datapath=replace(made.datapath, calibrated=LIMITS, calibration=ahead.datapath), ahead=ahead, hold=hold
     )
 
 
