@@ -274,7 +274,7 @@ def test_another_calibration_exceeds_the_bound() -> None:
     other = calibration_before_decimator("slight_ahead", datapath.inputs, wrong, datapath.output, Fraction(1, 16))
     ahead = replace(other.datapath, output=quantized.calibration.datapath.output)
     assert other.datapath.output.lsb == ahead.output.lsb
-    changed = replace(quantized, datapath=replace(datapath, ahead=ahead))
+    changed = replace(quantized, datapath=replace(datapath, calibration=ahead))
     assert worst_error(replace(made, quantized=changed), codes) > float(quantized.bound)
 
 

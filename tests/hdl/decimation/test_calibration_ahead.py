@@ -28,7 +28,7 @@ def made_in(name: str, before: str = "", *, hold: bool = False) -> Architecture:
     ahead = replace(other, datapath=replace(other.datapath, calibrated=LIMITS))
     return replace(
         made,
-        datapath=replace(made.datapath, calibrated=LIMITS, ahead=ahead.datapath),
+        datapath=replace(made.datapath, calibrated=LIMITS, calibration=ahead.datapath),
         calibration=ahead,
         hold=hold,
     )

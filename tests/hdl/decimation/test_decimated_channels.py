@@ -30,7 +30,7 @@ def made_in(name: str, before: str = "", *, core: str = "instrument", hold: bool
     ahead = replace(other, datapath=replace(other.datapath, calibrated=LIMITS))
     return replace(
         made,
-        datapath=replace(made.datapath, calibrated=LIMITS, ahead=ahead.datapath),
+        datapath=replace(made.datapath, calibrated=LIMITS, calibration=ahead.datapath),
         calibration=ahead,
         hold=hold,
     )
