@@ -88,7 +88,7 @@ class CheckBits:
 
     def _parities(self, data: Sequence[Value]) -> list[Value]:
         return [
-            reduce(xor, (bit for bit, column in zip(data, self._columns, strict=True) if column >> check & 1))
+            Cat(*(bit for bit, column in zip(data, self._columns, strict=True) if column >> check & 1)).xor()
             for check in range(self._count)
         ]
 

@@ -216,4 +216,6 @@ def texts(design: CoreDesign, board: Board, rate: int, progress: Callable[[str],
     """Return the SystemVerilog of the core, and of the board's top."""
     progress("SystemVerilog of the board")
     core = core_verilog(design)
-    return core, board_verilog(design, clock=wiring_of(design, board).clock(board), rate=rate, core=core)
+    wiring = wiring_of(design, board)
+    waits = wiring.pll is not None
+    return core, board_verilog(design, clock=wiring.clock(board), rate=rate, core=core, waits=waits)

@@ -12,7 +12,21 @@ AUTO = "auto"
 """Value of a key that leaves the choice to the design."""
 
 FAMILIES = ("butterworth", "chebyshev1", "chebyshev2", "elliptic", "bessel")
+_NO_FIR = ": FIR filters are not made, as cores consist of second-order sections"
+FAMILY_HINTS = {
+    **dict.fromkeys(("fir", "firwin", "remez", "equiripple", "kaiser", "window", "hamming"), _NO_FIR),
+    "cauer": " (did you mean elliptic?)",
+    "ellip": " (did you mean elliptic?)",
+    "butter": " (did you mean butterworth?)",
+}
+"""What to say to names of families that there are elsewhere."""
+
 KINDS = ("lowpass", "highpass", "bandpass", "bandstop")
+_OTHER_KINDS = (("lp", "lpf", "low"), ("hp", "hpf", "high"), ("bp", "bpf"), ("bs", "notch"))
+KIND_HINTS = {
+    other: f" (did you mean {kind}?)" for kind, others in zip(KINDS, _OTHER_KINDS, strict=True) for other in others
+}
+"""What to say to other names of kinds."""
 LOSSES = {
     "chebyshev1": ("passband_loss",),
     "chebyshev2": ("stopband_loss",),

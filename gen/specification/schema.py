@@ -17,6 +17,8 @@ from sosmith.gen.specification.choices import (
     ARCHITECTURES,
     AUTO,
     FAMILIES,
+    FAMILY_HINTS,
+    KIND_HINTS,
     KINDS,
     MAX_DECIMATION,
     METHODS,
@@ -171,8 +173,8 @@ class CalibrationTable(Table):
 class FilterTable(Table):
     """``[filter]``: given by order and cutoff, by edges and losses, or by sections."""
 
-    family: Annotated[str | None, PlainValidator(choice(FAMILIES))] = None
-    kind: Annotated[str | None, PlainValidator(choice(KINDS))] = None
+    family: Annotated[str | None, PlainValidator(choice(FAMILIES, FAMILY_HINTS))] = None
+    kind: Annotated[str | None, PlainValidator(choice(KINDS, KIND_HINTS))] = None
     method: Annotated[str | None, PlainValidator(choice(METHODS))] = None
     order: Annotated[int | None, PlainValidator(whole(1, MAX_ORDER))] = None
     cutoff: Edges = None

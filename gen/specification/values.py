@@ -7,7 +7,7 @@ numbers as `Fraction`. A value that does not fit raises `UnfitError`, from which
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from decimal import Decimal
 from fractions import Fraction
 from typing import TypeVar
@@ -196,12 +196,15 @@ def file_name(value: object) -> str:
     return value
 
 
-def choice(names: Sequence[str]) -> Callable[[object], str]:
-    """Return the reader of one of `names`."""
+_NO_HINTS: Mapping[str, str] = {}
+
+
+def choice(names: Sequence[str], hints: Mapping[str, str] = _NO_HINTS) -> Callable[[object], str]:
+    """Return the reader of one of `names`; `hints` tells what to do instead of others, in small letters."""
 
     def read(value: object) -> str:
         if not isinstance(value, str) or value not in names:
-            hint = did_you_mean(value, names) if isinstance(value, str) else ""
+            hint = hints.get(value.lower()) or did_you_mean(value, names) if isinstance(value, str) else ""
             raise UnfitError(one_of(names), f"{literal(value)}{hint}")
         return value
 

@@ -105,8 +105,12 @@ class Device:
     def _carried_out(self, request: Message) -> tuple[bytes, Status]:
         """Carry out a request; return the body of its response and the status."""
         body = request.body
+        packing = self._identity.packing
         if request.type == Type.SAMPLES:
-            return self._samples(body)
+            return self._samples(body, self._identity.samples)
+        if request.type == Type.SAMPLES_PACKED and packing is not None:
+            results, status = self._samples(body, packing.per_message(self._identity.sample_bytes))
+            return packing.packed(results), status
         if request.type == Type.WRITE and self._identity.reload is not None:
             return b"", self._written(body)
         length = {Type.OPEN: 0, Type.IDENTITY: 1, Type.COUNTERS: 0}
@@ -127,9 +131,9 @@ class Device:
         word = self._core.read(body[0] & ~3)
         return (word or 0).to_bytes(WORD_BYTES, "little"), Status.REFUSED if word is None else Status.OK
 
-    def _samples(self, body: bytes) -> tuple[bytes, Status]:
+    def _samples(self, body: bytes, most: int) -> tuple[bytes, Status]:
         size = self._identity.sample_bytes
-        if not 0 < len(body) <= 1 + size * self._identity.samples:
+        if not 0 < len(body) <= 1 + size * most:
             return b"", Status.LENGTH
         if body[0] >= self._identity.channels:
             return b"", Status.CHANNEL

@@ -263,11 +263,8 @@ def _read_only(values: npt.NDArray[Kind]) -> npt.NDArray[Kind]:
 
 def _check_time(path: Path, lines: Sequence[int], time: Values, sample_rate: Fraction, before: str) -> None:
     period = 1 / float(sample_rate)
-    digit = _last_digit(time)
+    digit = last_digit(time)
     few = digit > period / 2  # stamps of other instants would pass as rounded ones
-    # Instants that were rounded or cut to a digit are whole numbers of it apart, next below or next above a period.
-    ratio = period / digit
-    least, most = (np.floor(ratio) - 0.5) * digit, (np.ceil(ratio) + 0.5) * digit
 
     def check(bad: npt.NDArray[np.bool_], start: int, what: Callable[[int], str]) -> None:
         if bad.any():
@@ -280,9 +277,8 @@ def _check_time(path: Path, lines: Sequence[int], time: Values, sample_rate: Fra
         if not start:
             step[0] = period
         check(step <= 0, start, lambda k: f"above {time[k - 1]}, the value in {before}, not {time[k]}")
-        rounded = (step > least) & (step < most) & (not few)
         check(
-            (np.abs(step - period) > TIME_TOLERANCE * period) & ~rounded,
+            ~is_a_period(step, period, digit),
             start,
             lambda k: f"{period:.6g} s after {before}, not {time[k] - time[k - 1]:.6g} s",
         )
@@ -294,7 +290,18 @@ def _check_time(path: Path, lines: Sequence[int], time: Values, sample_rate: Fra
         )
 
 
-def _last_digit(time: Values) -> float:
+def is_a_period(step: Values, period: float, digit: float) -> npt.NDArray[np.bool_]:
+    """Tell which steps between time stamps that end with `digit` are a sample period, all in s."""
+    near: npt.NDArray[np.bool_] = np.abs(step - period) <= TIME_TOLERANCE * period
+    if digit > period / 2:  # stamps of other instants would pass as rounded ones
+        return near
+    # Instants that were rounded or cut to a digit are whole numbers of it apart, next below or next above a period.
+    ratio = period / digit
+    rounded = (step > (np.floor(ratio) - 0.5) * digit) & (step < (np.ceil(ratio) + 0.5) * digit)
+    return np.logical_or(near, rounded)
+
+
+def last_digit(time: Values) -> float:
     """Return the decimal digit that time stamps in s end with, down to a picosecond: 1e-6 for microseconds."""
     doubles = float(np.spacing(max(time.max(), -time.min())))
     blocks = [time[start : start + CHUNK] for start in range(0, len(time), CHUNK)]

@@ -164,11 +164,35 @@ function series(picture, what) {
   return picture.values;
 }
 
-function limits(what) {
+// The limits of wear; those of the value only where they are the same for all channels that are shown.
+function limits(what, visible) {
   const entries = Object.entries(facts.limits);
   if (what === "wear") return entries;
-  const same = facts.initial && facts.initial.every((value) => value === facts.initial[0]);
-  return what === "value" && same ? entries.map(([name, wear]) => [name, wear + facts.initial[0]]) : [];
+  const starts = facts.initial ? [...new Set(visible.map((channel) => facts.initial[channel]))] : [];
+  return what === "value" && starts.length === 1 ? entries.map(([name, wear]) => [name, wear + starts[0]]) : [];
+}
+
+// A limit that is no further from the curves than they reach is in the picture.
+function withLimits([low, high], values) {
+  const span = high - low, near = values.filter((value) => value > low - span && value < high + span);
+  const room = 0.06 * span, bottom = Math.min(low, ...near), top = Math.max(high, ...near);
+  return [bottom < low ? bottom - room : low, top > high ? top + room : high];
+}
+
+function drawLimits(svg, entries, low, high, y, width) {
+  const above = entries.filter(([, value]) => value >= high), below = entries.filter(([, value]) => value <= low);
+  const text = ([name, value]) => `${name} ${withUnit(Number(value.toPrecision(6)).toString().replace("-", "−"), facts.unit)}`;
+  for (const each of entries) {
+    const [name, value] = each;
+    if (above.includes(each) || below.includes(each)) continue;
+    const place = y(value), under = place < TOP + 20;
+    svg.append(drawn("line", { class: `limit ${name}`, x1: LEFT, x2: width - RIGHT, y1: place, y2: place }));
+    svg.append(drawn("text", { class: "limit-name", x: LEFT + 6, y: place + (under ? 15 : -5) }, text(each)));
+  }
+  above.forEach((each, k) => svg.append(
+    drawn("text", { class: "limit-name", x: width - RIGHT - 4, y: TOP + 14 + 16 * k, "text-anchor": "end" }, `↑ ${text(each)}`)));
+  below.forEach((each, k) => svg.append(
+    drawn("text", { class: "limit-name", x: width - RIGHT - 4, y: y(low) - 6 - 16 * k, "text-anchor": "end" }, `↓ ${text(each)}`)));
 }
 
 function ticks(low, high, count) {
@@ -226,7 +250,8 @@ function draw() {
   const visible = all.map((_, k) => k).filter((k) => !hidden.has(k));
   const flags = Object.entries(facts.flags).filter(([, bit]) => picture.status.some((each) => each.some((status) => status >> bit & 1)));
   const bottom = TOP + Math.max(220, Math.min(320, width * 0.45)), height = bottom + AXIS + flags.length * LANE + 4;
-  const [low, high] = range(visible.map((k) => all[k])), times = picture.times;
+  const bounds = limits(what, visible), times = picture.times;
+  const [low, high] = withLimits(range(visible.map((k) => all[k])), bounds.map(([, value]) => value));
   const end = times.at(-1), unit = end >= 7200 ? [3600, "h"] : end >= 120 ? [60, "min"] : [1, "s"];
   const x = (time) => LEFT + (time - times[0]) / (end - times[0]) * (width - LEFT - RIGHT);
   const y = (value) => bottom - (value - low) / (high - low) * (bottom - TOP);
@@ -241,16 +266,13 @@ function draw() {
   svg.append(drawn("text", { x: LEFT - 8, y: bottom + 19, "text-anchor": "end" }, unit[1]));
   const label = what === "value" ? withUnit(facts.quantity, facts.unit && `in ${facts.unit}`) : what === "rate" ? `rate in ${perHour}` : `wear in ${facts.unit}`;
   svg.append(drawn("text", { class: "strong", x: LEFT, y: 14 }, label));
-  for (const [name, value] of limits(what)) if (value > low && value < high) {
-    svg.append(drawn("line", { class: `limit ${name}`, x1: LEFT, x2: width - RIGHT, y1: y(value), y2: y(value) }));
-    svg.append(drawn("text", { x: LEFT + 6, y: y(value) - 5 }, name));
-  }
   for (const k of visible) {
     const line = drawn("path", { class: "line", d: path(times, all[k], x, y) });
     line.style.stroke = colour(k);
     if (k >= 8) line.style.strokeDasharray = "7 4";
     svg.append(line);
   }
+  drawLimits(svg, bounds, low, high, y, width);
   lanes(svg, picture, visible, flags, x, bottom + AXIS, width);
   if (cursor !== null) {
     cursor = Math.max(0, Math.min(cursor, times.length - 1));

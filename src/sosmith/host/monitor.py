@@ -255,10 +255,9 @@ class _Fetched:
 
     def fetch(self, clock: Clock) -> float:
         """Fetch what there is; return when the last of it came."""
-        moment, count = clock.monotonic(), 0
-        while count < MAX_FETCHED and (fetched := self._board.poll()) is not None:
+        moment = clock.monotonic()
+        for fetched in self._board.poll_all(MAX_FETCHED):
             moment = clock.monotonic()
-            count += len(fetched[1].codes)
             self._take(*fetched)
         return moment
 
