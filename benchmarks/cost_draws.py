@@ -10,7 +10,8 @@ import random
 from typing import NamedTuple
 
 from sosmith.gen.fpga.boards import find_board
-from sosmith.gen.specification.choices import FAMILIES, LOSSES, REALIZATIONS
+from sosmith.gen.realizations.registry import SECTIONS
+from sosmith.gen.specification.choices import FAMILIES, LOSSES
 
 BOARDS = ("icebreaker", "ice40_hx8k_b_evn", "ulx3s_25f", "ulx3s_25f", "tang_nano_9k", "tang_nano_9k")
 """Boards to draw from: iCE40, with and without multiplier blocks, ECP5 and Gowin in equal parts."""
@@ -159,6 +160,6 @@ def _options(rng: random.Random, architecture: str, kind: str, *, blocks: int) -
 
 
 def _realization(rng: random.Random, architecture: str, hardware: list[str], *, decimated: bool) -> str:
-    named = rng.choice(REALIZATIONS[1:])
+    named = rng.choice([*SECTIONS])
     free = architecture != "online" and not decimated and "look-ahead" not in "".join(hardware)
     return named if free and rng.random() < 0.5 else "auto"

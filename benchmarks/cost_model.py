@@ -14,7 +14,7 @@ from benchmarks.synthesis import TARGETS, Area, synthesize
 
 from sosmith.gen.core import design_core
 from sosmith.gen.output.generate import generate
-from sosmith.gen.realizations.registry import REALIZATIONS
+from sosmith.gen.realizations.registry import SECTIONS
 from sosmith.gen.specification.specification import load
 from sosmith.gen.word_lengths.cost import Cost, cost_of
 
@@ -23,7 +23,7 @@ CORES = [
     (path.stem, core, realization)
     for path in sorted((ROOT / "examples").glob("*.toml"))
     for core in ("filter", "calibration", "instrument")
-    for realization in (list(REALIZATIONS) if core == "filter" else ["df1_ef2"])
+    for realization in (list(SECTIONS) if core == "filter" else ["df1_ef2"])
     if not (path.stem == "audio_lowpass" and core != "filter")
 ]
 

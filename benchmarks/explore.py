@@ -31,7 +31,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from sosmith.gen.realizations.registry import REALIZATIONS
+from sosmith.gen.realizations.registry import SECTIONS
 from sosmith.gen.specification.specification import load
 from sosmith.instrument.scenarios.traces import ChosenTraces
 from sosmith.sim.exploration.grid import Subject
@@ -42,7 +42,7 @@ RECORD = ROOT / "benchmarks" / "explore.json"
 DOCUMENT = ROOT / "docs" / "scale.md"
 SAMPLES = 20_000
 SWEEP: dict[str, list[Any]] = {
-    "hardware.realization": list(REALIZATIONS),
+    "hardware.realization": list(SECTIONS),
     "filter.order": [2, 3, 4, 5, 6],
     "filter.cutoff": [0.1, 0.2, 0.4, 0.8, 1.6],
     "output.max_error": [0.00025, 0.0005, 0.001, 0.002, 0.004],

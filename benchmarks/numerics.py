@@ -23,7 +23,7 @@ from sosmith.gen.filter.design import decay_length
 from sosmith.gen.picture import settled
 from sosmith.gen.proof.linear_model import linear_model
 from sosmith.gen.realizations.noise import minimum_gain, second_order_modes
-from sosmith.gen.realizations.registry import REALIZATIONS
+from sosmith.gen.realizations.registry import SECTIONS
 from sosmith.gen.realizations.section_format import SectionFormat
 from sosmith.gen.realizations.state_space import minimum_noise
 from sosmith.gen.specification.specification import Specification, load
@@ -119,7 +119,7 @@ def table(name: str) -> str:
         "|---|---|---|---|---|---|---|---|---|",
     ]
     plain = replace(spec, hardware=replace(spec.hardware, architecture="parallel"))
-    for label, wanted, realization in (*((name, plain, name) for name in REALIZATIONS), *others(plain)):
+    for label, wanted, realization in (*((name, plain, name) for name in SECTIONS), *others(plain)):
         try:
             design = design_core(wanted, core="filter", realization=realization)
         except ShortfallError as error:
@@ -139,7 +139,7 @@ def table(name: str) -> str:
 def noise_gain(realization: str, cutoff: float) -> float:
     """Return the noise power gain of a unity-gain low-pass section, from all quantizers with equal variance."""
     words = SectionFormat(coefficient_bits=COEFFICIENT_BITS)
-    stage = REALIZATIONS[realization].build(published.lowpass(cutoff, QUALITY), words, "section")
+    stage = SECTIONS[realization].build(published.lowpass(cutoff, QUALITY), words, "section")
     model = linear_model(stage.graph)
     a = [float(value) for value in model.denominator]
     impulse = np.zeros(decay_length(np.array([[1.0, 0, 0, *a, *[0.0] * (3 - len(a))]])))
@@ -194,7 +194,7 @@ def slope_table(curves: dict[str, list[float] | str]) -> str:
     rows = []
     for name, curve in curves.items():
         slope = curve if isinstance(curve, str) else f"{slope_of(curve):+.1f}"
-        rows.append(f"| {name} | {REALIZATIONS[name].terms.title} | {slope} |")
+        rows.append(f"| {name} | {SECTIONS[name].terms.title} | {slope} |")
     return "\n".join(["| realization | | slope, dB per decade of the cutoff |", "|---|---|---|", *rows])
 
 
@@ -239,7 +239,7 @@ def order_table() -> str:
 
 def document() -> dict[str, str]:
     """Return the texts of the document and its plot, by path from the root."""
-    curves = {name: noise_curve(name) for name, realization in REALIZATIONS.items() if realization.cascade}
+    curves = {name: noise_curve(name) for name, realization in SECTIONS.items() if realization.cascade}
     sections = "\n\n".join(f"## {name}\n\n{table(name)}" for name in SPECIFICATIONS)
     text = f"""# Numerics of the realizations, side by side
 

@@ -12,7 +12,7 @@ from sosmith.gen.architectures.registry import candidates, fitting, reason_for
 from sosmith.gen.calibration.fit import Fit, fit, read_measurements
 from sosmith.gen.filter.design import Filter, design
 from sosmith.gen.fpga.boards import Board
-from sosmith.gen.realizations.registry import REALIZATIONS
+from sosmith.gen.realizations.registry import REALIZATIONS, realizations_for
 from sosmith.gen.search import AskedRealization, Response, Search
 from sosmith.gen.specification.choices import AUTO, CORES, ERROR_FEEDBACK
 from sosmith.gen.specification.combinations import asked_by
@@ -198,10 +198,17 @@ def _check_realization(spec: Specification, asked: AskedRealization, response: R
     Raises
     ------
     SpecificationError
-        If it has no such filter behind a decimator, stands beside look-ahead, which has its own, or has no other one's
-        word lengths.
+        If it is not for such a filter, has none behind a decimator, stands beside look-ahead, which has its own, or has
+        no other one's word lengths.
     """
     named = [name for name in (asked.name, asked.widths_of) if name in REALIZATIONS]
+    fir = response.ideal is not None and response.ideal.is_fir
+    for name in named if response.ideal is not None else ():
+        if name not in (suited := realizations_for(fir=fir)):
+            form = "an FIR filter" if fir else "second-order sections"
+            raise SpecificationError(
+                f"{spec.path}: the realization must be {AUTO}, {', '.join(suited)} for {form}, not {name}"
+            )
     factor = 1 if response.pre_stage is None else response.pre_stage.decimator.factor
     for name in named:
         if factor > 1 and (reason := REALIZATIONS[name].not_decimated):

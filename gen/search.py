@@ -154,6 +154,7 @@ class Search:
             lambda name: least_size(ideal, name, objective),
             objective,
             self.progress,
+            fir=ideal.is_fir,
         )
         if asked.widths_of is not None:
             quantized = with_realization(selection.proven(asked.widths_of), asked.name)

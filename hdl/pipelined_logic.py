@@ -108,7 +108,7 @@ class PipelinedLogic:
             own = self._pipeline_stages[index]
             if node.op is Op.INPUT:
                 self.wires.append(next(given))
-            elif node.op is Op.SHIFT:  # the same code
+            elif node.op is Op.SHIFT or self._is_once(index):  # the same code
                 self.wires.append(self.at(node.operands[0], own))
             else:
                 wire = Signal(shape_of(node), name=name, attrs={"keep": 1} if index in apart else {})
@@ -120,6 +120,11 @@ class PipelinedLogic:
                     value = self._multiple(index) if of_adders else logic(self._graph, node, operands, factor)
                     self._m.d.comb += wire.eq(value)
                 self.wires.append(wire)
+
+    def _is_once(self, index: int) -> bool:
+        """Whether a node is a product by the constant 1, whose name would else compete with that of its operand."""
+        node = self._graph.nodes[index]
+        return node.op is Op.SCALE and node.parameter == 1 and index not in self._constants
 
     def _multiple(self, index: int) -> Value:
         """Product by a constant from adders, made with those of its operand in the same pipeline stage."""

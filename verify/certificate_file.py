@@ -140,7 +140,7 @@ class SectionEntry(_Part):
     Only the first one may have a numerator of more than three: all of that of a sampled filter.
     """
 
-    numerator: Annotated[tuple[Rational, ...], Field(min_length=1, max_length=20)]
+    numerator: Annotated[tuple[Rational, ...], Field(min_length=1, max_length=256)]
     denominator: Annotated[tuple[Rational, ...], Field(min_length=1, max_length=3)]
 
 

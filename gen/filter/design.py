@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 
@@ -25,10 +25,10 @@ from sosmith.gen.filter.prototypes import Prototype, prototype
 from sosmith.gen.filter.sections import Row, rounded, sections
 from sosmith.gen.filter.transformations import bilinear, unwarped, warped
 from sosmith.gen.quantity import frequency
-from sosmith.gen.specification.choices import MAX_DECIMATION
+from sosmith.gen.specification.choices import FIR, FIR_FAMILIES, MAX_DECIMATION
 from sosmith.gen.specification.specification import FilterSpec
 from sosmith.model.arithmetic.correct_rounding import evaluate, nearest_double, sign
-from sosmith.model.arithmetic.recursive_filters import sosfilt
+from sosmith.model.arithmetic.recursive_filters import dc_gain, sosfilt
 from sosmith.model.errors import ShortfallError, SpecificationError
 
 Array = npt.NDArray[np.float64]
@@ -50,9 +50,9 @@ class Filter:
     sample_rate : float
         Hz.
     family, kind : str
-        As in the specification; ``"sections"`` if the sections were given.
+        As in the specification; ``"sections"`` or ``"fir"`` as the family if sections or taps were given.
     order : int
-        Number of poles.
+        Number of poles; of an FIR filter, of taps less 1.
     cutoff : tuple of float or None
         Hz, as the family defines it; None if the sections were given.
     passband_edge, stopband_edge : tuple of float or None
@@ -60,7 +60,8 @@ class Filter:
     passband_loss, stopband_loss : float or None
         dB, likewise.
     rows : tuple of tuple of float
-        (b0, b1, b2, 1, a1, a2) per section, in the order of the cascade.
+        (b0, b1, b2, 1, a1, a2) per section, in the order of the cascade. Of an FIR filter, one row: its taps, at least
+        three, and as many of 1, 0, 0, ...
     exact : tuple of tuple
         Numerator and denominator of the same sections as dyadic rationals, in any order, whose product is the specified
         filter far more accurately than that of `rows`: proofs compare with it.
@@ -86,7 +87,7 @@ class Filter:
 
     @property
     def sos(self) -> Array:
-        """Sections in scipy's form, shape (sections, 6)."""
+        """Sections in scipy's form, shape (sections, 6); of an FIR filter, shape (1, 2 * taps)."""
         return np.array(self.rows, dtype=np.float64)
 
     @cached_property
@@ -97,8 +98,12 @@ class Filter:
     @property
     def dc_gain(self) -> float:
         """Gain at zero frequency."""
-        sos = self.sos
-        return float(np.prod(sos[:, :3].sum(axis=1) / sos[:, 3:].sum(axis=1)))
+        return dc_gain(self.sos)
+
+    @property
+    def is_fir(self) -> bool:
+        """Whether it has taps, and is made by realizations for any number of them."""
+        return self.family in {FIR, *FIR_FAMILIES}
 
     @property
     def cutoff_of_stopband(self) -> bool:
@@ -120,6 +125,9 @@ class Filter:
     @property
     def describe(self) -> str:
         """One-line description: family, kind, order, cutoff, sample rate, and what else is not the default."""
+        if self.is_fir:
+            method = "" if self.family == FIR else f"{self.family} ".replace("_", " ")
+            return f"{method}FIR {self.kind}, {self.order + 1} taps at {frequency(self.sample_rate)}"
         if self.cutoff is None:
             return f"{len(self.rows)} given section{'s' * (len(self.rows) > 1)} at {frequency(self.sample_rate)}"
         method = "" if self.aliasing is None else ", impulse-invariant"
@@ -144,6 +152,9 @@ def impulse_response(sos: Array) -> Array:
 
 def decay_length(sos: Array) -> int:
     """Count the samples after which the slowest mode has decayed to 1e-12, with a margin for repeated poles."""
+    taps = sos.shape[1] // 2
+    if taps > 3:
+        return int(taps * len(sos))
     radius = max((_radius(float(row[4]), float(row[5])) for row in sos), default=0.0)
     samples = 64.0 if radius < 1e-3 else 64 + 1.5 * math.log(_DECAY) / math.log(min(radius, 1 - 1e-15))
     if samples > _MAX_RESPONSE:
@@ -196,7 +207,7 @@ def minimum_order(
     Returns
     -------
     order : int
-        Number of poles.
+        Number of poles; of an FIR filter, of taps less 1.
     cutoff : float
         Hz, at -3 dB; the pass-band edge is met exactly, the stop-band edge with margin.
     """
@@ -236,6 +247,10 @@ def design(spec: FilterSpec, sample_rate: Fraction | float) -> Filter:
         kind, rows = evaluate(lambda: _normalized(given))
         exact = evaluate(lambda: given_form(stated))
         return _filter(spec, fs, "sections", kind, rows, exact, order=_poles(given))
+    if spec.taps is not None:
+        return _fir(spec, spec.taps, fs)
+    if spec.family in FIR_FAMILIES:
+        return replace(_fir(spec, _designed(spec, fs), fs), family=spec.family, kind=spec.kind)
     order, cutoff = evaluate(lambda: _order_and_cutoff(spec, fs))
     alias = None
     if spec.method == "impulse_invariant":
@@ -247,6 +262,36 @@ def design(spec: FilterSpec, sample_rate: Fraction | float) -> Filter:
         rows, exact = evaluate(lambda: _bilinear(spec, fs))
     doubled = 2 if spec.kind in {"bandpass", "bandstop"} else 1
     return _filter(spec, fs, spec.family, spec.kind, rows, exact, order=doubled * order, cutoff=cutoff, aliasing=alias)
+
+
+def _fir(spec: FilterSpec, taps: Sequence[Fraction], fs: Fraction) -> Filter:
+    """Return the filter with given taps; they stay as they are, so that equal ones stay equal."""
+    row = fir_row(taps)
+    doubles = tuple(float(value) for value in row)
+    kind, _ = evaluate(lambda: _kind_and_reference([doubles]))
+    return _filter(spec, fs, FIR, kind, (doubles,), given_form([row]), order=len(taps) - 1)
+
+
+def _designed(spec: FilterSpec, fs: Fraction) -> tuple[Fraction, ...]:
+    from sosmith.gen.filter.fir_design import designed_taps, mask_of  # noqa: PLC0415 - seldom needed
+
+    # The specification has checked that these are given together.
+    assert spec.passband_edge is not None
+    assert spec.stopband_edge is not None
+    assert spec.passband_loss is not None
+    assert spec.stopband_loss is not None
+    passband, stopband = (tuple(edge / fs for edge in edges) for edges in (spec.passband_edge, spec.stopband_edge))
+    return designed_taps(spec.family, mask_of(spec.kind, passband, stopband, (spec.passband_loss, spec.stopband_loss)))
+
+
+def fir_row(taps: Sequence[Fraction]) -> tuple[Fraction, ...]:
+    """Return a filter's taps as the row of a section of an order of at least 2.
+
+    >>> fir_row([Fraction(1), Fraction(1)]) == (1, 1, 0, 1, 0, 0)
+    True
+    """
+    short = max(0, 3 - len(taps))
+    return (*taps, *[Fraction(0)] * short, Fraction(1), *[Fraction(0)] * (len(taps) + short - 1))
 
 
 def _filter(
@@ -338,17 +383,9 @@ def _poles(rows: Sequence[Row]) -> int:
 def _normalized(rows: Sequence[Row]) -> tuple[str, tuple[Row, ...]]:
     """Kind of given sections, and the sections scaled to unity gain in the pass band.
 
-    The kind follows from the frequency of the largest gain. The first section takes the remaining gain.
+    The first section takes the remaining gain.
     """
-    # cos and sin of the grid from 0 to just below half the sample rate
-    grid = [acb(arb.cos_pi_fmpq(fmpq(k, _GRID)), arb.sin_pi_fmpq(fmpq(k, _GRID))) for k in range(_GRID)]
-    gains = [nearest_double(abs(_response(rows, z))) for z in grid]
-    dc, nyquist, top = gains[0], gains[-1], max(gains)
-    if dc >= top / 2:
-        kind = "bandstop" if nyquist >= top / 2 else "lowpass"
-    else:
-        kind = "highpass" if nyquist >= top / 2 else "bandpass"
-    z = {"lowpass": acb(1), "bandstop": acb(1), "highpass": acb(-1), "bandpass": grid[gains.index(top)]}[kind]
+    kind, z = _kind_and_reference(rows)
     numerator_balls, total = [], arb(1)
     for row in rows:
         response = _response([row], z)
@@ -365,8 +402,30 @@ def _normalized(rows: Sequence[Row]) -> tuple[str, tuple[Row, ...]]:
     return kind, tuple((*numerator, *row[3:]) for numerator, row in zip(numerators, rows, strict=True))
 
 
+def _kind_and_reference(rows: Sequence[Row]) -> tuple[str, acb]:
+    """Kind of given sections, by the frequency of their largest gain, and the point on the unit circle to scale at."""
+    # cos and sin of the grid from 0 to just below half the sample rate
+    grid = [acb(arb.cos_pi_fmpq(fmpq(k, _GRID)), arb.sin_pi_fmpq(fmpq(k, _GRID))) for k in range(_GRID)]
+    gains = [nearest_double(abs(_response(rows, z))) for z in grid]
+    dc, nyquist, top = gains[0], gains[-1], max(gains)
+    if dc >= top / 2:
+        kind = "bandstop" if nyquist >= top / 2 else "lowpass"
+    else:
+        kind = "highpass" if nyquist >= top / 2 else "bandpass"
+    z = {"lowpass": acb(1), "bandstop": acb(1), "highpass": acb(-1), "bandpass": grid[gains.index(top)]}[kind]
+    return kind, z
+
+
 def _response(rows: Sequence[Row], z: acb) -> acb:
     value = acb(1)
-    for b0, b1, b2, _, a1, a2 in rows:
-        value *= ((b0 * z + b1) * z + b2) / ((z + a1) * z + a2)
+    for row in rows:
+        taps = len(row) // 2
+        value *= _horner(row[:taps], z) / _horner(row[taps:], z)
+    return value
+
+
+def _horner(coefficients: Sequence[float], z: acb) -> acb:
+    value = acb(0)
+    for coefficient in coefficients:
+        value = value * z + coefficient
     return value

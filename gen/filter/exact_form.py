@@ -80,21 +80,21 @@ def exact_form(first: Sequence[arb], zeros: Sequence[Taps], poles: Sequence[Taps
 
 
 def given_form(rows: Sequence[Sequence[Fraction]]) -> tuple[Exact, ...]:
-    """Round given sections (b0, b1, b2, 1, a1, a2).
+    """Round given sections (b0, b1, b2, 1, a1, a2), or of other orders in the same form.
 
     Raises
     ------
     UndecidedError
         If the precision does not tell a pole from a circle.
     """
-    below = [tuple(map(ball, _shortened(row[3:])[1:])) for row in rows]
+    below = [tuple(map(ball, _shortened(row[len(row) // 2 :])[1:])) for row in rows]
     return rounded_rows(rows, _SPARE_BITS + sum(map(_amplification, below)))
 
 
 def rounded_rows(rows: Sequence[Sequence[Fraction]], frac: int) -> tuple[Exact, ...]:
     """Round given sections to `frac` fraction bits."""
     nearest = [[Fraction(round(value * 2**frac), 2**frac) for value in row] for row in rows]
-    return tuple((_shortened(row[:3]), _shortened(row[3:])) for row in nearest)
+    return tuple((_shortened(row[: len(row) // 2]), _shortened(row[len(row) // 2 :])) for row in nearest)
 
 
 def _amplification(taps: Taps) -> int:

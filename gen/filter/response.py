@@ -1,4 +1,4 @@
-"""Frequency response of second-order sections: magnitude, group delay, passband and stopband measures.
+"""Frequency response of second-order sections and FIR filters: magnitude, group delay, passband and stopband measures.
 
 All results are computed section by section from the section's polynomials and then added, in dB and in samples. No
 phase is differentiated or unwrapped, so poles very close to z = 1 (cut-off far below the sampling frequency) cause no
@@ -11,9 +11,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import cast
 
 import numpy as np
 import numpy.typing as npt
+from flint import acb, fmpq, fmpq_poly
 
 from sosmith.gen.specification.choices import KINDS
 from sosmith.model.arithmetic.elementary import geometric, log10
@@ -40,9 +42,10 @@ class FilterFacts:
     ----------
     sample_rate : float
         Sampling frequency of one channel in Hz.
-    ideal_sos, quantized_sos : ndarray, shape (n_sections, 6)
-        Rows ``[b0, b1, b2, a0, a1, a2]`` with scipy's signs, ``a0 != 0``; the second holds the integer
-        coefficients of the hardware as numbers. The order of the rows may differ between the two.
+    ideal_sos, quantized_sos : ndarray, shape (n_sections, 2 * (order + 1))
+        Rows ``[b0, b1, b2, a0, a1, a2]`` with scipy's signs, ``a0 != 0``, or of an FIR filter its taps and as many of
+        1, 0, 0, ...; the second holds the integer coefficients of the hardware as numbers. The order of the rows may
+        differ between the two.
     kind : str
         ``"lowpass"``, ``"highpass"``, ``"bandpass"`` or ``"bandstop"``.
     passband_edge, stopband_edge : tuple of float or None
@@ -77,8 +80,8 @@ class FilterFacts:
                 raise ValueError(f"{name} of a {self.kind} must hold {count} frequencies, not {edges!r}")
         for name in ("ideal_sos", "quantized_sos"):
             shape = np.shape(getattr(self, name))
-            if len(shape) != 2 or shape[0] < 1 or shape[1] != 6:
-                raise ValueError(f"{name} must have the shape (n_sections, 6), not {shape!r}")
+            if len(shape) != 2 or shape[0] < 1 or shape[1] < 6 or shape[1] % 2:
+                raise ValueError(f"{name} must have the shape (n_sections, 6) or that of an FIR filter, not {shape!r}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,8 +110,14 @@ class ResponseMeasures:
     largest_pole_radius: float
 
 
+def halves(row: Array) -> tuple[Array, Array]:
+    """Return numerator and denominator of a section."""
+    taps = len(row) // 2
+    return row[:taps], row[taps:]
+
+
 def _polynomial(coefficients: Array, omega: Array) -> tuple[Array, Array]:
-    """Real and imaginary part of ``c0 + c1 z^-1 + c2 z^-2`` on the unit circle."""
+    """Real and imaginary part of ``c0 + c1 z^-1 + c2 z^-2 + ..`` on the unit circle."""
     return _at(coefficients, np.cos(omega), np.sin(omega))
 
 
@@ -117,13 +126,15 @@ def _at(coefficients: Array, cos: Array, sin: Array) -> tuple[Array, Array]:
 
     Complex numbers are avoided, because numpy's complex products differ among machines.
     """
-    c0, c1, c2 = (float(c) for c in coefficients)
-    inner_real, inner_imag = c1 + c2 * cos, -c2 * sin
-    return c0 + cos * inner_real + sin * inner_imag, cos * inner_imag - sin * inner_real
+    *others, before, last = (float(c) for c in coefficients)
+    real, imag = before + last * cos, -last * sin
+    for c in others[::-1]:
+        real, imag = c + cos * real + sin * imag, cos * imag - sin * real
+    return real, imag
 
 
 def _polynomial_delay(coefficients: Array, omega: Array) -> Array:
-    """Group delay of ``c0 + c1 z^-1 + c2 z^-2`` in samples; NaN where the polynomial vanishes.
+    """Group delay of ``c0 + c1 z^-1 + c2 z^-2 + ..`` in samples; NaN where the polynomial vanishes.
 
     The delay is ``Re(sum k c_k z^-k / sum c_k z^-k)``. (Anti)symmetric polynomials have linear phase, half
     their degree in samples, also on the unit circle's zeros where the quotient is 0/0.
@@ -133,7 +144,7 @@ def _polynomial_delay(coefficients: Array, omega: Array) -> Array:
         return np.full(omega.shape, (len(c) - 1) / 2)
     real, imag = _polynomial(coefficients, omega)
     vanishes = np.hypot(real, imag) < 1e-13 * np.sum(np.abs(coefficients))
-    slope_real, slope_imag = _polynomial(coefficients * np.arange(3), omega)
+    slope_real, slope_imag = _polynomial(coefficients * np.arange(len(coefficients)), omega)
     square = np.where(vanishes, 1.0, real * real + imag * imag)
     return np.where(vanishes, np.nan, (slope_real * real + slope_imag * imag) / square)
 
@@ -143,8 +154,8 @@ def magnitude_db(sos: Array, frequency: Array, sample_rate: float) -> Array:
 
     Parameters
     ----------
-    sos : ndarray, shape (n_sections, 6)
-        Second-order sections with scipy's signs.
+    sos : ndarray, shape (n_sections, 2 * (order + 1))
+        Sections with scipy's signs.
     frequency : ndarray, shape (n,)
         Frequencies in Hz.
     sample_rate : float
@@ -155,8 +166,7 @@ def magnitude_db(sos: Array, frequency: Array, sample_rate: float) -> Array:
     cos, sin = np.cos(omega), np.sin(omega)
     tiny = 10 ** (FLOOR_DB / 20)
     for section in sos:
-        numerator = np.hypot(*_at(section[:3], cos, sin))
-        denominator = np.hypot(*_at(section[3:], cos, sin))
+        numerator, denominator = (np.hypot(*_at(half, cos, sin)) for half in halves(section))
         total += 20 * log10(np.maximum(numerator, tiny) / np.maximum(denominator, tiny))
     return np.maximum(total, FLOOR_DB)
 
@@ -166,8 +176,7 @@ def complex_response(sos: Array, frequency: Array, sample_rate: float) -> Comple
     omega = 2 * np.pi * frequency / sample_rate
     total = np.ones(omega.shape, dtype=np.complex128)
     for section in sos:
-        over_real, over_imaginary = _polynomial(section[:3], omega)
-        under_real, under_imaginary = _polynomial(section[3:], omega)
+        (over_real, over_imaginary), (under_real, under_imaginary) = (_polynomial(h, omega) for h in halves(section))
         total *= (over_real + 1j * over_imaginary) / (under_real + 1j * under_imaginary)
     return total
 
@@ -185,14 +194,25 @@ def group_delay(sos: Array, frequency: Array, sample_rate: float) -> Array:
     omega = 2 * np.pi * frequency / sample_rate
     total = np.zeros(omega.shape)
     for section in sos:
-        total += _polynomial_delay(section[:3], omega) - _polynomial_delay(section[3:], omega)
+        over, under = halves(section)
+        total += _polynomial_delay(over, omega) - _polynomial_delay(under, omega)
     return total / sample_rate
 
 
 def _roots(polynomials: Array) -> Complex:
-    """Roots of the rows ``c0 + c1 z^-1 + c2 z^-2`` in z, without those at the origin and at infinity."""
-    roots = [root for row in polynomials.tolist() for root in _quadratic_roots(np.trim_zeros(np.array(row)).tolist())]
+    """Roots of the rows ``c0 + c1 z^-1 + c2 z^-2 + ..`` in z, without those at the origin and at infinity."""
+    roots = [root for row in polynomials.tolist() for root in _roots_of(np.trim_zeros(np.array(row)).tolist())]
     return np.array(roots, dtype=np.complex128)
+
+
+def _roots_of(coefficients: Sequence[float]) -> list[complex]:
+    """Roots of a polynomial with the highest power first."""
+    if len(coefficients) <= 3:
+        return _quadratic_roots(coefficients)
+    # Isolated by the library, and the same on every machine, which eigenvalues are not.
+    exact = fmpq_poly([fmpq(*c.as_integer_ratio()) for c in coefficients[::-1]])
+    roots = cast("list[tuple[acb, int]]", exact.numer().complex_roots())  # its type stubs omit the multiplicities
+    return [complex(root) for root, count in roots for _ in range(count)]
 
 
 def _quadratic_roots(coefficients: Sequence[float]) -> list[complex]:
@@ -211,12 +231,12 @@ def _quadratic_roots(coefficients: Sequence[float]) -> list[complex]:
 
 def poles(sos: Array) -> Complex:
     """Poles of all sections, without those at the origin."""
-    return _roots(sos[:, 3:])
+    return _roots(sos[:, sos.shape[1] // 2 :])
 
 
 def zeros(sos: Array) -> Complex:
     """Zeros of all sections, without those at the origin and at infinity."""
-    return _roots(sos[:, :3])
+    return _roots(sos[:, : sos.shape[1] // 2])
 
 
 def frequency_grid(facts: FilterFacts, points: int = 1200) -> Array:

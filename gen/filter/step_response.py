@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sosmith.gen.filter.response import Array, poles
-from sosmith.model.arithmetic.recursive_filters import sosfilt
+from sosmith.model.arithmetic.recursive_filters import dc_gain, sosfilt
 
 MAX_SAMPLES = 1 << 20
 """Longest response that is computed; a filter that is slower than that has none."""
@@ -79,8 +79,8 @@ def step_response(sos: Array, sample_rate: float, precision: float, entering: Ar
 
     Parameters
     ----------
-    sos : ndarray, shape (n_sections, 6)
-        Second-order sections with scipy's signs.
+    sos : ndarray, shape (n_sections, 2 * (order + 1))
+        Sections with scipy's signs.
     sample_rate : float
         Sampling frequency in Hz.
     precision : float
@@ -98,10 +98,10 @@ def step_response(sos: Array, sample_rate: float, precision: float, entering: Ar
         return None
     # a pole of multiplicity m decays later than a single one: n**(m-1) r**n, for which the factor makes room
     decay = 0.0 if radius == 0 else math.log(precision / 1000) / math.log(radius)
-    samples = 8 + 2 * len(sos) + math.ceil(1.5 * decay) + len(entering) - 1
+    samples = 8 + (sos.shape[1] // 2 - 1) * len(sos) + math.ceil(1.5 * decay) + len(entering) - 1
     if samples > MAX_SAMPLES:
         return None
     step = np.append(entering, np.ones(samples - len(entering)))
-    values = sosfilt(sos / sos[:, 3:4], step)
-    final = float(np.prod(sos[:, :3].sum(axis=1) / sos[:, 3:].sum(axis=1)))
+    values = sosfilt(sos / sos[:, sos.shape[1] // 2, np.newaxis], step)
+    final = dc_gain(sos)
     return StepResponse(sample_rate=sample_rate, values=values, final=final)

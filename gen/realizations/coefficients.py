@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+
+from sosmith.model.dataflow.adder_graph import signed_digits
 
 
 @dataclass(frozen=True)
@@ -45,3 +47,15 @@ def lowest_terms(integer: int, frac: int) -> tuple[int, int]:
     if frac < 0:
         return integer << -frac, 0
     return integer, frac
+
+
+def with_fewer_digits(integer: int, exact: float) -> Iterator[int]:
+    """Yield integers near `exact`, above and below, with fewer signed digits than `integer`."""
+    least = len(signed_digits(integer))
+    for whole in (math.floor(exact), math.ceil(exact)):
+        digits = signed_digits(whole)[::-1]
+        for count in range(1, len(digits) + 1):
+            near = sum(sign << power for sign, power in digits[:count])
+            for other in (near, near + (1 << digits[count - 1][1]), near - (1 << digits[count - 1][1])):
+                if other and other != integer and len(signed_digits(other)) < least:
+                    yield other

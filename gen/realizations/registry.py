@@ -8,9 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Protocol
 
 from sosmith.gen.realizations.direct_form import direct_form
+from sosmith.gen.realizations.fir import fir_section
 from sosmith.gen.realizations.lattice import Part, lattice_parts, lattice_stage
 from sosmith.gen.realizations.look_ahead import look_ahead
 from sosmith.gen.realizations.section_format import WIDE, SectionFormat
@@ -20,9 +22,10 @@ from sosmith.gen.specification import choices
 from sosmith.gen.specification import realizations as terms
 from sosmith.gen.specification.realizations import RealizationTerms
 from sosmith.model.dataflow.datapath import Stage
+from sosmith.model.sections.fir import Form
 
 Row = Sequence[float]
-"""b0, b1, b2, 1, a1, a2 of an ideal section."""
+"""b0, b1, b2, 1, a1, a2 of an ideal section; longer halves of an FIR filter, whose second one is 1, 0, 0, ..."""
 
 
 class Section(Stage, Protocol):
@@ -58,7 +61,7 @@ class Realization:
         Turns the ideal sections into one part for each stage: the rows themselves for a cascade. Raises
         ShortfallError if the filter has no such realization.
     cascade : bool
-        Whether every stage is one of the ideal sections, in any order.
+        Whether every stage is one of several ideal sections, in any order, for which words are searched together.
     not_decimated : str
         Why a filter that corrects a decimator's droop is not made so, half a sentence; empty if it is.
     """
@@ -105,7 +108,7 @@ def _lattice(part: Part, form: SectionFormat, name: str) -> Section:
     )
 
 
-REALIZATIONS: dict[str, Realization] = {
+SECTIONS: dict[str, Realization] = {
     realization.name: realization
     for realization in (
         *(
@@ -125,7 +128,27 @@ REALIZATIONS: dict[str, Realization] = {
         ),
     )
 }
+"""Realizations of second-order sections, by name, in the order in which lists show them."""
+
+FIR: dict[str, Realization] = {
+    each.name: Realization(
+        terms=each,
+        build=partial(fir_section, structure=form),
+        cascade=False,
+        not_decimated="filters behind a decimator have poles",
+    )
+    for each, form in zip(terms.FIR, Form, strict=True)
+}
+"""Realizations of FIR filters, likewise."""
+
+REALIZATIONS = SECTIONS | FIR
 """All realizations that a specification can name, by name, in the order in which lists show them."""
+
+
+def realizations_for(*, fir: bool) -> dict[str, Realization]:
+    """Return the realizations of FIR filters, or those of second-order sections."""
+    return FIR if fir else SECTIONS
+
 
 LOOK_AHEAD: dict[int, Realization] = {
     samples: Realization(
@@ -145,7 +168,7 @@ def realization_of(name: str) -> Realization:
     return REALIZATIONS[name] if name in REALIZATIONS else others[name]
 
 
-CASCADES = tuple(name for name, realization in REALIZATIONS.items() if realization.cascade)
+CASCADES = tuple(name for name, realization in SECTIONS.items() if realization.cascade)
 """Names of the realizations whose stages are the ideal sections."""
 
 BEST_KEPT = terms.DF1_EF2.name

@@ -122,14 +122,16 @@ def behaviour_entry(measured: Behaviour) -> dict[str, Any]:
 
 def _step(facts: FilterFacts, lsb: float, span: float, before: DecimationFacts | None) -> StepResponse | None:
     factor, stages = (1, 0) if before is None else (before.factor, before.stages)
-    return _cached_step(facts.quantized_sos.tobytes(), facts.sample_rate, lsb / 2 / span, factor, stages)
+    return _cached_step(
+        facts.quantized_sos.tobytes(), len(facts.quantized_sos), facts.sample_rate, lsb / 2 / span, factor, stages
+    )
 
 
 @lru_cache(maxsize=8)
 def _cached_step(
-    sections: bytes, sample_rate: float, precision: float, factor: int, stages: int
+    sections: bytes, count: int, sample_rate: float, precision: float, factor: int, stages: int
 ) -> StepResponse | None:
-    sos = np.frombuffer(sections).reshape(-1, 6)
+    sos = np.frombuffer(sections).reshape(count, -1)
     return step_response(sos, sample_rate, precision, decimated_step(factor, stages))
 
 

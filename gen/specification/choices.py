@@ -12,9 +12,17 @@ AUTO = "auto"
 """Value of a key that leaves the choice to the design."""
 
 FAMILIES = ("butterworth", "chebyshev1", "chebyshev2", "elliptic", "bessel")
-_NO_FIR = ": FIR filters are not made, as cores consist of second-order sections"
+FIR = "fir"
+"""Family of filters that are given by their taps."""
+
+FIR_FAMILIES = ("equiripple", "least_squares", "kaiser", "halfband")
+"""Methods by which an FIR filter is designed from its edges and losses."""
+
+MAX_TAPS = 256
+"""Most taps of an FIR filter."""
+
 FAMILY_HINTS = {
-    **dict.fromkeys(("fir", "firwin", "remez", "equiripple", "kaiser", "window", "hamming"), _NO_FIR),
+    **dict.fromkeys(("fir", "firwin", "remez", "window", "hamming"), " (did you mean equiripple or kaiser?)"),
     "cauer": " (did you mean elliptic?)",
     "ellip": " (did you mean elliptic?)",
     "butter": " (did you mean butterworth?)",

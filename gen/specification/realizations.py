@@ -35,6 +35,12 @@ DELTA = RealizationTerms("delta", "transposed direct form II, delta operator")
 STATE_SPACE = RealizationTerms("state_space", "state space with minimum roundoff noise")
 NORMAL = RealizationTerms("normal", "normal form with truncated magnitudes, free of limit cycles")
 LATTICE_WDF = RealizationTerms("lattice_wdf", "lattice wave digital filter, free of limit cycles")
+FIR_DIRECT = RealizationTerms("fir_direct", "direct form FIR, a product for each tap")
+FIR_SYMMETRIC = RealizationTerms("fir_symmetric", "direct form FIR, equal taps added before their product")
+FIR_TRANSPOSED = RealizationTerms("fir_transposed", "transposed direct form FIR, a product for each magnitude of taps")
 
-ALL = (DF1, DF1_EF1, DF1_EF2, DF2T, DELTA, STATE_SPACE, NORMAL, LATTICE_WDF)
+FIR = (FIR_DIRECT, FIR_SYMMETRIC, FIR_TRANSPOSED)
+"""Those of filters without poles, of any length; all others are of second-order sections."""
+
+ALL = (DF1, DF1_EF1, DF1_EF2, DF2T, DELTA, STATE_SPACE, NORMAL, LATTICE_WDF, *FIR)
 """All that a specification can name, in the order in which lists show them."""

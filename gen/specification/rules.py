@@ -9,7 +9,16 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 
-from sosmith.gen.specification.choices import AUTO, CALIBRATION_INPUTS, FAMILIES, KINDS, LOOK_AHEAD, LOSSES, MAX_RATIO
+from sosmith.gen.specification.choices import (
+    AUTO,
+    CALIBRATION_INPUTS,
+    FAMILIES,
+    FIR_FAMILIES,
+    KINDS,
+    LOOK_AHEAD,
+    LOSSES,
+    MAX_RATIO,
+)
 from sosmith.gen.specification.combinations import check_combinations
 from sosmith.gen.specification.converters import ADCS, DACS, OUTPUT
 from sosmith.gen.specification.schema import MAX_ORDER, ConverterTable, Document, FilterTable, InputTable
@@ -29,9 +38,10 @@ coefficients would have that many leading bits without information.
 _BY_ORDER = ("order", "cutoff")
 _BY_EDGES = ("passband_edge", "stopband_edge", "passband_loss", "stopband_loss")
 _BY_SECTIONS = ("sos", "sos_file")
+_BY_TAPS = ("taps", "taps_file")
 _FORMS = (
     "given by order and cutoff, by passband_edge, stopband_edge, passband_loss and stopband_loss, "
-    "or by one of sos and sos_file"
+    "by one of sos and sos_file, or by one of taps and taps_file"
 )
 
 
@@ -159,20 +169,24 @@ def _check_uncertainty(document: Document) -> None:
 
 def _check_filter(document: Document) -> None:
     table, sample_rate = document.filter, document.sample_rate
-    given = [key for key in (*_BY_ORDER, *_BY_EDGES, *_BY_SECTIONS) if getattr(table, key) is not None]
-    match [any(key in given for key in form) for form in (_BY_ORDER, _BY_EDGES[:2], _BY_SECTIONS)]:
-        case [True, False, False]:
+    given = [key for key in (*_BY_ORDER, *_BY_EDGES, *_BY_SECTIONS, *_BY_TAPS) if getattr(table, key) is not None]
+    match [any(key in given for key in form) for form in (_BY_ORDER, _BY_EDGES[:2], _BY_SECTIONS, _BY_TAPS)]:
+        case [True, False, False, False]:
             _check_by_order(table, given, sample_rate)
-        case [False, True, False]:
+        case [False, True, False, False]:
             _check_by_edges(table, given, sample_rate)
-        case [False, False, True]:
+        case [False, False, True, False]:
             _check_sections(table, given)
+        case [False, False, False, True]:
+            _check_taps(table, given)
         case _:
             raise UnfitError(_FORMS, f"by {listed(given) if given else 'none of them'}", where="filter")
 
 
 def _check_by_order(table: FilterTable, given: Sequence[str], sample_rate: Fraction) -> None:
     family, kind = _family_and_kind(table)
+    if family in FIR_FAMILIES:
+        raise UnfitError(f"given by {listed(_BY_EDGES)} for {family}", "by order and cutoff", where="filter")
     if table.method == "impulse_invariant":
         _check_impulse_invariant(table, family, kind)
     losses = LOSSES.get(family, ())
@@ -194,6 +208,8 @@ def _check_by_order(table: FilterTable, given: Sequence[str], sample_rate: Fract
 
 def _check_by_edges(table: FilterTable, given: Sequence[str], sample_rate: Fraction) -> None:
     family, kind = _family_and_kind(table)
+    if family in FIR_FAMILIES and table.method is not None:
+        raise UnfitError(f"left out for {family}", literal(table.method), where="filter.method")
     if table.method == "impulse_invariant":
         raise UnfitError(
             "given by order and cutoff with impulse_invariant, as no formula for the minimum order covers its aliasing",
@@ -217,6 +233,20 @@ def _check_by_edges(table: FilterTable, given: Sequence[str], sample_rate: Fract
             _frequencies(passband),
             where="filter.passband_edge",
         )
+    if family == "halfband":
+        _check_halfband(kind, passband, stopband, sample_rate)
+
+
+def _check_halfband(
+    kind: str, passband: tuple[Fraction, ...], stopband: tuple[Fraction, ...], sample_rate: Fraction
+) -> None:
+    """Check that a half-band filter is a low-pass, whose edges lie at equal distances from a quarter of the rate."""
+    if kind != "lowpass":
+        expected = "lowpass for halfband: the taps of a high-pass are the same with alternating signs"
+        raise UnfitError(expected, literal(kind), where="filter.kind")
+    if passband[0] + stopband[0] != sample_rate / 2:
+        expected = f"{literal(sample_rate / 2 - passband[0])} Hz for halfband, half the sample_rate less passband_edge"
+        raise UnfitError(expected, _frequencies(stopband), where="filter.stopband_edge")
 
 
 def _check_impulse_invariant(table: FilterTable, family: str, kind: str) -> None:
@@ -238,10 +268,7 @@ def _check_impulse_invariant(table: FilterTable, family: str, kind: str) -> None
 
 
 def _check_sections(table: FilterTable, given: Sequence[str]) -> None:
-    form = "sos" if table.sos is not None else "sos_file"
-    for key in given:
-        if key != form:
-            raise UnfitError(f"left out with {form}", literal(getattr(table, key)), where=f"filter.{key}")
+    _check_alone(table, given, "sos" if table.sos is not None else "sos_file")
     for k, (b0, b1, b2, a0, a1, a2) in enumerate(table.sos or ()):
         where = f"filter.sos[{k}]"
         if a0 != 1:
@@ -257,9 +284,24 @@ def _check_sections(table: FilterTable, given: Sequence[str]) -> None:
             )
 
 
+def _check_taps(table: FilterTable, given: Sequence[str]) -> None:
+    form = "taps" if table.taps is not None else "taps_file"
+    labels = [key for key in ("family", "kind", "method") if getattr(table, key) is not None]
+    _check_alone(table, [*labels, *given], form)
+    if table.taps is not None and not any(table.taps):
+        raise UnfitError("a list of numbers that are not all 0", "zeros only", where="filter.taps")
+
+
+def _check_alone(table: FilterTable, given: Sequence[str], form: str) -> None:
+    """Check that no other key is given beside the one that gives all of the filter."""
+    for key in given:
+        if key != form:
+            raise UnfitError(f"left out with {form}", literal(getattr(table, key)), where=f"filter.{key}")
+
+
 def _family_and_kind(table: FilterTable) -> tuple[str, str]:
     if table.family is None:
-        raise UnfitError(one_of(FAMILIES), "missing", where="filter.family")
+        raise UnfitError(one_of((*FAMILIES, *FIR_FAMILIES)), "missing", where="filter.family")
     if table.kind is None:
         raise UnfitError(one_of(KINDS), "missing", where="filter.kind")
     return table.family, table.kind

@@ -18,9 +18,11 @@ from sosmith.gen.specification.choices import (
     AUTO,
     FAMILIES,
     FAMILY_HINTS,
+    FIR_FAMILIES,
     KIND_HINTS,
     KINDS,
     MAX_DECIMATION,
+    MAX_TAPS,
     METHODS,
     PIPELINES,
     REALIZATIONS,
@@ -171,9 +173,9 @@ class CalibrationTable(Table):
 
 
 class FilterTable(Table):
-    """``[filter]``: given by order and cutoff, by edges and losses, or by sections."""
+    """``[filter]``: given by order and cutoff, by edges and losses, by sections, or by taps."""
 
-    family: Annotated[str | None, PlainValidator(choice(FAMILIES, FAMILY_HINTS))] = None
+    family: Annotated[str | None, PlainValidator(choice((*FAMILIES, *FIR_FAMILIES), FAMILY_HINTS))] = None
     kind: Annotated[str | None, PlainValidator(choice(KINDS, KIND_HINTS))] = None
     method: Annotated[str | None, PlainValidator(choice(METHODS))] = None
     order: Annotated[int | None, PlainValidator(whole(1, MAX_ORDER))] = None
@@ -187,6 +189,8 @@ class FilterTable(Table):
         PlainValidator(list_of(list_of(number, 6, 6), 1, MAX_ORDER // 2, "rows [b0, b1, b2, 1.0, a1, a2]")),
     ] = None
     sos_file: Annotated[str | None, PlainValidator(file_name)] = None
+    taps: Annotated[tuple[Fraction, ...] | None, PlainValidator(list_of(number, 1, MAX_TAPS))] = None
+    taps_file: Annotated[str | None, PlainValidator(file_name)] = None
     decimate: Annotated[int | str | None, PlainValidator(read_decimate)] = None
     hold: Annotated[bool, PlainValidator(flag)] = False
 

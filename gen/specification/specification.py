@@ -11,7 +11,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sosmith.gen.specification.choices import CALIBRATION_INPUTS
+from sosmith.gen.specification.choices import CALIBRATION_INPUTS, FIR, FIR_FAMILIES
 from sosmith.gen.specification.converters import ConverterSpec, converters, dac
 from sosmith.gen.specification.toml_text import toml_text
 from sosmith.gen.specification.uncertainty import CoefficientsSpec, UncertaintySpec
@@ -57,13 +57,13 @@ class CalibrationSpec:
 
 @dataclass(frozen=True, kw_only=True)
 class FilterSpec:
-    """The required filter: by `order` and `cutoff`, by edges and losses, or by sections; the other attributes are None.
+    """The required filter: by `order` and `cutoff`, edges and losses, sections, or taps; the other attributes are None.
 
     Attributes
     ----------
     family, kind, method : str
         For example "butterworth", "lowpass", "bilinear". With `sos` they are only a label, "sections" by
-        default.
+        default; with `taps` they are "fir", as is the method of a designed FIR filter.
     order : int or None
         Order of the prototype, 1 to 20; for bandpass and bandstop 1 to 10, as the filter has twice that order.
     cutoff, passband_edge, stopband_edge : tuple of Fraction or None
@@ -76,12 +76,14 @@ class FilterSpec:
     sos : tuple of tuples of Fraction or None
         1 to 10 stable rows (b0, b1, b2, a0, a1, a2) with a0 = 1 and the sign convention of scipy; of the
         specification or of its `sos_file`.
+    taps : tuple of Fraction or None
+        1 to 256 coefficients of 1, 1/z and so on, not all 0; of the specification or of its `taps_file`.
     decimate : int, "auto" or None
         Factor of the decimator before a low-pass filter by order and cutoff, a power of two; None without one.
     hold : bool
         Whether each result behind a decimator is handed out once for each of its samples, at their rate.
     origin : str
-        How `sos_file` was read, a sentence; empty without one.
+        How `sos_file` or `taps_file` was read, a sentence; empty without one.
     """
 
     family: str
@@ -94,9 +96,15 @@ class FilterSpec:
     passband_loss: Fraction | None
     stopband_loss: Fraction | None
     sos: tuple[tuple[Fraction, ...], ...] | None
+    taps: tuple[Fraction, ...] | None = None
     origin: str = ""
     decimate: int | str | None = None
     hold: bool = False
+
+    @property
+    def is_fir(self) -> bool:
+        """Whether it is an FIR filter, whose realizations are others than those of second-order sections."""
+        return self.taps is not None or self.family in FIR_FAMILIES
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -333,11 +341,18 @@ def _filter(path: Path, table: FilterTable) -> FilterSpec:
         from sosmith.gen.specification.sections_file import sections_of  # only a file of arrays needs numpy
 
         sections, origin = sections_of(path.parent / table.sos_file)
-    by_sections = sections is not None
+    taps = table.taps
+    if table.taps_file is not None:
+        from sosmith.gen.specification.taps_file import taps_of
+
+        taps, origin = taps_of(path.parent / table.taps_file)
+    label = SECTIONS if taps is None else FIR
+    designed = table.family in FIR_FAMILIES
+    method = FIR if designed else label if sections is not None or taps is not None else "bilinear"
     return FilterSpec(
-        family=table.family or SECTIONS,
-        kind=table.kind or SECTIONS,
-        method=table.method or (SECTIONS if by_sections else "bilinear"),
+        family=table.family or label,
+        kind=table.kind or label,
+        method=table.method or method,
         order=table.order,
         cutoff=table.cutoff,
         passband_edge=table.passband_edge,
@@ -345,6 +360,7 @@ def _filter(path: Path, table: FilterTable) -> FilterSpec:
         passband_loss=table.passband_loss,
         stopband_loss=table.stopband_loss,
         sos=sections,
+        taps=taps,
         origin=origin,
         decimate=table.decimate,
         hold=table.hold,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Protocol
 
-from sosmith.gen.word_lengths.cost import LUTS_OF_A_BLOCK, area_by_digits, area_of, cost_of, scalings
+from sosmith.gen.word_lengths.cost import LUTS_OF_A_BLOCK, MULTIPLIER_BITS, area_by_digits, area_of, cost_of, scalings
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.folding import FoldingError, columns_of, program
 from sosmith.model.dataflow.graph import Graph, Op
@@ -50,6 +50,10 @@ class Objective(Protocol):
     def few_digits(self) -> bool:
         """Whether a coefficient of fewer signed digits takes less, though it has as many bits."""
 
+    @property
+    def factor_bits(self) -> int | None:
+        """Bits of a constant, with its sign, beyond which a product takes more; None if there is no such step."""
+
     def of_graph(self, graph: Graph) -> float:
         """Estimate what one stage adds to the size; infinite if it does not suit."""
 
@@ -78,6 +82,7 @@ class SmallArea:
     unsuited = "not for this filter"
     hopeless = 2.5  # trimming saved less than half in every design seen
     few_digits = False
+    factor_bits = MULTIPLIER_BITS
 
     def of_graph(self, graph: Graph) -> float:
         """Return the area of the graph's operators, in LUT4."""
@@ -113,6 +118,7 @@ class FewAdders:
     unsuited = "not for this filter"
     hopeless = SmallArea.hopeless
     few_digits = True
+    factor_bits = None
 
     def of_graph(self, graph: Graph) -> float:
         """Return the area of the graph's operators, in LUT4, by the digits of its constants."""
@@ -157,6 +163,11 @@ class ShortProgram:
     beyond = "longer even with one digit for each value"
     unsuited = "not to be folded"
     hopeless = 1.5  # trimming saved less than a fifth in every design seen
+
+    @property
+    def factor_bits(self) -> int | None:
+        """Bits of a digit, but where each bit takes a clock."""
+        return None if self.bit_serial else self.digit_bits
 
     @property
     def best(self) -> str:

@@ -40,6 +40,7 @@ class OnlineUnits:
     unsuited = "no direct form"
     hopeless = 2.5  # as for the parallel architecture
     few_digits = False
+    factor_bits = None
 
     def of_graph(self, graph: Graph) -> float:
         """Estimate the area of one stage, with as many units as the digits of its results take, times its interval."""

@@ -22,6 +22,7 @@ from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
 from sosmith.gen.word_lengths.bit_limits import MAX_BITS
 from sosmith.gen.word_lengths.cascade import cascade, parts_of, stages_of, unquantized
 from sosmith.gen.word_lengths.equal_shares import equally_shared
+from sosmith.gen.word_lengths.fir import fir_stages
 from sosmith.gen.word_lengths.input_stage import InputStage, input_stages, needs_scaling, starting
 from sosmith.gen.word_lengths.objective import SMALL_AREA, Objective
 from sosmith.gen.word_lengths.ordering import best_order
@@ -108,7 +109,9 @@ class Plan:
     def under(self, objective: Objective) -> Plan:
         """Return the same plan, to be trimmed for another objective."""
         search = None if self.search is None else self.search.under(objective)
-        return replace(self, search=search, objective=objective)
+        other = replace(self, search=search, objective=objective)
+        by_taps = self.ideal is not None and self.ideal.is_fir
+        return replace(other, quantized=_by_taps(other)) if by_taps and objective != self.objective else other
 
     def trimmed(self) -> Plan:
         """Return a copy with formats trimmed until no step saves any more."""
@@ -154,7 +157,7 @@ def plan(
         realization.
     """
     scaled = polynomial is not None or needs_scaling(inputs[0], output)
-    parts = scaled + 2 * (ideal is not None)
+    parts = scaled + (0 if ideal is None else 1 if ideal.is_fir else 2)  # an FIR filter rounds nothing
     share = (max_error / output.lsb - Fraction(1, 2)) / max(parts, 1)
     gain = Fraction(1) if ideal is None else gain_of(ideal)
     before = input_stages(polynomial, inputs, output, share / gain)
@@ -183,7 +186,7 @@ def plan(
     )
     if ideal is None or search is not None:
         return planned
-    return replace(planned, quantized=_equally_shared(planned, ideal))
+    return replace(planned, quantized=_by_taps(planned) if ideal.is_fir else _equally_shared(planned, ideal))
 
 
 def quantize(
@@ -256,6 +259,23 @@ def _equally_shared(planned: Plan, ideal: Filter) -> Quantized:
     before = planned.input_stages[0]
     x, share = before.output, planned.share
     return _assembled(planned, before, *equally_shared(ideal, planned.realization, x, share, steady=planned.steady))
+
+
+def _by_taps(planned: Plan) -> Quantized:
+    """Leave to the coefficients of an FIR filter what input stage and start do not take of the error allowed."""
+    ideal, before = planned.ideal, planned.input_stages[0]
+    assert ideal is not None
+    spent = before.error * planned.gain + (0 if before.start is None else before.start.error)
+    stages = fir_stages(
+        ideal,
+        planned.realization,
+        before.output,
+        planned.allowed - spent,
+        steady=planned.steady,
+        few_digits=planned.objective.few_digits,
+        factor_bits=planned.objective.factor_bits,
+    )
+    return _assembled(planned, before, *stages)
 
 
 def _assembled(

@@ -26,7 +26,7 @@ import numpy.typing as npt
 
 from sosmith.gen.filter.design import estimated_length
 from sosmith.gen.proof.linear_model import Source, linear_model, quantizers, transfer_function
-from sosmith.gen.realizations.coefficients import lowest_terms, round_significant
+from sosmith.gen.realizations.coefficients import lowest_terms, round_significant, with_fewer_digits
 from sosmith.gen.realizations.registry import Section, realization_of
 from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
 from sosmith.gen.word_lengths.bit_limits import MIN_BITS
@@ -34,7 +34,6 @@ from sosmith.gen.word_lengths.cost import MULTIPLIER_BITS
 from sosmith.gen.word_lengths.input_stage import InputStage
 from sosmith.gen.word_lengths.objective import SMALL_AREA, Objective
 from sosmith.model.arithmetic.recursive_filters import lfilter, sosfilt
-from sosmith.model.dataflow.adder_graph import signed_digits
 from sosmith.model.dataflow.graph import Range
 from sosmith.model.errors import ShortfallError
 
@@ -239,7 +238,7 @@ class Search:
             yield form.with_frac(name, frac)
         for name, (integer, frac) in form.coefficients.items():
             if self._objective.few_digits:
-                for nearest in _with_fewer_digits(integer, self._estimates[k].ideal[name] * 2.0**frac):
+                for nearest in with_fewer_digits(integer, self._estimates[k].ideal[name] * 2.0**frac):
                     yield form.with_coefficient(name, lowest_terms(nearest, frac))
             for step in _STEPS:
                 exact = self._estimates[k].ideal[name] * 2.0 ** (frac - step)
@@ -486,18 +485,6 @@ def _slope(row: Sequence[float], realization: str, section: Section, name: str, 
         for above, below in zip_longest(_product(changed_b, a), _product(b, changed_a), fillvalue=Fraction(0))
     ]
     return _filtered((1,), _floats(changed_a), _filtered(terms, _floats(a), others))
-
-
-def _with_fewer_digits(integer: int, exact: float) -> Iterator[int]:
-    """Yield integers near `exact`, above and below, with fewer signed digits than `integer`."""
-    least = len(signed_digits(integer))
-    for whole in (math.floor(exact), math.ceil(exact)):
-        digits = signed_digits(whole)[::-1]
-        for count in range(1, len(digits) + 1):
-            near = sum(sign << power for sign, power in digits[:count])
-            for other in (near, near + (1 << digits[count - 1][1]), near - (1 << digits[count - 1][1])):
-                if other and other != integer and len(signed_digits(other)) < least:
-                    yield other
 
 
 def _bits_below(error: float, share: float) -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 
-from sosmith.gen.realizations.registry import BEST_KEPT, REALIZATIONS
+from sosmith.gen.realizations.registry import BEST_KEPT, REALIZATIONS, realizations_for
 from sosmith.gen.word_lengths.objective import Objective
 from sosmith.gen.word_lengths.quantize import Plan, prove
 from sosmith.gen.word_lengths.quantized import Quantized
@@ -33,6 +33,8 @@ class Selection:
         The size to be made small.
     progress : callable
         Called with the name of each step.
+    fir : bool
+        Whether the filter is an FIR filter, which has other realizations than second-order sections.
     """
 
     def __init__(
@@ -41,7 +43,10 @@ class Selection:
         floor_of: Callable[[str], float],
         objective: Objective,
         progress: Progress,
+        *,
+        fir: bool = False,
     ) -> None:
+        self._realizations = realizations_for(fir=fir)
         self._plan_of = plan_of
         self._floor_of = floor_of
         self._objective = objective
@@ -85,16 +90,17 @@ class Selection:
         while promising := self._promising(floors, math.inf if best is None else best[0], failures):
             best = self._smallest(promising, best, accept, failures)
         if best is None:
-            with_best = "" if len(set(failures.values())) == 1 else f"with {BEST_KEPT}, "
+            best_kept = BEST_KEPT if BEST_KEPT in failures else next(iter(failures))
+            with_best = "" if len(set(failures.values())) == 1 else f"with {best_kept}, "
             raise ShortfallError(
-                f"none of the {len(failures)} realizations meets the specification: {with_best}{failures[BEST_KEPT]}"
+                f"none of the {len(failures)} realizations meets the specification: {with_best}{failures[best_kept]}"
             )
         return best[1], self._reason(best[1], {*failures} - unsuited, unsuited, [*floors])
 
     def _floors(self, failures: dict[str, str]) -> dict[str, float]:
         """Least sizes of all realizations, in the order of planning."""
         floors = {}
-        for name in REALIZATIONS:
+        for name in self._realizations:
             try:
                 floors[name] = self._floor_of(name)
             except ShortfallError as error:
@@ -142,13 +148,13 @@ class Selection:
         reason = f"{quantized.realization}: {why}, {self._objective.size_text(quantized.datapath)}"
         others = [
             ", ".join(f"{name} {round(self._known_size(name)):,}" for name in left),
-            f"{self._objective.beyond}: {', '.join(name for name in REALIZATIONS if name in dropped)}"
+            f"{self._objective.beyond}: {', '.join(name for name in self._realizations if name in dropped)}"
             if dropped
             else "",
-            f"{self._objective.unsuited}: {', '.join(name for name in REALIZATIONS if name in unsuited)}"
+            f"{self._objective.unsuited}: {', '.join(name for name in self._realizations if name in unsuited)}"
             if unsuited
             else "",
-            _falling_short([name for name in REALIZATIONS if name in short]),
+            _falling_short([name for name in self._realizations if name in short]),
         ]
         rest = "; ".join(other for other in others if other)
         return f"{reason} ({rest})" if rest else reason

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from graphlib import TopologicalSorter
 
 from sosmith.model.dataflow.graph import Graph, Node, Op
 
@@ -18,17 +19,21 @@ _BLOCK_BITS = 18
 
 
 def pipeline_depth(graph: Graph) -> int:
-    """Return the number of pipeline stages that `graph` takes, 1 to 3."""
+    """Return the number of pipeline stages that `graph` takes: 1 to 3 with a recursion."""
     return max(pipeline_stages(graph)) + 1
 
 
 def pipeline_stages(graph: Graph) -> list[int]:
-    """Return the pipeline stage of each node, 0 to 2.
+    """Return the pipeline stage of each node.
 
-    First comes what no recursion reaches. Then comes what depends on a recursion only through states that are at least
-    two samples old, which are known a clock before they are needed; and last the rest of the loop.
+    With a recursion, there are at most three. First comes what it does not reach. Then comes what depends on a
+    recursion only through states that are at least two samples old, which are known a clock before they are needed; and
+    last the rest of the loop. An FIR filter, which has states but no recursion, has as many as it takes to have one
+    product and one sum after the other in each, at most.
     """
     loop = _recursive(graph)
+    if not loop and graph.delays:
+        return _one_after_another(graph)
     late = _late(graph, loop)
     stages = [0] * len(graph.nodes)
     for part, whole in ((loop, _needed(graph, loop)), (late, loop)):
@@ -36,6 +41,24 @@ def pipeline_stages(graph: Graph) -> list[int]:
             for i in part:
                 stages[i] += 1
     return stages
+
+
+def _one_after_another(graph: Graph) -> list[int]:
+    """Return pipeline stages of nodes without a recursion, each as early as its operands are there.
+
+    A state belongs to the pipeline stage in which its next value is computed: it then holds the sample before that one.
+    """
+    there: dict[int, tuple[int, int]] = {}  # pipeline stage in which a value is there, and after what time in it
+    for index in TopologicalSorter({index: node.operands for index, node in enumerate(graph.nodes)}).static_order():
+        node = graph.nodes[index]
+        stage, time = max((there[i] for i in node.operands), default=(0, 0))
+        took = operation_time(graph, node)
+        if node.op is Op.DELAY:
+            time = 0
+        elif time and time + took > _MULTIPLICATION + ADDITION:
+            stage, time = stage + 1, 0
+        there[index] = stage, time + took
+    return [there[index][0] for index in range(len(graph.nodes))]
 
 
 def _needed(graph: Graph, nodes: set[int]) -> set[int]:

@@ -19,6 +19,9 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 
+_SECOND_ORDER = 6
+"""Numbers in a row of second-order sections."""
+
 
 def lfilter(numerator: npt.ArrayLike, denominator: npt.ArrayLike, values: npt.ArrayLike) -> Array:
     """Filter values by a rational transfer function, from rest.
@@ -45,15 +48,15 @@ def lfilter(numerator: npt.ArrayLike, denominator: npt.ArrayLike, values: npt.Ar
 
 
 def sosfilt(sections: npt.ArrayLike, values: npt.ArrayLike, states: Array | None = None) -> Array:
-    """Filter values by a cascade of second-order sections, from rest or from where it was left.
+    """Filter values by a cascade of sections, from rest or from where it was left.
 
     Parameters
     ----------
-    sections : array_like, shape (sections, 6)
-        b0, b1, b2, 1, a1, a2 of each.
+    sections : array_like, shape (sections, 2 * (order + 1))
+        b0, b1, b2, 1, a1, a2 of each second-order section; of an FIR filter, its taps and as many of 1, 0, 0, ...
     values : array_like, shape (samples,)
-    states : ndarray, shape (sections, 2), optional
-        Two values of each section, zero at rest; the last ones are left there.
+    states : ndarray, shape (sections, order), optional
+        Values of each section, zero at rest; the last ones are left there.
 
     Returns
     -------
@@ -66,8 +69,36 @@ def sosfilt(sections: npt.ArrayLike, values: npt.ArrayLike, states: Array | None
     """
     sos = np.array(sections, dtype=np.float64)
     filtered = np.array(values, dtype=np.float64)
+    if sos.shape[1] != _SECOND_ORDER:
+        return _taken_through(sos, filtered, states)
     _cascade()(sos, filtered[np.newaxis], (np.zeros((len(sos), 2)) if states is None else states)[np.newaxis])
     return filtered
+
+
+def dc_gain(sections: Array) -> float:
+    """Gain of a cascade of sections at zero frequency.
+
+    Examples
+    --------
+    >>> dc_gain(np.array([[1.0, 2.0, 1.0, 1.0, -0.5, 0.0]]))
+    8.0
+    """
+    taps = sections.shape[1] // 2
+    return float(np.prod(sections[:, :taps].sum(axis=1) / sections[:, taps:].sum(axis=1)))
+
+
+def _taken_through(sections: Array, values: Array, states: Array | None) -> Array:
+    """Filter values by a cascade of sections without poles, whose states are the latest values that each took."""
+    taps = sections.shape[1] // 2
+    if sections[:, taps + 1 :].any():
+        raise ValueError(f"sections of {taps} taps must have no poles")
+    for k, row in enumerate(sections):
+        past = np.zeros(taps - 1) if states is None else states[k]
+        known = np.concatenate([past, values])
+        values = np.convolve(known, row[:taps] / row[taps], "valid") if len(values) else values
+        if states is not None:
+            states[k] = known[len(known) - taps + 1 :]
+    return values
 
 
 @cache

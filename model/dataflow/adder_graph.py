@@ -35,6 +35,12 @@ from sosmith.model.dataflow.graph import Graph, Op
 _SEARCHED = 72
 """Bits times signed digits of a number up to which a power is split off at any place: bounds the time of the search."""
 
+_MANY = 8
+"""Multiples beyond which one that is there is tried only where it leaves another that is there: bounds the time too."""
+
+_COMPARED = 8
+"""Most constants that are compared for which is to be made next, those with the fewest signed digits."""
+
 _OPERAND_BITS = 16
 """Width of the operand for which adder bits are minimized; the choice hardly depends on it."""
 
@@ -101,7 +107,8 @@ def adder_graph(constants: tuple[int, ...]) -> tuple[Adder, ...]:
     wanted = {odd_part(constant)[0] for constant in constants} - {1}
     while wanted:
         search = _Search(levels)
-        candidates = [search.cheapest(number, _most_levels(number)) for number in sorted(wanted, key=_by_size)]
+        simplest = sorted(wanted, key=lambda number: (len(signed_digits(number)), _by_size(number)))[:_COMPARED]
+        candidates = [search.cheapest(number, _most_levels(number)) for number in sorted(simplest, key=_by_size)]
         for number, split in min(candidates, key=lambda candidate: candidate.bits).splits.items():
             levels[number] = 1 + max(levels[part] for part in split.parts)
             splits[number] = split
@@ -202,10 +209,11 @@ class _Search:
             low = sum(sign << power for sign, power in digits[:cut])
             yield from _signed((low, 0), odd_part(number - low))
         places = range(top + 1) if top * len(digits) <= _SEARCHED else ()
+        fewer = len(digits) if len(self._there) <= _MANY else 0
         for there in self._there:
             for term in ((sign * there, place) for place in places for sign in (1, -1)):
                 part = odd_part(number - (term[0] << term[1])) if number != term[0] << term[1] else (0, 0)
-                if part[0] in self._there or 0 < len(signed_digits(part[0])) < len(digits):
+                if part[0] in self._there or 0 < len(signed_digits(part[0])) < fewer:
                     yield from _signed(term, part)
 
 

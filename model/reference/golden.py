@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sosmith.model.arithmetic.recursive_filters import sosfilt
+from sosmith.model.arithmetic.recursive_filters import dc_gain, sosfilt
 from sosmith.model.arrays import Codes, Values
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.polynomial import Polynomial
@@ -112,8 +112,8 @@ class Filtering:
 
     Parameters
     ----------
-    sos : float array, shape (sections, 6), or None
-        Second-order sections of the ideal filter; None for no filter.
+    sos : float array, shape (sections, 2 * (order + 1)), or None
+        Sections of the ideal filter, as for `sosfilt`; None for no filter.
     output : Port
         Output port, whose range limits the result.
     steady : bool
@@ -123,7 +123,7 @@ class Filtering:
     def __init__(self, sos: Values | None, output: Port, *, steady: bool = False) -> None:
         self._sos, self._steady = sos, steady
         self._range = output.decode(np.array([output.lowest, output.highest]))
-        self._states = None if sos is None else np.zeros((len(sos), 2))
+        self._states = None if sos is None else np.zeros((len(sos), sos.shape[1] // 2 - 1))
         self._first: float | None = None
 
     def __call__(self, values: Values) -> Values:
@@ -133,5 +133,5 @@ class Filtering:
             self._first = values[0] if self._steady and sos is not None and len(values) else 0.0
         result = values if sos is None else sosfilt(sos, values - self._first, self._states)
         if sos is not None and self._first:
-            result = result + np.prod(sos[:, :3].sum(axis=1) / sos[:, 3:].sum(axis=1)) * self._first
+            result = result + dc_gain(sos) * self._first
         return np.clip(result, *self._range)

@@ -298,7 +298,8 @@ def is_a_period(step: Values, period: float, digit: float) -> npt.NDArray[np.boo
     # Instants that were rounded or cut to a digit are whole numbers of it apart, next below or next above a period.
     ratio = period / digit
     rounded = (step > (np.floor(ratio) - 0.5) * digit) & (step < (np.ceil(ratio) + 0.5) * digit)
-    return np.logical_or(near, rounded)
+    near |= rounded
+    return near
 
 
 def last_digit(time: Values) -> float:

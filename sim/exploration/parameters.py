@@ -12,7 +12,7 @@ from typing import Any
 
 from sosmith.gen.architectures.blocks import NO_LIMIT
 from sosmith.gen.architectures.registry import candidates
-from sosmith.gen.realizations.registry import REALIZATIONS
+from sosmith.gen.realizations.registry import realizations_for
 from sosmith.gen.specification.choices import AUTO
 from sosmith.gen.specification.combinations import asked_by
 from sosmith.gen.specification.specification import Specification
@@ -47,7 +47,7 @@ def default_parameters(spec: Specification) -> dict[str, Values]:
     allowed, looks_ahead = spec.max_error, spec.hardware.pipeline == "look-ahead"
     parameters: dict[str, Values] = {}
     if not looks_ahead:
-        parameters["hardware.realization"] = list(REALIZATIONS)
+        parameters["hardware.realization"] = list(realizations_for(fir=spec.filter.is_fir))
         fastest_first = [kind.terms.name for kind in reversed(candidates(AUTO, NO_LIMIT, asked_by(spec)))]
         if len(fastest_first) > 1:
             parameters["hardware.architecture"] = fastest_first

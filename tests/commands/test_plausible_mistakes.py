@@ -148,8 +148,7 @@ COMMANDS = [
     (["emulate", "good.toml", "tome"], "the scenario must be one of .* .did you mean tone.*"),
     (["import", "good.toml"], "Missing option '--sample-rate'."),
     (["import", "tone.wav", "--sample-rate", "48000"], "tone.wav: the filter must be .*, not a recording .*"),
-    (["import", "fir.txt", "--sample-rate", "48000"], "fir.txt: the filter must be .*, as of an FIR filter"),
-    (["import", "fir.mat", "--sample-rate", "48000"], "fir.mat: variables must be SOS, .*: an FIR filter is not .*"),
+    (["import", "other.mat", "--sample-rate", "48000"], "other.mat: variables must be SOS, .*, not only response"),
     (["import", "rew.txt", "--sample-rate", "48000"], "rew.txt: the filter .* Room EQ Wizard's .*: export .*"),
     (["import", "x.xlsx", "--sample-rate", "48000"], "x.xlsx: .*, not a spreadsheet: save it as CSV"),
 ]
@@ -189,9 +188,8 @@ def test_a_mistake_on_the_command_line(arguments: list[str], expected: str) -> N
     scipy.io.wavfile.write("cd.wav", 44100, np.zeros(10, np.int16))
     scipy.io.wavfile.write("stereo.wav", 48000, np.zeros((10, 2), np.int16))
     Path("x.xlsx").write_bytes(b"PK")
-    Path("fir.txt").write_text("0.1\n0.2\n0.4\n0.2\n0.1\n", encoding="utf-8")
     Path("rew.txt").write_text("Filter Settings file\n\nRoom EQ V5.20\nFilter  1: ON  PK  Fc 63 Hz\n", encoding="utf-8")
-    scipy.io.savemat("fir.mat", {"h": np.ones(5)})
+    scipy.io.savemat("other.mat", {"response": np.ones(5)})
     said = answer(*arguments)
     assert re.fullmatch(expected, said), said
 

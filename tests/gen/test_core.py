@@ -12,7 +12,7 @@ from tests.gen.designs import EXAMPLES
 
 from sosmith.gen import search
 from sosmith.gen.core import CoreDesign, design_core
-from sosmith.gen.realizations.registry import REALIZATIONS
+from sosmith.gen.realizations.registry import SECTIONS
 from sosmith.gen.specification.specification import Specification, from_tree, load
 from sosmith.gen.word_lengths.cost import cost_of
 from sosmith.gen.word_lengths.quantize import Plan, plan
@@ -40,7 +40,7 @@ def within(spec: Specification, beyond_half: Fraction) -> Specification:
 
 def test_the_cheapest_is_taken_and_the_rest_are_told(spec: Specification) -> None:
     made = design_core(spec)
-    areas = {name: cost_of(design_core(spec, realization=name).datapath).area for name in REALIZATIONS}
+    areas = {name: cost_of(design_core(spec, realization=name).datapath).area for name in SECTIONS}
     best = made.quantized.realization
     assert areas[best] == min(areas.values())
     found = re.fullmatch(
@@ -94,7 +94,7 @@ def test_programs_have_an_objective_of_their_own(spec: Specification, architectu
         clocks = program.serial_cycles if architecture == "serial" else len(program.instructions)
         return clocks, program.words, program.accumulator_bits
 
-    foldable = [name for name in REALIZATIONS if name not in {"normal", "lattice_wdf"}]
+    foldable = [name for name in SECTIONS if name not in {"normal", "lattice_wdf"}]
     lengths = {name: length(design_core(asked, realization=name)) for name in foldable}
     assert length(made) == min(lengths.values())
     clocks, words, bits = length(made)
@@ -122,7 +122,7 @@ def test_what_was_dropped_is_planned_if_nothing_else_suits(
 ) -> None:
     few = {"df1", "df1_ef1", "df1_ef2", "lattice_wdf"}
     fail(monkeypatch, dict.fromkeys(few, "it must fit, and does not"))
-    assert design_core(spec).quantized.realization in REALIZATIONS.keys() - few
+    assert design_core(spec).quantized.realization in SECTIONS.keys() - few
 
 
 def test_those_that_fall_short_are_told(spec: Specification) -> None:
@@ -130,9 +130,9 @@ def test_those_that_fall_short_are_told(spec: Specification) -> None:
 
 
 def test_the_only_one_that_is_left(spec: Specification, monkeypatch: pytest.MonkeyPatch) -> None:
-    fail(monkeypatch, {name: "it must fit, and does not" for name in REALIZATIONS if name != "delta"})
+    fail(monkeypatch, {name: "it must fit, and does not" for name in SECTIONS if name != "delta"})
     monkeypatch.setattr(search, "least_size", lambda ideal, name, objective: 0)
-    others = [name for name in REALIZATIONS if name != "delta"]
+    others = [name for name in SECTIONS if name != "delta"]
     reason = design_core(spec).reasons["realization"]
     assert re.fullmatch(
         r"delta: the only one proven, [0-9,]+ LUT4 with a multiplier block counted as 864 "
@@ -154,7 +154,7 @@ def fail(monkeypatch: pytest.MonkeyPatch, sentences: dict[str, str]) -> None:
 
 def test_none_for_one_reason(spec: Specification) -> None:
     sentence = (
-        f"none of the {len(REALIZATIONS)} realizations meets the specification: the filter's coefficients must keep "
+        f"none of the {len(SECTIONS)} realizations meets the specification: the filter's coefficients must keep "
         "their error below 5e-13 output LSB with 40 significant bits each, and do not: raise output.max_error, raise "
         "output.bits or decimate by 32 first, as the cutoff is 1/1000 of the sample rate"
     )
@@ -181,9 +181,9 @@ def test_a_realization_that_falls_short_is_told_which_one_does_not() -> None:
 
 
 def test_none_for_several_reasons(spec: Specification, monkeypatch: pytest.MonkeyPatch) -> None:
-    fail(monkeypatch, {name: f"the bound must hold for {name}, and does not" for name in REALIZATIONS})
+    fail(monkeypatch, {name: f"the bound must hold for {name}, and does not" for name in SECTIONS})
     sentence = (
-        f"none of the {len(REALIZATIONS)} realizations meets the specification: with df1_ef2, the bound must hold for "
+        f"none of the {len(SECTIONS)} realizations meets the specification: with df1_ef2, the bound must hold for "
         "df1_ef2, and does not"
     )
     with pytest.raises(ShortfallError, match=f"^{re.escape(sentence)}$"):

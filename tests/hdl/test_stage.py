@@ -7,12 +7,12 @@ from tests.gen.designs import ALL, example_design
 from tests.gen.word_lengths.filters import stimulus
 from tests.hdl.stage_bench import run
 
-from sosmith.gen.realizations.registry import REALIZATIONS
+from sosmith.gen.realizations.registry import SECTIONS
 from sosmith.hdl.stages import pipelined as stage_module
 
 
 @pytest.mark.sweep(5)
-@pytest.mark.parametrize("realization", list(REALIZATIONS))
+@pytest.mark.parametrize("realization", list(SECTIONS))
 @pytest.mark.parametrize("name", ALL)
 def test_stages_equal_their_graphs(name: str, realization: str) -> None:
     datapath = example_design(name, realization=realization).datapath

@@ -16,7 +16,7 @@ from tests.gen.designs import ALL, EXAMPLES, parallel_design
 
 from sosmith.gen.core import design_core
 from sosmith.gen.output.generate import generate
-from sosmith.gen.realizations.registry import REALIZATIONS
+from sosmith.gen.realizations.registry import SECTIONS
 from sosmith.gen.report.evidence import Evidence
 from sosmith.gen.report.report import summarise
 from sosmith.gen.specification.specification import load
@@ -107,7 +107,7 @@ def test_worst_cases_stay_within_the_proof(example: str, run_of: Callable[[str, 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("realization", REALIZATIONS)
+@pytest.mark.parametrize("realization", SECTIONS)
 @pytest.mark.parametrize("example", ALL)
 def test_worst_cases_in_every_realization(example: str, realization: str, tmp_path: Path) -> None:
     """Two rounds, the second from where the first has left the states."""

@@ -55,9 +55,9 @@ _Section = tuple[tuple[Fraction, ...], tuple[Fraction, ...]]
 
 
 def _rounded_rows(rows: Sequence[Sequence[Fraction]]) -> list[_Section]:
-    bits = _SPARE_BITS + sum(_spread(_shortened(row[3:])[1:]) for row in rows)
+    bits = _SPARE_BITS + sum(_spread(_shortened(row[len(row) // 2 :])[1:]) for row in rows)
     nearest = [[Fraction(round(value * 2**bits), 2**bits) for value in row] for row in rows]
-    return [(_shortened(row[:3]), _shortened(row[3:])) for row in nearest]
+    return [(_shortened(row[: len(row) // 2]), _shortened(row[len(row) // 2 :])) for row in nearest]
 
 
 def _derived(stated: StatedFilter) -> list[_Section]:

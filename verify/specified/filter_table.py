@@ -10,6 +10,8 @@ from fractions import Fraction
 from sosmith.model.errors import SpecificationError
 
 _FAMILIES = ("butterworth", "chebyshev1", "chebyshev2", "elliptic", "bessel")
+FIR_FAMILIES = ("equiripple", "least_squares", "kaiser", "halfband")
+"""Families of FIR filters, of which edges and losses do not state all digits."""
 _KINDS = ("lowpass", "highpass", "bandpass", "bandstop")
 _METHODS = ("bilinear", "impulse_invariant")
 _LABELS = ("family", "kind", "method")
@@ -35,7 +37,7 @@ class FilterTable:
     losses : mapping of str to Fraction
         "passband_loss" and "stopband_loss" in dB, above 0, as far as they are stated.
     rows : tuple of tuples of Fraction
-        Sections (b0, b1, b2, 1, a1, a2), or empty.
+        Sections (b0, b1, b2, 1, a1, a2), or one of an FIR filter: its taps, and as many of 1, 0, 0, ...; or empty.
     """
 
     family: str = ""
@@ -47,6 +49,11 @@ class FilterTable:
     stopband_edge: tuple[Fraction, ...] = ()
     losses: Mapping[str, Fraction] = field(default_factory=dict)
     rows: tuple[tuple[Fraction, ...], ...] = ()
+
+    @property
+    def is_fir(self) -> bool:
+        """Whether edges and losses state no single filter, but what an FIR filter must keep to."""
+        return self.family in FIR_FAMILIES
 
     @property
     def max_order(self) -> int:
@@ -61,7 +68,7 @@ def read_filter_table(table: Mapping[str, object], sample_rate: Fraction) -> Fil
     ----------
     table : mapping
         Keys as in the file. Numbers are int, Fraction or Decimal, frequencies one number or a list of two, `sos` a
-        list of rows.
+        list of rows, `taps` one of numbers.
     sample_rate : Fraction
         In Hz, above 0.
 
@@ -76,12 +83,19 @@ def read_filter_table(table: Mapping[str, object], sample_rate: Fraction) -> Fil
     >>> read_filter_table(stated, Fraction(100)).cutoff
     (Fraction(3, 1000),)
     """
+    if "taps" in table:
+        _require_only(table, ("taps",), "with taps")
+        return FilterTable(rows=(_taps(table["taps"]),))
     if "sos" in table:
         _require_only(table, (*_LABELS, "sos"), "with sos")
         return FilterTable(rows=_rows(table["sos"]))
-    family, kind = _word(table, "family", _FAMILIES), _word(table, "kind", _KINDS)
+    family, kind = _word(table, "family", (*_FAMILIES, *FIR_FAMILIES)), _word(table, "kind", _KINDS)
     method = _word({"method": _METHODS[0], **table}, "method", _METHODS)
-    if "order" in table or "cutoff" in table:
+    by_order = "order" in table or "cutoff" in table
+    if family in FIR_FAMILIES:
+        _require(not by_order, "family", "another one with order and cutoff", family)
+        _require("method" not in table, "method", f"left out for {family}", method)
+    if by_order:
         ripples = _RIPPLES.get(family, ())
         _require_only(table, (*_LABELS, "order", "cutoff", *ripples), f"with order and cutoff for {family}")
         read = FilterTable(
@@ -191,6 +205,14 @@ def _check_sides(kind: str, passband: tuple[Fraction, ...], stopband: tuple[Frac
         "bandstop": ("around", low_pass < low_stop and high_stop < high_pass),
     }[kind]
     _require(holds, "passband_edge", f"{relation} stopband_edge for {kind}", "elsewhere")
+
+
+def _taps(value: object) -> tuple[Fraction, ...]:
+    """Read taps, as the row of a section without poles."""
+    if not isinstance(value, list | tuple) or not value:
+        raise SpecificationError("filter.taps must be a list of numbers, not another value")
+    taps = tuple(_number(number, f"taps[{k}]") for k, number in enumerate(value))
+    return (*taps, Fraction(1), *[Fraction(0)] * (len(taps) - 1))
 
 
 def _rows(value: object) -> tuple[tuple[Fraction, ...], ...]:

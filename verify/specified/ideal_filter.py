@@ -185,8 +185,8 @@ def _moved_inwards(passband: Sequence[arb], stopband: Sequence[arb]) -> list[arb
 def _product(rows: Sequence[Sequence[Fraction]]) -> TransferFunction:
     one = arb_poly([1])
     return TransferFunction(
-        prod((arb_poly([ball(b) for b in row[:3]]) for row in rows), start=one),
-        prod((arb_poly([ball(a) for a in row[3:]]) for row in rows), start=one),
+        prod((arb_poly([ball(b) for b in row[: len(row) // 2]]) for row in rows), start=one),
+        prod((arb_poly([ball(a) for a in row[len(row) // 2 :]]) for row in rows), start=one),
     )
 
 

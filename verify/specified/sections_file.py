@@ -1,4 +1,6 @@
-"""Reads the file that `filter.sos_file` names, by code of its own: rows of six numbers, with MATLAB's scale values.
+"""Reads the file that `filter.sos_file` or `filter.taps_file` names, by code of its own.
+
+Sections are rows of six numbers, with MATLAB's scale values; taps are one row or one column.
 
 Only files whose meaning is beyond doubt: ``.npy``, ``.mat`` with SOS, and text with six columns. The signs of a1 and a2
 are scipy's, or both negated if only that is stable.
@@ -34,16 +36,7 @@ def sections_in(path: Path) -> tuple[tuple[Fraction, ...], ...]:
     RejectedError
         If the file cannot be read, or is of a kind that this module does not read.
     """
-    try:
-        if path.stat().st_size > _MAX_BYTES:
-            raise RejectedError(f"filter.sos_file must be at most {_MAX_BYTES} bytes, not longer")
-        rows, scale = _content(path.suffix.lower(), read_given(path, _MAX_BYTES))
-    except RejectedError:
-        raise
-    except Exception as error:  # whatever a damaged file makes of its reader
-        raise RejectedError(
-            f"filter.sos_file must be a file of sections that can be read, not: {type(error).__name__}"
-        ) from None
+    rows, scale = _read(path, "sos_file", "sections")
     if (
         not rows
         or any(len(row) != 6 or not row[3] for row in rows)
@@ -60,6 +53,36 @@ def sections_in(path: Path) -> tuple[tuple[Fraction, ...], ...]:
     if not _stable(sections):
         sections = [[*row[:4], -row[4], -row[5]] for row in sections]
     return tuple(map(tuple, sections))
+
+
+def taps_in(path: Path) -> tuple[Fraction, ...]:
+    """Return the taps in a file: one row or one column of numbers.
+
+    Raises
+    ------
+    RejectedError
+        As `sections_in`.
+    """
+    rows, scale = _read(path, "taps_file", "taps")
+    if scale or not rows or (len(rows) > 1 and any(len(row) != 1 for row in rows)):
+        raise RejectedError(
+            "filter.taps_file must have one row or one column of numbers to be compared, not another format: "
+            "`sosmith import` writes its taps into the specification"
+        )
+    return tuple(value for row in rows for value in row)
+
+
+def _read(path: Path, key: str, what: str) -> tuple[_Rows, list[Fraction]]:
+    try:
+        if path.stat().st_size > _MAX_BYTES:
+            raise RejectedError(f"filter.{key} must be at most {_MAX_BYTES} bytes, not longer")
+        return _content(path.suffix.lower(), read_given(path, _MAX_BYTES))
+    except RejectedError:
+        raise
+    except Exception as error:  # whatever a damaged file makes of its reader
+        raise RejectedError(
+            f"filter.{key} must be a file of {what} that can be read, not: {type(error).__name__}"
+        ) from None
 
 
 def _content(suffix: str, content: bytes) -> tuple[_Rows, list[Fraction]]:

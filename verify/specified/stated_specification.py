@@ -21,8 +21,10 @@ from sosmith.verify.certificate_file import Certificate, PortEntry, SectionEntry
 from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.specified.exact_form import exact_sections
 from sosmith.verify.specified.filter_distance import distance
+from sosmith.verify.specified.filter_table import FilterTable
+from sosmith.verify.specified.fir_mask import keeps_to_losses
 from sosmith.verify.specified.ideal_filter import stated_filter
-from sosmith.verify.specified.sections_file import sections_in
+from sosmith.verify.specified.sections_file import sections_in, taps_in
 from sosmith.verify.specified.words import words_of
 
 _CALIBRATED = {"voltage": "V", "temperature": "degC"}
@@ -47,6 +49,8 @@ class Agreement:
         Whether the calibration is fitted to measurements: its coefficients are then not in the specification.
     measurements : int
         Number of measurements that it was fitted to again; 0 if it was not.
+    by_losses : bool
+        Whether the filter is an FIR filter that was shown to keep to its edges and losses, which state no digits of it.
     not_compared : tuple of str
         Keys of the specification that nothing was held against, in its order.
     """
@@ -55,6 +59,7 @@ class Agreement:
     distance: Fraction | None
     fitted: bool
     measurements: int = 0
+    by_losses: bool = False
     not_compared: tuple[str, ...] = ()
 
 
@@ -115,10 +120,16 @@ def _checked(certificate: Certificate, tree: Mapping[str, Any], margin: Fraction
         _equal("the start of the filter", certificate.ideal.start or "zero", stated)
         flagged = certificate.claims.settling is not None
         _equal("whether samples are flagged until the filter has settled", flagged, stated == "zero")
-    return Agreement(core, _filter_distance(certificate, tree, margin, folder) if sections else None, fitted)
+    if not sections:
+        return Agreement(core, None, fitted)
+    apart = _filter_distance(certificate, tree, margin, folder)
+    return Agreement(core, apart or Fraction(0), fitted, by_losses=apart is None)
 
 
-def _filter_distance(certificate: Certificate, tree: Mapping[str, Any], margin: Fraction, folder: Path) -> Fraction:
+def _filter_distance(
+    certificate: Certificate, tree: Mapping[str, Any], margin: Fraction, folder: Path
+) -> Fraction | None:
+    """Return how far the filter is from the specified one; None if it has to keep to losses only, and does."""
     table, rate = dict(tree["filter"]), _number(tree["sample_rate"])
     decimates, entry = table.pop("decimate", None), certificate.decimation
     table.pop("hold", None)  # how often a result leaves, which changes none
@@ -130,8 +141,13 @@ def _filter_distance(certificate: Certificate, tree: Mapping[str, Any], margin: 
         rate, correction = rate / entry.factor, entry.correction
     if "sos_file" in table:
         table["sos"] = sections_in(folder / table.pop("sos_file"))
+    if "taps_file" in table:
+        table["taps"] = taps_in(folder / table.pop("taps_file"))
     try:
         wanted = stated_filter(table, rate, correction)
+        if wanted.table.is_fir:
+            _check_losses(certificate.ideal.sections, wanted.table)
+            return None
         apart = distance(wanted, certificate.ideal.sections)
         exact = exact_sections(wanted)
     except UndecidedError as error:
@@ -143,6 +159,14 @@ def _filter_distance(certificate: Certificate, tree: Mapping[str, Any], margin: 
     )
     _check_digits(certificate.ideal.sections, exact)
     return apart
+
+
+def _check_losses(proven: Sequence[SectionEntry], table: FilterTable) -> None:
+    """Check that a filter is an FIR filter that keeps to edges and losses."""
+    require(
+        len(proven) == 1 and len(proven[0].denominator) == 1 and keeps_to_losses(proven[0].numerator, table),
+        "the filter must keep to the edges and losses of the specification with symmetric taps",
+    )
 
 
 def _check_digits(proven: Sequence[SectionEntry], exact: Sequence[SectionEntry]) -> None:

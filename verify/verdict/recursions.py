@@ -7,13 +7,15 @@ A realization's name is a claim about the graphs. It is decided here by what the
 - df2t, delta: the output is the first state and what the input adds; the second state feeds the first, and is itself
   fed by the second (delta) or not (df2t);
 - state_space, normal: any others, with input weights that are powers of two; normal if states are truncated;
+- fir_direct, fir_symmetric, fir_transposed: no state is in a loop. The states hold earlier inputs, and a product takes
+  one of them or several; or each product takes the new input;
 - lattice_wdf: outputs of allpass functions, which the last section, without a past, adds up.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -171,6 +173,8 @@ def _is(name: str, part: Recursion) -> bool:
     if name in _FEEDBACK and part.loop:
         most, weights = _FEEDBACK[name], part.error_feedback or (0, 0)
         return part.is_direct and all(abs(weight) <= limit for weight, limit in zip(weights, most, strict=True))
+    if name in _FIR:
+        return not part.loop and part.is_single and _FIR[name](part)
     if not part.loop and part.is_single:
         return name in _NAMES
     if part.is_direct or len(part.loop) > 2 or not part.is_single:
@@ -179,6 +183,36 @@ def _is(name: str, part: Recursion) -> bool:
     if name in {"df2t", "delta"}:
         return not truncates and _is_transposed(part, delta=name == "delta")
     return name == ("normal" if truncates else "state_space") and _has_plain_inputs(part)
+
+
+def _is_direct_fir(part: Recursion) -> bool:
+    """Whether each product takes one input, new or earlier."""
+    nodes = part.stage.nodes
+    return all(
+        nodes[part.transfer.undelayed(node.operands[0])[0]].op is Operation.INPUT
+        for node in nodes
+        if node.op is Operation.SCALE
+    ) and _has_delay_line(part)
+
+
+def _has_delay_line(part: Recursion) -> bool:
+    """Whether all states hold earlier inputs."""
+    transfer = part.transfer
+    return all(part.stage.nodes[transfer.undelayed(state)[0]].op is Operation.INPUT for state in transfer.states)
+
+
+def _takes_new_input(part: Recursion) -> bool:
+    """Whether each product takes the new input."""
+    nodes = part.stage.nodes
+    return all(nodes[node.operands[0]].op is Operation.INPUT for node in nodes if node.op is Operation.SCALE)
+
+
+_FIR: dict[str, Callable[[Recursion], bool]] = {
+    "fir_direct": _is_direct_fir,
+    "fir_symmetric": _has_delay_line,
+    "fir_transposed": _takes_new_input,
+}
+"""What is true of the structure of each FIR filter."""
 
 
 def _is_transposed(part: Recursion, *, delta: bool) -> bool:

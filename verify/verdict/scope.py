@@ -91,7 +91,8 @@ def _specified(
         asked = core in {"instrument", "filter"}
         filter_ = Part(State.NOT_READ, "the certificate is that of a core without the filter", asked=asked)
     else:
-        filter_ = Part(state, f"it is the one of the specification's words{unstated}")
+        stated = "it keeps to the edges and losses of" if agreement.by_losses else "it is the one of"
+        filter_ = Part(state, f"{stated} the specification's words{unstated}")
     if certificate.ideal.polynomial is None:
         asked = core in {"instrument", "calibration"}
         calibration = Part(State.NOT_READ, "the certificate is that of a core without a calibration", asked=asked)

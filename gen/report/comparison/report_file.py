@@ -166,7 +166,7 @@ def _wrong_curves(content: Any) -> str:
         rows = filter_.get(name)
         if not isinstance(rows, list) or not 1 <= len(rows) <= _SECTIONS:
             return f"with {shortened(rows)} as curves.filter.{name}"
-        if not all(_drawable(row) and len(row) == 6 for row in rows):
+        if not all(_drawable(row) and len(row) >= 6 and len(row) % 2 == 0 and len(row) == len(rows[0]) for row in rows):
             return f"with {shortened(rows)} as curves.filter.{name}"
     return ""
 

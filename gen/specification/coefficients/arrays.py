@@ -138,25 +138,29 @@ def _matlab(path: Path) -> Content:
         return _numerator_and_denominator(path, variables[names["b"]], variables[names["a"]])
     if "ba" in names:
         return of_rows(path, _matrix(path, variables[names["ba"]]), kind=f"{names['ba']} in a MAT file")
+    taps = next((names[name] for name in _TAPS if name in names), None)
+    if taps is not None:
+        return _numerator_and_denominator(path, variables[taps], np.ones((1, 1)), f"{taps} in a MAT file")
     raise SpecificationError(
-        f"{path}: variables must be SOS, with or without G, or b and a, or z, p and k, not only "
-        f"{', '.join(variables) or 'none'}{_FIR if 'h' in names or 'num' in names or 'b' in names else ''}"
+        f"{path}: variables must be SOS, with or without G, b and a, z, p and k, or Num, h or b alone, not only "
+        f"{', '.join(variables) or 'none'}"
     )
 
 
-_FIR = ": an FIR filter is not read, as cores are made of second-order sections"
+_TAPS = ("num", "h", "b")
+"""Names of the taps of an FIR filter, without regard to case; the filter designer has the first."""
 
 
-def _numerator_and_denominator(path: Path, b: np.ndarray[Any, Any], a: np.ndarray[Any, Any]) -> TransferFunction:
+def _numerator_and_denominator(
+    path: Path, b: np.ndarray[Any, Any], a: np.ndarray[Any, Any], what: str = "b and a in a MAT file"
+) -> TransferFunction:
     """Read a transfer function; the coefficients are divided by a0."""
     upper, lower = ([value for row in _matrix(path, array) for value in row] for array in (b, a))
     if not lower[0]:
         raise SpecificationError(f"{path}: a must begin with a number other than 0, not 0")
-    if not any(lower[1:]):
-        raise SpecificationError(f"{path}: a must be the denominator of an IIR filter, not only its first one{_FIR}")
     longest = max(len(upper), len(lower))
     rows = [[value / lower[0] for value in side] + [Fraction(0)] * (longest - len(side)) for side in (upper, lower)]
-    return TransferFunction(format="b and a in a MAT file", numerator=tuple(rows[0]), denominator=tuple(rows[1]))
+    return TransferFunction(format=what, numerator=tuple(rows[0]), denominator=tuple(rows[1]))
 
 
 def _zeros_poles_gain(path: Path, *arrays: np.ndarray[Any, Any]) -> ZerosAndPoles:

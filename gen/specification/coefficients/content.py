@@ -49,6 +49,14 @@ class TransferFunction:
     numerator: tuple[Fraction, ...]
     denominator: tuple[Fraction, ...]
 
+    @property
+    def taps(self) -> tuple[Fraction, ...] | None:
+        """The coefficients of an FIR filter; None of a filter with poles."""
+        first, *others = self.denominator
+        if any(others) or not first:
+            return None
+        return tuple(value / first for value in self.numerator)
+
 
 @dataclass(frozen=True, kw_only=True)
 class ZerosAndPoles:

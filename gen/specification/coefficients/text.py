@@ -2,12 +2,14 @@
 
 The formats, and what tells them apart:
 
-- MATLAB's filter designer and ``fcfwrite``: a line ``SOS Matrix:`` and one ``Scale Values:``, comments behind ``%``.
+- MATLAB's filter designer and ``fcfwrite``: a line ``SOS Matrix:`` and one ``Scale Values:``, or a line ``Numerator:``
+  and the taps of an FIR filter, comments behind ``%``.
 - Room EQ Wizard and miniDSP: ``biquad1,`` and then ``b0=``, ``b1=``, ``b2=``, ``a1=``, ``a2=``. Both write a1 and a2
   with the sign they have on the right-hand side of the recursion: negated.
 - Tables with six columns b0, b1, b2, a0, a1, a2, as pyfda's ``.sos`` and ``numpy.savetxt`` write them; with five
   columns, without a0, as for CMSIS-DSP, whose a1 and a2 are negated.
 - Tables with the numerator and the denominator of a transfer function, as two rows or as two columns: pyfda's CSV.
+- One column, or one row of other lengths than 5 and 6: the taps of an FIR filter.
 
 Every number is read as the decimal number that it is.
 """
@@ -33,6 +35,9 @@ _ENTRY = re.compile(r"\s*([ab]\d)\s*=\s*([^\s,;]+)\s*[,;]?\s*", re.IGNORECASE)
 _HEADER = re.compile(r"biquad\s*\d+\s*,?", re.IGNORECASE)
 _KEYS = ("b0", "b1", "b2", "a1", "a2")
 
+_DESIGNER = "exported text of MATLAB's filter designer"
+_NUMERATOR = "numerator:"
+
 _Numbers = tuple[Fraction, ...]
 
 
@@ -50,6 +55,8 @@ def read_text_file(path: Path) -> Content:
         return _designer(path, lines)
     if any(_HEADER.fullmatch(line.strip()) for line in lines):
         return _biquads(path, lines)
+    if any(line.strip().lower() == _NUMERATOR for line in lines):
+        return _numerator(path, lines)
     slip = next((cure for start, cure in _OTHERS.items() if any(line.strip().startswith(start) for line in lines)), "")
     if slip:
         raise SpecificationError(f"{path}: the filter must be given by coefficients, not {slip}")
@@ -60,10 +67,18 @@ _OTHERS = {
     "Filter Settings file": "as Room EQ Wizard's list of Fc, Gain and Q: export the filters as biquad coefficients",
     "Preamp:": "as Equalizer APO's list of Fc, Gain and Q: export the filters as biquad coefficients",
     "Filter 1: ON": "as a list of Fc, Gain and Q: export the filters as biquad coefficients",
-    "Discrete-Time FIR Filter": "as an FIR filter: cores are made of second-order sections, from an IIR filter",
-    "% Discrete-Time FIR Filter": "as an FIR filter: cores are made of second-order sections, from an IIR filter",
 }
 """Files of other tools by how a line begins, and what they are."""
+
+
+def _numerator(path: Path, lines: Sequence[str]) -> TransferFunction:
+    """Read an FIR filter that MATLAB's filter designer exports."""
+    start = next((at for at, line in enumerate(lines) if line.strip().lower() == _NUMERATOR), len(lines)) + 1
+    cells = [(at, line.split("%")[0].split()) for at, line in enumerate(lines[start:], start + 1)]
+    taps = tuple(value for at, row in cells for value in _numbers(path, at, row))
+    if not taps:
+        raise SpecificationError(f"{path}: Numerator must have at least one number, not none")
+    return TransferFunction(format=_DESIGNER, numerator=taps, denominator=(Fraction(1),))
 
 
 def _designer(path: Path, lines: Sequence[str]) -> StatedSections:
@@ -86,7 +101,7 @@ def _designer(path: Path, lines: Sequence[str]) -> StatedSections:
                 raise _unfit(path, at, "a row of 6 numbers", line)
     if not rows:
         raise SpecificationError(f"{path}: SOS Matrix must have at least one row, not none")
-    return StatedSections(format="exported text of MATLAB's filter designer", rows=tuple(rows), gains=tuple(gains))
+    return StatedSections(format=_DESIGNER, rows=tuple(rows), gains=tuple(gains))
 
 
 def _biquads(path: Path, lines: Sequence[str]) -> StatedSections:
@@ -148,14 +163,12 @@ def of_rows(path: Path, rows: Sequence[_Numbers], *, kind: str) -> Content:
     if width == 2 and len(rows) > 1 and rows[0][1] == 1:
         b, a = (tuple(row[k] for row in rows) for k in (0, 1))
         return TransferFunction(format=f"{kind} of b and a", numerator=b, denominator=a)
-    if width == 1 or (len(rows) == 1 and width > 6):
-        raise SpecificationError(
-            f"{path}: the filter must be an IIR filter, rows of b0, b1, b2, a0, a1, a2 or b and a, not {len(rows)} x "
-            f"{width} numbers, as of an FIR filter"
-        )
+    if width == 1 or len(rows) == 1:
+        taps = tuple(value for row in rows for value in row)
+        return TransferFunction(format=f"{kind} of taps", numerator=taps, denominator=(Fraction(1),))
     raise SpecificationError(
-        f"{path}: the filter must be rows of b0, b1, b2, a0, a1, a2, the same without a0, or b and a with a0 = 1, "
-        f"not {len(rows)} x {width} numbers"
+        f"{path}: the filter must be rows of b0, b1, b2, a0, a1, a2, the same without a0, b and a with a0 = 1, or one "
+        f"row or column of taps, not {len(rows)} x {width} numbers"
     )
 
 

@@ -55,7 +55,8 @@ def import_command(
 
     FILE is recognized by its content: sos arrays of NumPy (.npy, .npz), MATLAB's SOS and G (.mat) and the exported text
     of its filter designer, pyfda's .sos, .csv, .npz and .json, CMSIS-DSP's five columns, biquad lists as from Room EQ
-    Wizard and miniDSP, or an analog prototype (.toml) with zeros, poles and gain in rad/s.
+    Wizard and miniDSP, an analog prototype (.toml) with zeros, poles and gain in rad/s, or the taps of an FIR filter in
+    one row or column.
 
     Says on stderr how the file was read: tools disagree on the signs of a1 and a2. Of the two choices, the stable one
     is taken, and its gains at 0 Hz and at half the sample rate are shown.

@@ -129,7 +129,8 @@ class Proof(View):
             if agreement is None
             else {
                 "core": agreement.core,
-                "filter_distance": None if distance is None else float(distance),
+                "filter_distance": None if distance is None or agreement.by_losses else float(distance),
+                "filter_by_losses": agreement.by_losses,
                 "calibration_from_measurements": agreement.fitted,
                 "not_compared": list(agreement.not_compared),
             },

@@ -8,13 +8,13 @@ from decimal import Context, Decimal
 from fractions import Fraction
 from os import PathLike, fspath
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 import numpy as np
 import numpy.typing as npt
 
 from sosmith.gen.filter.factoring import factored
-from sosmith.gen.specification.coefficients.content import Row, StatedSections
+from sosmith.gen.specification.coefficients.content import Row, StatedSections, TransferFunction
 from sosmith.gen.specification.coefficients.filter_file import read_filter_file
 from sosmith.gen.specification.coefficients.signs import sentence, settled
 from sosmith.interface.specification import Specification
@@ -26,16 +26,19 @@ _DIGITS = 60
 
 @dataclass(frozen=True)
 class Coefficients:
-    r"""Stable second-order sections read from a file; make one with `load`.
+    r"""Stable second-order sections, or the taps of an FIR filter, read from a file; make one with `load`.
 
     Attributes
     ----------
     rows : tuple of tuples of Fraction
-        (b0, b1, b2, 1, a1, a2), exact, in scipy's convention: the denominator is ``1 + a1/z + a2/z**2``.
+        (b0, b1, b2, 1, a1, a2), exact, in scipy's convention: the denominator is ``1 + a1/z + a2/z**2``. None of an
+        FIR filter.
     notes : tuple of str
         How the file was read: its format, the signs of a1 and a2 and why, and the deviation where roots were found.
     sample_rate : Fraction or None
         In Hz, if it was given.
+    taps : tuple of Fraction
+        Of an FIR filter, exact; empty for sections.
 
     Examples
     --------
@@ -56,6 +59,7 @@ class Coefficients:
     rows: tuple[Row, ...]
     notes: tuple[str, ...]
     sample_rate: Fraction | None = None
+    taps: tuple[Fraction, ...] = ()
 
     @classmethod
     def load(
@@ -94,6 +98,8 @@ class Coefficients:
             if isinstance(content, StatedSections):
                 sections = settled(content, asked)
                 return cls(sections.rows, (sentence(content, sections),), rate)
+            if isinstance(content, TransferFunction) and content.taps is not None:
+                return cls((), (f"{len(content.taps)} taps from {content.format}",), rate, content.taps)
             factorization = factored(content, rate)
             exact = tuple(tuple(Fraction(value) for value in row) for row in factorization.rows)
             sections = settled(StatedSections(format=content.format, rows=exact), "scipy")
@@ -117,14 +123,14 @@ class Coefficients:
         return np.array([[float(value) for value in row] for row in self.rows], dtype=np.float64)
 
     def specification(self, **keys: Any) -> Specification:
-        """Specify hardware for these sections.
+        """Specify hardware for these sections or taps.
 
         Coefficients are stated exactly, up to 60 decimal digits.
 
         Parameters
         ----------
         **keys
-            As for `Specification.from_sos`; `sample_rate` only if it was not given to `load`.
+            As for `Specification.from_sos` and `Specification.from_taps`; `sample_rate` only if `load` was given none.
 
         Raises
         ------
@@ -135,12 +141,17 @@ class Coefficients:
             keys = {"sample_rate": float(self.sample_rate)} | keys
         if "sample_rate" not in keys:
             raise SpecificationError("sample_rate must be given in Hz, not left out")
+        if self.taps:
+            return Specification.from_taps(cast("Any", [_decimal(value) for value in self.taps]), **keys)
         sos: Any = [[_decimal(value) for value in row] for row in self.rows]
         return Specification.from_sos(sos, **keys)
 
     @property
     def gains(self) -> tuple[float, float]:
         """Gain at 0 Hz and at half the sample rate, with sign; infinite if beyond doubles."""
+        if self.taps:
+            even, odd = (sum(self.taps[k::2], Fraction(0)) for k in (0, 1))
+            return _double(even + odd), _double(even - odd)
         at_zero, at_half = Fraction(1), Fraction(1)
         for b0, b1, b2, _, a1, a2 in self.rows:
             at_zero *= (b0 + b1 + b2) / (1 + a1 + a2)

@@ -10,7 +10,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from sosmith.gen.facts.table import Table, View
-from sosmith.gen.specification.choices import ARCHITECTURES, FAMILIES, KINDS, LOSSES, METHODS, REALIZATIONS, STARTS
+from sosmith.gen.specification.choices import (
+    ARCHITECTURES,
+    FAMILIES,
+    FIR_FAMILIES,
+    KINDS,
+    LOSSES,
+    METHODS,
+    REALIZATIONS,
+    STARTS,
+)
 from sosmith.gen.specification.combinations import Combination, combinations
 from sosmith.gen.specification.exact_values import exact
 from sosmith.gen.specification.specification import Specification as Checked
@@ -201,6 +210,40 @@ class Specification(View):
         )
 
     @classmethod
+    def from_taps(
+        cls, taps: npt.ArrayLike, sample_rate: float, *, name: str = "fir_filter", **keys: Any
+    ) -> Specification:
+        """Specify hardware for an FIR filter with given taps, such as those from scipy.
+
+        Parameters
+        ----------
+        taps : array_like, shape (taps,)
+            1 to 256 coefficients of 1, 1/z, 1/z^2 and so on, not all 0, as returned by ``scipy.signal.remez``. Taps of
+            one magnitude share a multiplier, taps of 0 have none.
+        sample_rate : float
+            Samples per second of each channel, in Hz.
+        name : str
+            Name of the top module and of the files, a Verilog identifier.
+        **keys
+            The others of `from_sos`: `channels`, `input_bits`, `input_range`, `output_bits`, `output_range`, `unit`,
+            `max_error`, `realization`, `architecture`, `clock`.
+
+        Raises
+        ------
+        SpecificationError
+            If a value is invalid.
+
+        Examples
+        --------
+        >>> import sosmith
+        >>> spec = sosmith.Specification.from_taps([0.25, 0.5, 0.25], sample_rate=1000, name="mean")
+        >>> spec.as_dict()["filter"]
+        {'taps': [0.25, 0.5, 0.25]}
+        """
+        # The sections stand for the taps while everything else is checked.
+        return cls.from_sos([[1, 0, 0, 1, 0, 0]], sample_rate, name=name, **keys).replaced(filter={"taps": taps})
+
+    @classmethod
     def example(cls) -> Specification:
         """Return the built-in example, the flange wear of a locomotive, as written by `sosmith init`."""
         import tomllib
@@ -233,7 +276,7 @@ class Specification(View):
         ('lowpass', 'highpass', 'bandpass', 'bandstop')
         """
         return {
-            "filter.family": FAMILIES,
+            "filter.family": (*FAMILIES, *FIR_FAMILIES),
             "filter.kind": KINDS,
             "filter.method": METHODS,
             "hardware.realization": REALIZATIONS,
@@ -268,6 +311,20 @@ class Specification(View):
         (('passband_loss', 'stopband_loss'), ())
         """
         return LOSSES.get(family, ())
+
+    @property
+    def realizations(self) -> tuple[str, ...]:
+        """Names of the realizations that there are for a filter of this kind.
+
+        Examples
+        --------
+        >>> import sosmith
+        >>> sosmith.Specification.from_taps([0.5, 0.5], 1000).realizations
+        ('fir_direct', 'fir_symmetric', 'fir_transposed')
+        """
+        from sosmith.gen.realizations.registry import realizations_for
+
+        return tuple(realizations_for(fir=self.checked.filter.is_fir))
 
     @property
     def filter(self) -> Filter:

@@ -102,9 +102,8 @@ def prove(tell: Tell, *, text: str, path: str) -> dict[str, Any]:
 def side_by_side(tell: Tell, *, text: str, path: str) -> list[dict[str, Any]]:
     """Design every realization of a specification; each row is sent as a part as soon as it is there."""
     spec = _specification(text, path)
-    names = [name for name in Specification.choices()["hardware.realization"] if name != "auto"]
     rows = []
-    for name in names:
+    for name in spec.realizations:
         tell("step", name)
         try:
             design = sosmith.design(spec, realization=name)
@@ -201,7 +200,7 @@ def calibrate(tell: Tell, *, measurements: str) -> dict[str, Any]:
 def _specification(text: str, path: str) -> Specification:
     """Check a specification; files that it names must lie in its folder, as the text comes from a page."""
     folder = Path(path).parent.resolve()
-    for table, key in (("calibration", "data"), ("filter", "sos_file")):
+    for table, key in (("calibration", "data"), ("filter", "sos_file"), ("filter", "taps_file")):
         named = _tree(text).get(table)
         name = named.get(key) if isinstance(named, dict) else None
         if isinstance(name, str) and not (folder / name).resolve().is_relative_to(folder):

@@ -11,9 +11,9 @@ import pytest
 from tests.gen.designs import example_design
 from tests.gen.report.evidences import Page, evidence, page_of
 
+from sosmith.gen.realizations.registry import SECTIONS
 from sosmith.gen.report.diagram import diagram
 from sosmith.gen.report.recursion import Coefficient, Equation, Recursion, Term, recursion_of
-from sosmith.gen.specification.choices import REALIZATIONS
 from sosmith.model.dataflow.graph import Graph
 
 SMALL = str.maketrans("₋₀₁₂₃₄₅₆₇₈₉", "-0123456789")
@@ -83,7 +83,7 @@ def agrees(name: str, graph: Graph) -> bool:
 
 
 @pytest.mark.sweep(4)
-@pytest.mark.parametrize("realization", [name for name in REALIZATIONS if name != "auto"])
+@pytest.mark.parametrize("realization", list(SECTIONS))
 def test_equations_compute_what_the_graph_computes(realization: str) -> None:
     made = example_design("flange_wear_bench.toml", core="filter", realization=realization).quantized
     assert made.sections

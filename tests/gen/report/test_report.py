@@ -743,7 +743,10 @@ def test_evidence_may_be_as_little_as_one_sample(shape: tuple[int, ...]) -> None
     [
         ({"kind": "allpass"}, "kind must be one of lowpass, highpass, bandpass, bandstop, not 'allpass'"),
         ({"cutoff": (1.0, 2.0)}, "cutoff of a lowpass must hold 1 frequencies, not (1.0, 2.0)"),
-        ({"ideal_sos": np.zeros((2, 5))}, "ideal_sos must have the shape (n_sections, 6), not (2, 5)"),
+        (
+            {"ideal_sos": np.zeros((2, 5))},
+            "ideal_sos must have the shape (n_sections, 6) or that of an FIR filter, not (2, 5)",
+        ),
     ],
 )
 def test_filter_facts_refuse(changes: dict[str, Any], message: str) -> None:

@@ -107,7 +107,7 @@ TABLES = (
 
 FILTER_KEYS = (
     "one of the keys family, kind, method, order, cutoff, passband_edge, stopband_edge, passband_loss,"
-    " stopband_loss, sos, sos_file, decimate, hold, not an unknown one"
+    " stopband_loss, sos, sos_file, taps, taps_file, decimate, hold, not an unknown one"
 )
 
 
@@ -117,12 +117,12 @@ IDENTIFIER = "a Verilog identifier of at most 64 letters, digits and underscores
 IN_PROPORTION = "a number of at most 50 digits, zero or from 1e-30 to below 1e30 in size"
 
 
-FAMILIES = "one of butterworth, chebyshev1, chebyshev2, elliptic, bessel"
+FAMILIES = "one of butterworth, chebyshev1, chebyshev2, elliptic, bessel, equiripple, least_squares, kaiser, halfband"
 
 
 FORMS = (
     "given by order and cutoff, by passband_edge, stopband_edge, passband_loss and stopband_loss, "
-    "or by one of sos and sos_file"
+    "by one of sos and sos_file, or by one of taps and taps_file"
 )
 
 

@@ -11,10 +11,10 @@ from sosmith.gen.architectures.budget import Budget
 from sosmith.gen.architectures.registry import ARCHITECTURES, candidates
 from sosmith.gen.core import design_core
 from sosmith.gen.fpga.boards import find_board
+from sosmith.gen.realizations.coefficients import with_fewer_digits
 from sosmith.gen.specification.combinations import NO_MULTIPLIERS, SEVERAL, Option
 from sosmith.gen.word_lengths.cost import area_by_digits, cost_of_graphs, products_from_adders, scalings
 from sosmith.gen.word_lengths.objective import FEW_ADDERS, SMALL_AREA
-from sosmith.gen.word_lengths.search import _with_fewer_digits
 from sosmith.model.dataflow.adder_graph import signed_digits
 from sosmith.model.dataflow.graph import Graph, GraphBuilder
 
@@ -57,7 +57,7 @@ def test_each_digit_but_the_first_is_a_sum() -> None:
 @pytest.mark.parametrize("exact", [216531.4, -216531.4, 5.9, 1000.3])
 def test_neighbours_with_fewer_digits(exact: float) -> None:
     integer = round(exact)
-    found = list(_with_fewer_digits(integer, exact))
+    found = list(with_fewer_digits(integer, exact))
     assert found
     assert all(near and len(signed_digits(near)) < len(signed_digits(integer)) for near in found)
     assert min(found) < exact < max(found)

@@ -13,7 +13,7 @@ from tests.gen.designs import ALL, example_design, with_rows
 from tests.gen.word_lengths.filters import OUT, SIGNED, butterworth, errors, plain, stimulus
 
 from sosmith.gen.filter.design import Filter, design
-from sosmith.gen.realizations.registry import CASCADES, REALIZATIONS
+from sosmith.gen.realizations.registry import CASCADES, SECTIONS
 from sosmith.gen.specification.specification import FilterSpec
 from sosmith.gen.word_lengths.other_realization import with_realization
 from sosmith.gen.word_lengths.quantize import quantize
@@ -47,7 +47,7 @@ def case(name: str, realization: str) -> Any:
 
 
 @pytest.mark.sweep(8)
-@pytest.mark.parametrize(("name", "realization"), [case(*each) for each in product(ALL, REALIZATIONS)])
+@pytest.mark.parametrize(("name", "realization"), [case(*each) for each in product(ALL, SECTIONS)])
 def test_examples_stay_within_their_bound(name: str, realization: str) -> None:
     design = example_design(name, realization=realization)
     quantized = design.quantized

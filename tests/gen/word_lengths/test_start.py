@@ -11,7 +11,7 @@ from tests.gen.word_lengths.filters import OUT, SIGNED, butterworth, plain
 from tests.gen.word_lengths.steady import CURRENT, ripple, steady_design
 
 from sosmith.gen.core import CoreDesign, design_core
-from sosmith.gen.realizations.registry import REALIZATIONS
+from sosmith.gen.realizations.registry import SECTIONS
 from sosmith.gen.specification.specification import load
 from sosmith.gen.word_lengths.other_realization import with_realization
 from sosmith.gen.word_lengths.quantized import START, Quantized
@@ -33,7 +33,7 @@ def error(made: Quantized, codes: np.ndarray) -> float:
 
 
 @pytest.mark.sweep(3)
-@pytest.mark.parametrize("realization", REALIZATIONS)
+@pytest.mark.parametrize("realization", SECTIONS)
 @pytest.mark.parametrize("kind", ["lowpass", "highpass", "bandpass", "bandstop"])
 def test_error_and_ranges_of_every_realization(kind: str, realization: str) -> None:
     made = plain(butterworth(3, 0.05, kind), realization, steady=True)

@@ -15,7 +15,7 @@ import pytest
 from tests.gen.word_lengths.sweep_designs import REFUSED
 
 from sosmith.gen.filter.design import decay_length, design, impulse_response
-from sosmith.gen.realizations.registry import CASCADES, REALIZATIONS
+from sosmith.gen.realizations.registry import CASCADES, SECTIONS
 from sosmith.gen.specification.specification import FilterSpec
 from sosmith.gen.stimuli.worst_case_inputs import sign_matched
 from sosmith.gen.word_lengths.error_paths import error_responses
@@ -125,7 +125,7 @@ ALL = [
         (number, realization), id=f"{number}-{realization}", marks=[] if number % 8 == 4 else [pytest.mark.slow]
     )
     for number in range(len(DESIGNS))
-    for realization in REALIZATIONS
+    for realization in SECTIONS
     if realization in CASCADES or is_lattice(DESIGNS[number])
 ] + [
     pytest.param(

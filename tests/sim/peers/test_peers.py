@@ -8,7 +8,7 @@ from tests.sim.peers.peer_runs import expected, made_of, run, stimulus, words
 from tests.suite.extras import needs
 
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
-from sosmith.gen.realizations.registry import REALIZATIONS
+from sosmith.gen.realizations.registry import SECTIONS
 from sosmith.hdl.check_bits import CheckBits
 from sosmith.hdl.cores.folded import FoldedCore
 
@@ -25,7 +25,7 @@ FAST = {
 CASES = [
     pytest.param(*case, marks=[] if case in FAST else [pytest.mark.slow])
     for architecture in SAMPLES
-    for realization in REALIZATIONS
+    for realization in SECTIONS
     for channels in (1, 3, 12, 20)
     for case in [(architecture, realization, channels)]
     if architecture == "parallel" or realization not in UNFOLDABLE

@@ -86,7 +86,9 @@ def _agreement(agreement: Agreement) -> str:
             else "calibration"
         )
         parts.append(fitted)
-    if agreement.distance is not None:
+    if agreement.by_losses:
+        parts.append("filter by its edges and losses")
+    elif agreement.distance is not None:
         parts.append(f"filter within a peak gain of {float(agreement.distance):.1e} of its words")
     compared = f"{', '.join(parts[:-1])} and {parts[-1]}" if len(parts) > 1 else parts[0]
     if agreement.not_compared:

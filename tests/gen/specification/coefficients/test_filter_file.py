@@ -217,9 +217,9 @@ def test_a_convention_that_is_asked_for_has_to_be_stable(tmp_path: Path) -> None
     [
         (
             "f.csv",
-            "1,2,3\n",
-            "the filter must be rows of b0, b1, b2, a0, a1, a2, the same without a0, or b and a with "
-            "a0 = 1, not 1 x 3 numbers",
+            "1,2,3\n4,5,6\n",
+            "the filter must be rows of b0, b1, b2, a0, a1, a2, the same without a0, b and a with a0 = 1, or one row "
+            "or column of taps, not 2 x 3 numbers",
         ),
         ("f.csv", "", "the filter must have numbers, not none"),
         ("f.csv", "1;0,5;0;1;0;0\n", "line 1 must have numbers with a decimal point, not '0,5'"),
