@@ -114,8 +114,8 @@ def designed_taps(family: str, mask: FirMask) -> tuple[Fraction, ...]:
         best = _kept(family, lengths[missed], mask)
     below = at - 1
     while best is not None and below >= 0 and missed - below <= _MISSES:
-        found = _kept(family, lengths[below], mask)
-        best, missed, below = (best, missed, below - 1) if found is None else (found, below, below - 1)
+        shorter = _kept(family, lengths[below], mask)
+        best, missed, below = (best, missed, below - 1) if shorter is None else (shorter, below, below - 1)
     if best is None:
         raise SpecificationError(
             f"filter's edges and losses must be met by at most {MAX_TAPS} taps, and are not: widen the transition band "
@@ -135,14 +135,14 @@ def _kept(family: str, length: int, mask: FirMask) -> tuple[Fraction, ...] | Non
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of an exchange that does not converge: the proof decides
-            made = _FAMILIES[family].design(length, mask)
+            designed = _FAMILIES[family].design(length, mask)
     except (ValueError, np.linalg.LinAlgError):
         return None
-    if not np.isfinite(made).all():
+    if not np.isfinite(designed).all():
         return None
-    gain = np.abs(np.fft.rfft(made, 2 * _POINTS))
+    gain = np.abs(np.fft.rfft(designed, 2 * _POINTS))
     inside = _points_in(mask.passbands)
-    scaled = (made + made[::-1]) / 2 * (1 - _SPARE) / float(np.max(gain[inside]))
+    scaled = (designed + designed[::-1]) / 2 * (1 - _SPARE) / float(np.max(gain[inside]))
     if not _may_keep(gain / float(np.max(gain[inside])), inside, mask):
         return None
     taps = tuple(Fraction(round(tap * 2.0**_GRID_BITS), 1 << _GRID_BITS) for tap in scaled.tolist())

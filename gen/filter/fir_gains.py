@@ -47,11 +47,11 @@ def keeps_to(
     """
     with ctx.workprec(_PRECISION + _BITS_OF_A_TAP * len(taps)):
         square = squared_gain(taps)
-        turns = _turning_points(square)
+        turning_points = _turning_points(square)
         least, most = (arb(10) ** (-_ball(loss) / 10) for loss in (passband_loss, stopband_loss))
         return all(
-            least <= low and high <= 1 for low, high in (_limits(square, turns, band) for band in passbands)
-        ) and all(high <= most for _, high in (_limits(square, turns, band) for band in stopbands))
+            least <= low and high <= 1 for low, high in (_limits(square, turning_points, band) for band in passbands)
+        ) and all(high <= most for _, high in (_limits(square, turning_points, band) for band in stopbands))
 
 
 def gains_in(taps: Sequence[Fraction], band: Band) -> tuple[float, float]:
@@ -87,10 +87,10 @@ def _turning_points(square: fmpq_poly) -> list[arb]:
     return [root.real for root, _ in roots if root.imag.contains(0)]
 
 
-def _limits(square: fmpq_poly, turns: Sequence[arb], band: Band) -> tuple[arb, arb]:
+def _limits(square: fmpq_poly, turning_points: Sequence[arb], band: Band) -> tuple[arb, arb]:
     """Return balls around the smallest and the largest squared gain in a band."""
     high, low = (arb.cos_pi(2 * _ball(edge)) for edge in band)
-    points = [low, high, *(turn for turn in turns if not (turn < low or turn > high))]
+    points = [low, high, *(point for point in turning_points if not (point < low or point > high))]
     values = [_at(square, point) for point in points]
     least, most = values[0], values[0]
     for value in values[1:]:

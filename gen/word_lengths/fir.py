@@ -77,9 +77,9 @@ def fir_stages(
         if few_digits:
             fitting = [_of_few_digits(ideal, wanted, nearest, windows, allowed)]
         for chosen in (*fitting, nearest):
-            made = _proven(ideal, realization, chosen, x, steady=steady)
-            if made[1].coefficients.magnitude <= allowed:
-                return made
+            sections, proof = _proven(ideal, realization, chosen, x, steady=steady)
+            if proof.coefficients.magnitude <= allowed:
+                return sections, proof
     raise ShortfallError(
         f"the filter's coefficients must keep their error below {float(allowed):.3g} output LSB with {MAX_BITS} bits, "
         "and do not: raise output.max_error or raise output.bits"
@@ -162,12 +162,12 @@ def _near(c: Coefficient, integer: int, frac: int, largest: Fraction) -> list[tu
     """Return integers near a coefficient with ever fewer signed digits: their digits, they, and the error of each."""
     unit = len(c.taps) * largest * Fraction(2) ** -frac
     scaled = Fraction(c.value) * Fraction(2) ** frac
-    found = [(len(signed_digits(integer)), integer, abs(integer - scaled) * unit)]
+    choices = [(len(signed_digits(integer)), integer, abs(integer - scaled) * unit)]
     near = {
         value: len(signed_digits(value)) for value in (with_fewer_digits(integer, float(scaled)) if integer else ())
     }
-    for digits in range(found[0][0] - 1, 0, -1):
+    for digits in range(choices[0][0] - 1, 0, -1):
         best = min((value for value in near if near[value] == digits), key=lambda v: (abs(v - scaled), v), default=None)
         if best is not None:
-            found.append((digits, best, abs(best - scaled) * unit))
-    return found
+            choices.append((digits, best, abs(best - scaled) * unit))
+    return choices

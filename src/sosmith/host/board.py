@@ -311,12 +311,12 @@ class Board:
                 yield self._poll_kind, b""
 
         for body in self._session.exchange(requests(), self._polled_sound):
-            found = self._polled(body)
-            if found is None:
+            fetched = self._polled(body)
+            if fetched is None:
                 empty = True
             else:
-                missing -= len(found[1].codes)
-                yield found
+                missing -= len(fetched[1].codes)
+                yield fetched
 
     @property
     def _poll_kind(self) -> Type:
