@@ -41,7 +41,7 @@ CALIBRATION = ROOT / "docs" / "calibration.md"
 PRINTING = [CALIBRATION, *(ROOT / "docs" / f"{name}.md" for name in ("spectrum", "wear", "vehicle", "sensors"))]
 """Documents whose shell blocks stand above what they print."""
 IMAGES = ROOT / "docs" / "images"
-DRAWN = ("vehicle.svg",)
+DRAWN = ("vehicle.svg", "calibration.svg")
 """Pictures that the shell blocks of these documents draw."""
 PYTHON = ROOT / "docs" / "python.md"
 COMMANDS = ROOT / "docs" / "commands.md"

@@ -267,18 +267,16 @@ def test_results_that_came_before_the_line_was_lost_count() -> None:
     clock = Time()
     device = MeasuringDevice(lambda: clock.now, measuring_identity())
     clock.now = 2.0  # more than one response holds
-    line, lines = BadLine(device), 0
-    poll = Board.poll
+    line = BadLine(device)
+    polled = Board._polled
 
-    def lost(board: Board) -> object:
-        nonlocal lines
-        lines += 1
-        line.unplugged = lines == 2
-        return poll(board)
+    def lost(board: Board, body: bytes) -> object:
+        line.unplugged = True
+        return polled(board, body)
 
     events = []
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Board, "poll", lost)
+        patch.setattr(Board, "_polled", lost)
         for event in watch(lambda: Board.on(line), lambda identity: CODES, clock=clock):
             events.append(event)
             if isinstance(event, Lost):
