@@ -69,9 +69,11 @@ class Fault:
     change: Callable[[Values, Values, Values, Values, np.random.Generator], tuple[Values, Values]]
 
 
-def _off(offset: float, gain: float = 0.0, per_day: float = 0.0) -> Callable[..., tuple[Values, Values]]:
+def _off(
+    offset: float, gain: float = 0.0, per_day: float = 0.0, gain_per_day: float = 0.0
+) -> Callable[..., tuple[Values, Values]]:
     def change(d: Values, V: Values, T: Values, late: Values, chance: np.random.Generator) -> tuple[Values, Values]:
-        return d, V * (1.0 + gain) + offset + per_day * (late + 1.0)
+        return d, V * (1.0 + gain + gain_per_day * (late + 1.0)) + offset + per_day * (late + 1.0)
 
     return change
 
@@ -104,6 +106,7 @@ FAULTS = (
     Fault("another sensor, of the type's tolerances", _another),
     Fault("offset drifts by 0.01 V a day", _off(0.0, per_day=0.01)),
     Fault("offset drifts by 0.03 V a day", _off(0.0, per_day=0.03)),
+    Fault("gain drifts by 0.3 % a day", _off(0.0, gain_per_day=0.003)),
     Fault("measurements scatter 1.5 times as much", _louder(1.5)),
     Fault("measurements scatter 2 times as much", _louder(2.0)),
 )

@@ -9,7 +9,7 @@ from scipy import special
 
 from sosmith.gen.calibration.fit import NORMAL_CONSISTENCY
 from sosmith.instrument.wear.assessment import WearLimits, block_medians
-from sosmith.instrument.wear.state_space import DayReading, DayState, Told, WearModel, filtered
+from sosmith.instrument.wear.state_space import STATES, DayReading, DayState, Told, WearModel, filtered
 from sosmith.model.arrays import Values
 from sosmith.model.errors import SpecificationError
 
@@ -23,9 +23,13 @@ RISK = 0.05
 """Probability of being past the limit from which wear is critical."""
 
 
+TOTAL_ERROR = 0.03
+"""Standard uncertainty in mm of the sum of both clearances of an axle, where nothing else is said."""
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class OverDays:
-    """Wear of one wheel over days; lengths in mm, times in days.
+    """Wear of a wheel over days, and of the other one of its axle if it was read; lengths in mm, times in days.
 
     Attributes
     ----------
@@ -65,6 +69,13 @@ class OverDays:
         return self.now.interval(self.confidence)
 
     @property
+    def other(self) -> tuple[float, float, float] | None:
+        """Clearance of the other wheel and its interval; None if it was not read."""
+        if len(self.now.hypotheses.mean[0]) == STATES:
+            return None
+        return (self.now.level(1)[0], *self.now.interval(self.confidence, 1))
+
+    @property
     def rate(self) -> tuple[float, float, float]:
         """Rate in mm a day and its interval."""
         mean, spread = self.now.rate()
@@ -99,6 +110,9 @@ def over_days(
     model: WearModel | None = None,
     risk: float = RISK,
     confidence: float = 0.95,
+    other: Values | None = None,
+    total: Values | None = None,
+    total_error: float = TOTAL_ERROR,
 ) -> OverDays:
     """Follow the wear of a wheel over days.
 
@@ -112,6 +126,12 @@ def over_days(
         What is known beforehand.
     risk, confidence : float
         Between 0 and 1; see `OverDays`.
+    other : ndarray, shape (n,), or None
+        Clearance in mm of the other wheel of the axle.
+    total : ndarray, shape (n,), or None
+        Sum of both clearances in mm, as known by other means; with `other` only.
+    total_error : float
+        Standard uncertainty in mm of that sum, new each day.
 
     Raises
     ------
@@ -123,18 +143,31 @@ def over_days(
             raise SpecificationError(f"{name} must be between 0 and 1, not {value:g}")
     if day_error is not None and not LEAST <= day_error < np.inf:
         raise SpecificationError(f"day_error must be {LEAST:g} mm or more, not {day_error:g} mm")
-    times, medians, _, _ = block_medians(time, clearance, block)
-    spread = _scatter(medians) if day_error is None else day_error
+    if not LEAST <= total_error < np.inf:
+        raise SpecificationError(f"total_error must be {LEAST:g} mm or more, not {total_error:g} mm")
+    if total is not None and other is None:
+        raise SpecificationError("the sum of both clearances must come with that of the other wheel, not without it")
+    wheels = [clearance] if other is None else [clearance, other]
+    times, _, _, _ = block_medians(time, clearance, block)
+    medians = [block_medians(time, one, block)[1] for one in wheels]
+    spreads = [_scatter(one) if day_error is None else day_error for one in medians]
+    totals = [None] * len(times) if total is None else block_medians(time, total, block)[1].tolist()
     days = [
-        DayReading(time=t, clearance=(d,), uncertainty=(spread,))
-        for t, d in zip(times.tolist(), medians.tolist(), strict=True)
+        DayReading(
+            time=float(times[k]),
+            clearance=tuple(float(one[k]) for one in medians),
+            uncertainty=tuple(spreads),
+            total=totals[k],
+            total_uncertainty=total_error,
+        )
+        for k in range(len(times))
     ]
     return OverDays(
         limits=limits,
         states=filtered(days, model or WearModel()),
         risk=risk,
         confidence=confidence,
-        day_error=spread,
+        day_error=spreads[0],
         stated=day_error is not None,
     )
 

@@ -202,3 +202,28 @@ def test_wear_is_critical_before_the_reading_is_past_the_limit() -> None:
 
 def test_an_error_of_a_day_goes_with_a_risk() -> None:
     refused("--day-error must go with --risk, not without it", "days.csv", *LIMITS, "--day-error", "0.1")
+
+
+def test_the_known_sum_of_an_axle_narrows_both_wheels() -> None:
+    errors = [0.2 * (-1) ** (k // 2) for k in range(40)]
+    rows = [f"{k},{2 + 0.05 * k + off:.6g},{3 + 0.05 * k + off:.6g},{5 + 0.1 * k:.6g}" for k, off in enumerate(errors)]
+    Path("axle.csv").write_text("\n".join(["days,clearance_mm,right_mm,both_mm", *rows]) + "\n")
+    call = ("axle.csv", *LIMITS, "--risk", "0.05", "--day-error", "0.2", "--other-wheel", "right_mm")
+    alone, summed = (
+        json.loads(good(*call, *more, "--json").stdout)["over_days"] for more in ((), ("--sum", "both_mm"))
+    )
+    for found, widest in ((alone, 0.5), (summed, 0.35)):
+        left, right = found["clearance_mm"], found["other_wheel_mm"]
+        assert left["low"] < 3.95 < left["high"]
+        assert right["low"] < 4.95 < right["high"]
+        assert left["high"] - left["low"] < widest
+    assert summed["clearance_mm"]["standard"] < 0.85 * alone["clearance_mm"]["standard"]
+    assert "  other wheel" in good(*call, "--sum", "both_mm", "--sum-error", "0.05").stdout
+    refused(
+        "the sum of both clearances must come with that of the other wheel, not without it",
+        *call[:7],
+        "--sum",
+        "both_mm",
+    )
+    refused("total_error must be 0.001 mm or more, not 0 mm", *call, "--sum", "both_mm", "--sum-error", "0")
+    refused("--other-wheel must go with --risk, not without it", "axle.csv", *LIMITS, "--other-wheel", "right_mm")

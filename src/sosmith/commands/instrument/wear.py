@@ -62,6 +62,9 @@ same comparisons as the wear flags of the hardware.
     help="With --risk: standard uncertainty in mm of what is new each day in a reading.  [default: that of SPEC, or "
     "the scatter of the days]",
 )
+@click.option("--other-wheel", metavar="COLUMN", help="With --risk: column of the clearance of the axle's other wheel.")
+@click.option("--sum", "total", metavar="COLUMN", help="With --other-wheel: column of the known sum of both, in mm.")
+@click.option("--sum-error", "total_error", type=float, help="Standard uncertainty in mm of that sum.  [default: 0.03]")
 @plot_option("SVG or PNG file for a plot.")
 @JSON_OPTION
 def wear_command(
@@ -78,6 +81,9 @@ def wear_command(
     confidence: float,
     risk: float | None,
     day_error: float | None,
+    other_wheel: str | None,
+    total: str | None,
+    total_error: float | None,
     plot: Path | None,
     as_json: bool,
 ) -> None:
@@ -106,6 +112,9 @@ def wear_command(
             confidence=confidence,
             risk=risk,
             day_error=day_error,
+            other_wheel=other_wheel,
+            total=total,
+            total_error=total_error,
             progress=step,
         )
         drawn = None

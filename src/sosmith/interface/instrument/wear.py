@@ -11,7 +11,7 @@ from typing import Any
 from sosmith.gen.facts.table import Table, View
 from sosmith.instrument.uncertainty.instrument_budget import instrument_of
 from sosmith.instrument.wear.assessment import WearLimits, WearReport, judge
-from sosmith.instrument.wear.over_days import OverDays, over_days
+from sosmith.instrument.wear.over_days import TOTAL_ERROR, OverDays, over_days
 from sosmith.instrument.wear.record_file import WearRecord, moment_text, read_wear_record
 from sosmith.instrument.wear.state_space import Happening, Told, WearModel
 from sosmith.interface.certificate import Progress
@@ -55,6 +55,9 @@ class Wear(View):
         confidence: float = 0.95,
         risk: float | None = None,
         day_error: float | None = None,
+        other_wheel: str | None = None,
+        total: str | None = None,
+        total_error: float | None = None,
         progress: Progress = lambda step, done, total: None,
     ) -> Wear:
         """Judge the record in a CSV file.
@@ -79,6 +82,10 @@ class Wear(View):
         day_error : float
             With `risk`: standard uncertainty in mm of what is new each day in a reading. By default that of a
             specification that states it, else the scatter of the days.
+        other_wheel, total : str
+            With `risk`: names of the columns of the other wheel's clearance in mm, and of the known sum of both.
+        total_error : float
+            Standard uncertainty in mm of that sum; 0.03 if not given.
         progress : callable
             Called with the name of each step, 0 and 0.
 
@@ -87,8 +94,10 @@ class Wear(View):
         SpecificationError
             If the file cannot be read, or the limits do not fit.
         """
-        if day_error is not None and risk is None:
-            raise SpecificationError("--day-error must go with --risk, not without it")
+        of_days = {"--day-error": day_error, "--other-wheel": other_wheel, "--sum": total, "--sum-error": total_error}
+        for name, given in of_days.items():
+            if given is not None and risk is None:
+                raise SpecificationError(f"{name} must go with --risk, not without it")
         worth, known, instrument = None, limits, None
         if isinstance(known, Specification):
             asked, known = known, _limits_of(known, channel)
@@ -125,6 +134,9 @@ class Wear(View):
                 model=model,
                 risk=risk,
                 confidence=confidence,
+                other=None if other_wheel is None else read_wear_record(path, other_wheel, channel).clearance,
+                total=None if total is None else read_wear_record(path, total, channel).clearance,
+                total_error=TOTAL_ERROR if total_error is None else total_error,
             )
         return cls(record, report, channel, followed)
 
@@ -260,6 +272,9 @@ def _rows_over_days(record: WearRecord, found: OverDays) -> Iterator[tuple[str, 
     """Level, rate, risk and what was told, by the state over days."""
     share, (low, high) = f"at {100 * found.confidence:g} %", found.interval
     yield "clearance", f"{found.now.level()[0]:.4g} mm ({low:.4g} to {high:.4g} {share})"
+    if found.other is not None:
+        level, low, high = found.other
+        yield "other wheel", f"{level:.4g} mm ({low:.4g} to {high:.4g})"
     rate, slow, fast = found.rate
     yield "rate", f"{rate:.3g} mm a day ({slow:.3g} to {fast:.3g})"
     by = "as stated" if found.stated else "by the scatter of the days"
@@ -281,7 +296,7 @@ def _told(record: WearRecord, one: Told) -> str:
         f"a {one.event.what} of about {what} at {when(one.event.time)}"
         if one.event.what is Happening.JUMP
         else f"a {one.event.what} {what} at about {when(one.event.time)}"
-    ) + f", seen at {when(one.at)} with a probability of {one.probability:.2g}"
+    ) + f"{' of the other wheel' * one.event.wheel}, seen at {when(one.at)} with a probability of {one.probability:.2g}"
 
 
 def _over_days_json(found: OverDays) -> dict[str, Any]:
@@ -290,6 +305,9 @@ def _over_days_json(found: OverDays) -> dict[str, Any]:
     return {
         "clearance_mm": {"value": level, "standard": spread, "low": low, "high": high},
         "rate_mm_per_day": {"value": rate, "low": slow, "high": fast},
+        "other_wheel_mm": None
+        if found.other is None
+        else dict(zip(("value", "low", "high"), found.other, strict=True)),
         "day_error_mm": found.day_error,
         "life_days": {"value": half, "low": soon, "high": late},
         "probability_past_the_limit": found.past,
@@ -298,6 +316,7 @@ def _over_days_json(found: OverDays) -> dict[str, Any]:
         "told": [
             {
                 "what": str(one.event.what),
+                "wheel": one.event.wheel,
                 "days": one.event.time,
                 "seen_days": one.at,
                 "probability": one.probability,
