@@ -370,7 +370,7 @@ def _relation(kind: str, passband: Sequence[Fraction], stopband: Sequence[Fracti
 def _check_decimation(document: Document) -> None:
     """Check that what else is asked for is there behind a decimator."""
     table = document.filter
-    if table.decimate is None and table.hold:
+    if table.decimate is None or table.is_fir and table.hold:
         raise UnfitError("false without filter.decimate, as every sample has a result", "true", where="filter.hold")
     if table.decimate is None:
         return
