@@ -370,9 +370,9 @@ def _relation(kind: str, passband: Sequence[Fraction], stopband: Sequence[Fracti
 def _check_decimation(document: Document) -> None:
     """Check that what else is asked for is there behind a decimator."""
     table = document.filter
-    if table.decimate is None or table.is_fir and table.hold:
+    if table.decimate is None and table.hold:
         raise UnfitError("false without filter.decimate, as every sample has a result", "true", where="filter.hold")
-    if table.decimate is None:
+    if table.decimate is None or table.is_fir:  # the table of combinations has the second
         return
     found, where = literal(table.decimate), "filter.decimate"
     if table.order is None or table.cutoff is None:
