@@ -2,19 +2,22 @@
 
 Each case emulates ten days of a sensor of the type equation 5a with one thing wrong, and calibrates it for the last of
 these days and for the day after. Printed are the shares of true clearances inside their 95 % intervals, on both days,
-the mean half-width, and the share of sensors that were warned of.
+the mean half-width, and how many sensors were warned of, by the fit or by an alarm of their health.
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from sosmith.gen.calibration.fit import Measurements
 from sosmith.instrument.calibration.acceptance import DEFAULT_RANGES
 from sosmith.instrument.calibration.bayesian_fit import bayesian_fit
+from sosmith.instrument.calibration.health.monitoring import health_of
 from sosmith.instrument.calibration.sensor_type import DEFAULT_TYPE, SENSOR_TYPES
 from sosmith.instrument.calibration.uncertainty import SHARE, of_posterior
 from sosmith.model.arrays import Values
@@ -44,6 +47,10 @@ class Case:
         Ratio of the sensor's gain to that of the type.
     lasting : float
         Amplitude in mm of an S-shaped curve over the clearance that stays.
+    step : float
+        Step of the voltage in V on the last day of measurements, which stays.
+    thermometer : float
+        How far the thermometer reads too high from that day on, in K.
     rail : float
         Voltage in V at which the sensor saturates.
     typical : bool
@@ -56,6 +63,8 @@ class Case:
     correlation: float = 2.0
     gain: float = 1.0
     lasting: float = 0.0
+    step: float = 0.0
+    thermometer: float = 0.0
     rail: float = 10.0
     typical: bool = True
 
@@ -73,6 +82,9 @@ CASES = (
     Case("S-curve of 1 mm", lasting=1.0),
     Case("scatter times 3", scatter=0.9),
     Case("errors of days times 3", systematic=0.36),
+    Case("voltage steps by -1 V", step=-1.0),
+    Case("voltage steps by +0.3 V", step=0.3),
+    Case("thermometer reads 10 K more", thermometer=10.0),
     Case("rail at 6 V", rail=6.0),
 )
 
@@ -96,7 +108,8 @@ def _sensor(case: Case, seed: int) -> tuple[Measurements, list[tuple[Values, Val
         d = TYPE.polynomial(tuple(z.tolist()))(V * case.gain, T)
         d = d + case.lasting * np.sin(2 * np.pi * d / 10.0)
         d = d + _error(chance, case, d)
-        V = np.minimum(V, case.rail)
+        late = day >= DAYS - 1
+        V, T = np.minimum(np.maximum(V + case.step * late, 0.0), case.rail), T + case.thermometer * late
         if day < DAYS:
             measured = np.maximum(d[:EACH] + chance.normal(0, case.scatter, EACH), 0.0)
             columns.append([measured, V[:EACH], T[:EACH], np.full(EACH, FIRST_DAY + day)])
@@ -107,8 +120,8 @@ def _sensor(case: Case, seed: int) -> tuple[Measurements, list[tuple[Values, Val
     return Measurements(clearance, voltage, temperature, "emulated", tuple(days.astype(int).tolist())), readings
 
 
-def run(case: Case, seeds: range) -> tuple[list[float], list[float], float]:
-    """Return coverage and mean half-width in mm on the last day and the day after, and the share warned of."""
+def run(case: Case, seeds: range) -> dict[str, Any]:
+    """Return shares inside and mean half-widths in mm, on the last day and the day after, and the share warned of."""
     inside, widths, warned = [[], []], [[], []], 0
     for seed in seeds:
         measurements, readings = _sensor(case, seed)
@@ -121,8 +134,19 @@ def run(case: Case, seeds: range) -> tuple[list[float], list[float], float]:
             inside[k] += (np.abs(made.fit.polynomial(V[held], T[held]) - d[held]) <= half).tolist()
             widths[k] += half.tolist()
             told = told or bool(made.surprise or made.doubts or made.rails.found or worth.lack.structured)
-        warned += told
-    return [float(np.mean(one)) for one in inside], [float(np.mean(one)) for one in widths], warned / len(seeds)
+        alarms = health_of(measurements, TYPE, made.rails.ends).alarms
+        warned += told or bool(alarms)
+    shares, halves = ([round(float(np.mean(one)), 4) for one in both] for both in (inside, widths))
+    return {"case": case.name, "inside": shares, "half_width": halves, "warned": warned, "count": len(seeds)}
+
+
+def all_sensors(seeds: range, progress: Callable[[str, int, int], None]) -> list[dict[str, Any]]:
+    """Return the figures of all cases."""
+    found = []
+    for k, case in enumerate(CASES):
+        progress(f"coverage: {case.name}", k, len(CASES))
+        found.append(run(case, seeds))
+    return found
 
 
 def main() -> None:
@@ -135,9 +159,13 @@ def main() -> None:
     print(f"| sensor | its last day, % inside {100 * SHARE:.0f} % | ± mm | day after | ± mm | warned of |")
     print("|---|---|---|---|---|---|")
     for case in CASES:
-        inside, widths, warned = run(case, seeds)
-        cells = [f"{100 * a:.1f} | {b:.3f}" for a, b in zip(inside, widths, strict=True)]
-        print(f"| {case.name} | {' | '.join(cells)} | {100 * warned:.0f} % |", flush=True)
+        print(f"| {' | '.join(row_of(run(case, seeds)))} |", flush=True)
+
+
+def row_of(one: dict[str, Any]) -> list[str]:
+    """Return the cells of a case."""
+    cells = [f"{100 * a:.1f} | {b:.3f}" for a, b in zip(one["inside"], one["half_width"], strict=True)]
+    return [one["case"], *cells, f"{one['warned']} of {one['count']}"]
 
 
 if __name__ == "__main__":

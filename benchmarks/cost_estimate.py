@@ -3,8 +3,9 @@
 Synthesizes designs that seeds draw, one after the other, and records them in benchmarks/cost_estimate.json after each;
 it can be stopped at any time, and goes on where it was. Then fits the factors in gen/estimate/fitted.json to some of
 them, and writes the errors on the others to docs/cost.md. `--count 0` only fits and writes. `--cores` adds cores of
-benchmarks/cost.json whose synthesis is recorded and up to date. `--check` computes the quantities of all rows anew from
-their seeds, writes nothing, and fails if one differs. Needs the packages of the extra "boards".
+benchmarks/cost.json whose synthesis is recorded and up to date. `--check` computes the quantities of all rows anew,
+writes nothing, and fails if one differs; `--renew` records them, after a change of what is counted. Needs the packages
+of the extra "boards".
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from benchmarks import cost_cores
 from benchmarks.cost import mark, source
 from benchmarks.cost_cores import CORES, architecture_on, fmax, targets_in
 from benchmarks.cost_draws import draw
-from benchmarks.cost_estimate_record import Recorded, designed, nine_in_ten, recorded, rows_of, write
+from benchmarks.cost_estimate_record import Recorded, designed, name_of, nine_in_ten, recorded, rows_of, write
 from benchmarks.cost_fit import errors, fitted
 from benchmarks.cost_page import document
 from benchmarks.synthesis import TARGETS
@@ -35,7 +36,7 @@ from sosmith.gen.fpga.yosys import yosys_version
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.model.errors import SosmithError
 
-COUNT = 300
+COUNT = 576
 """Seeds that are drawn."""
 
 _LEAST_CORES = 3
@@ -135,15 +136,22 @@ def fit() -> None:
     FITTED.write_text(json.dumps(content, indent=1, sort_keys=True) + "\n", encoding="utf-8")
 
 
+def renewed() -> list[Recorded]:
+    """Return the record with the quantities that are counted now."""
+    return [row if "refused" in row else {**row, **_told_of(row)} for row in recorded()]
+
+
+def _told_of(row: Recorded) -> Recorded:
+    if "seed" in row:
+        return _told(designed(row["seed"]).architecture, find_board(row["board"]))
+    core = next(core for core in CORES if core.key == row["core"])
+    return _told(architecture_on(core, row["target"]), TARGETS[row["target"]])
+
+
 def changed() -> list[str]:
-    """Name the draws whose quantities are not those recorded."""
-    found = []
-    for row in recorded():
-        if "seed" in row and "refused" not in row:
-            told = _told(designed(row["seed"]).architecture, find_board(row["board"]))
-            if told != {key: row[key] for key in told}:
-                found.append(f"draw {row['seed']} must have the quantities recorded, not others")
-    return found
+    """Name the rows whose quantities are not those recorded."""
+    rows = zip(recorded(), renewed(), strict=True)
+    return [f"{name_of(old)} must have the quantities recorded, not others" for old, new in rows if old != new]
 
 
 def main() -> None:
@@ -152,9 +160,12 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=COUNT, help="seeds to draw, from 1 on")
     parser.add_argument("--cores", action="store_true", help="add the cores of benchmarks/cost.json")
     parser.add_argument("--check", action="store_true", help="only compare the quantities of all rows")
+    parser.add_argument("--renew", action="store_true", help="count the quantities of all rows anew")
     options = parser.parse_args()
     if options.check:
-        sys.exit("\n".join(changed()))
+        sys.exit("\n".join(changed()) or None)
+    if options.renew:
+        write(renewed())
     measure(options.count)
     if options.cores:
         add_cores()

@@ -22,7 +22,7 @@ RECORD = ROOT / "benchmarks" / "cost_estimate.json"
 GOAL = 0.15
 """Relative error of LUT4 that nine in ten designs should not exceed."""
 
-FITTED_UP_TO = 230
+FITTED_UP_TO = 396
 """Draws up to this seed are for the fit, and were looked at while quantities were chosen; later ones are for tests."""
 
 Recorded = dict[str, Any]
@@ -62,11 +62,16 @@ def designed(seed: int) -> CoreDesign:
     return design_core(from_text(drawn.toml, Path(f"draw{seed}.toml")), board=find_board(drawn.board))
 
 
+def name_of(row: Recorded) -> str:
+    """Return the name of a row."""
+    return f"draw {row['seed']}" if "seed" in row else f"{row['core']} on {row['target']}"
+
+
 def rows_of(record: Sequence[Recorded]) -> list[Row]:
     """Return the rows that have been synthesized."""
     return [
         Row(
-            name=f"draw {row['seed']}" if "seed" in row else f"{row['core']} on {row['target']}",
+            name=name_of(row),
             architecture=row["architecture"],
             family=find_board(row["board"]).device.family,
             unseen="seed" in row and is_unseen(row["seed"]),
@@ -112,13 +117,15 @@ def section(record: Sequence[Recorded]) -> str:
 ## Estimates before synthesis
 
 Written by `python -m benchmarks.cost_estimate` from `benchmarks/cost_estimate.json`. `design`, the report, the studio
-and `explore` show estimates of LUT4 and flip-flops. They count bits of sums, choices, comparisons and memories in the
-plan of the hardware, each times a factor for its architecture and family of FPGA. Factors are fitted to synthesis with
-Yosys of what the seeds up to {FITTED_UP_TO} draw, and of cores above. Errors are those on what later seeds draw,
-which was looked at neither by the fit nor while quantities were chosen. Drawn are filters of all families and kinds,
-orders 1 to 4, some calibrated, with up to 32 channels, reload, protect, decimate, look-ahead and limits of multipliers,
-but no parallel cores with reload on FPGAs without multiplier blocks. iCE40 is the UP5K and the HX8K, ECP5 the
-LFE5U-25F, Gowin the GW1NR-9C.
+and `explore` show estimates of LUT4 and flip-flops. They count bits of sums, products, choices, comparisons and
+memories in the plan of the hardware as synthesis makes them, each times a factor for its architecture and family of
+FPGA: sums that are merged, products that several multiplier blocks make, memories in slices, of block RAM or of LUT4 by
+what Yosys weighs them with. Factors are fitted to synthesis with Yosys of what the seeds up to {FITTED_UP_TO} draw, and
+of cores above. Errors are those on what later seeds draw, which was looked at neither by the fit nor while quantities
+were chosen. Drawn are filters of all families, kinds and realizations, orders 1 to 4, some calibrated, with up to 32
+channels, reload, protect, start, decimate, look-ahead, several samples a clock and limits of multipliers, but no
+parallel cores with reload on FPGAs without multiplier blocks. iCE40 is the UP5K and the HX8K, ECP5 the LFE5U-25F, Gowin
+the GW1NR-9C.
 
 {table}
 """

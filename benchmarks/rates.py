@@ -107,7 +107,7 @@ def instrument_table() -> str:
     for core in ("filter", "instrument"):
         for decimate in (None, "auto"):
             made = locomotive(decimate, core)
-            costs, ahead = rate_costs(made), made.architecture.ahead
+            costs, ahead = rate_costs(made), made.architecture.calibration
             factor = "-" if made.datapath.decimator is None else f'"auto", {made.datapath.decimator.factor}'
             rows.append(
                 (

@@ -103,9 +103,17 @@ def design_core(
     asked = AskedRealization(_known(realization or spec.hardware.realization), source, widths_of)
     response, decimates = response_of(spec, kind, progress)
     _check_realization(spec, asked, response)
-    ahead, budget, calibrates = _ahead(spec, response, _budget(spec, response.pre_stage, board), board)
+    calibration, budget, calibrates = _calibration_hardware(
+        spec, response, _budget(spec, response.pre_stage, board), board
+    )
     search = Search(
-        spec=spec, response=response, asked=asked, budget=budget, ahead=ahead, board=board, progress=progress
+        spec=spec,
+        response=response,
+        asked=asked,
+        budget=budget,
+        calibration=calibration,
+        board=board,
+        progress=progress,
     )
     wanted = spec.hardware.architecture
     kinds = candidates(wanted, budget.blocks, asked_by(spec))
@@ -157,7 +165,7 @@ def response_of(
         ideal: Filter | None = pre_stage.filter
     else:
         ideal = None if kind == "calibration" else filter_of(spec)
-    made = Response(
+    response = Response(
         inputs=inputs if pre_stage is None else (pre_stage.decimator.output,),
         codes=() if fitted is None else calibrated_codes(inputs, fitted),
         polynomial=polynomial,
@@ -165,7 +173,7 @@ def response_of(
         pre_stage=pre_stage,
         ideal=ideal,
     )
-    return made, decimates
+    return response, decimates
 
 
 def _budget(spec: Specification, pre_stage: PreStage | None, board: Board | None) -> Budget:
@@ -261,7 +269,7 @@ def pre_stage_in(
     return pre_stage, {"decimation": reason}
 
 
-def _ahead(
+def _calibration_hardware(
     spec: Specification, response: Response, budget: Budget, board: Board | None
 ) -> tuple[Architecture | None, Budget, dict[str, str]]:
     """Choose the architecture of the calibration before a decimator: that of the filter, or the smallest that keeps up.
@@ -273,28 +281,28 @@ def _ahead(
     ShortfallError
         If none keeps up with all samples.
     """
-    datapath = None if response.pre_stage is None else response.pre_stage.ahead(response.codes)
+    datapath = None if response.pre_stage is None else response.pre_stage.calibration_datapath(response.codes)
     if datapath is None:
         return None, budget, {}
     wanted, each = spec.hardware.architecture, replace(budget, decimate=1, hold=False)
     refused = ""
     for kind in candidates(wanted, budget.blocks, asked_by(spec)):
         try:
-            made = fitting(kind, each, datapath, board)
+            architecture = fitting(kind, each, datapath, board)
         except ShortfallError as error:
             refused = f"before the decimator, {error}"
         else:
-            why = reason_for(made, each, asked=wanted != AUTO, board=board, refused=refused)
-            left = replace(budget, blocks=_left(budget.blocks, made))
-            return made, left, {"calibration before the decimator": why}
+            why = reason_for(architecture, each, asked=wanted != AUTO, board=board, refused=refused)
+            left = replace(budget, blocks=_left(budget.blocks, architecture))
+            return architecture, left, {"calibration before the decimator": why}
     raise ShortfallError(refused)
 
 
-def _left(blocks: Blocks, ahead: Architecture) -> Blocks:
+def _left(blocks: Blocks, calibration: Architecture) -> Blocks:
     """Return the multiplier blocks that what stands before the decimator leaves."""
     if blocks.available is None:
         return blocks
-    return blocks._replace(available=max(0, blocks.available - ahead.multiplier_blocks))
+    return blocks._replace(available=max(0, blocks.available - calibration.multiplier_blocks))
 
 
 def refuse_decimated_channels(design: CoreDesign, where: str) -> None:

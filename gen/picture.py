@@ -128,8 +128,8 @@ def settled(svg: str, prefix: str = "") -> str:
     ends.
     """
     numbers = itertools.count(1)
-    names = {found: f"{prefix}{found[0]}{next(numbers)}" for found in dict.fromkeys(_IDENTIFIER.findall(svg))}
-    svg = re.sub(r"\b[a-z][0-9a-f]{10}\b", lambda found: names.get(found[0], found[0]), svg)
+    names = {match: f"{prefix}{match[0]}{next(numbers)}" for match in dict.fromkeys(_IDENTIFIER.findall(svg))}
+    svg = re.sub(r"\b[a-z][0-9a-f]{10}\b", lambda match: names.get(match[0], match[0]), svg)
     svg = _COORDINATES.sub(lambda attribute: _LONG.sub(_thousandths, attribute[0]), svg)
     return "\n".join(line.rstrip() for line in svg.splitlines()) + "\n"
 

@@ -98,7 +98,7 @@ class Search:
         The realization that is asked for.
     budget : Budget
         Time and multiplier blocks.
-    ahead : Architecture or None
+    calibration : Architecture or None
         Hardware of the calibration before a decimator; None without one.
     board : Board or None
         Target board.
@@ -110,7 +110,7 @@ class Search:
     response: Response
     asked: AskedRealization
     budget: Budget
-    ahead: Architecture | None
+    calibration: Architecture | None
     board: Board | None
     progress: Progress
     _plans: dict[str, Plan] = field(default_factory=dict)
@@ -169,10 +169,10 @@ class Search:
     def _other_that_does(self, kind: type[Architecture], selection: Selection) -> str:
         """Say which realization meets the specification as it is, if one does."""
         try:
-            found, _ = selection.cheapest(partial(self._in_hardware, kind, look_ahead=self._looks_ahead))
+            other, _ = selection.cheapest(partial(self._in_hardware, kind, look_ahead=self._looks_ahead))
         except ShortfallError:
             return ""
-        return f'; hardware.realization = "{found.realization}" meets the specification as it is'
+        return f'; hardware.realization = "{other.realization}" meets the specification as it is'
 
     def _plan_of(self, realization: str) -> Plan:
         """Plan a realization, once for all architectures that are tried."""
@@ -210,7 +210,7 @@ class Search:
         if pre_stage is None:
             whole = replace(flagged, calibrated=codes)
             return fitting(kind, self.budget, whole, self.board, look_ahead=look_ahead)
-        return fitting(kind, self.budget, pre_stage.before(flagged, codes), self.board, ahead=self.ahead)
+        return fitting(kind, self.budget, pre_stage.before(flagged, codes), self.board, calibration=self.calibration)
 
     def _may_look_ahead(self, plain: Candidate) -> bool:
         """Say whether look-ahead may take the place of plain loops: if nothing is asked for that excludes it."""

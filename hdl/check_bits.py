@@ -65,8 +65,8 @@ class CheckBits:
 
     def word(self, data: int) -> int:
         """Return the word of `data`, a code of `bits` bits."""
-        held = [column for bit, column in enumerate(self._columns) if data >> bit & 1]
-        return data | reduce(xor, held, 0) << self._bits
+        columns = [column for bit, column in enumerate(self._columns) if data >> bit & 1]
+        return data | reduce(xor, columns, 0) << self._bits
 
     def written(self, data: Value) -> Value:
         """Return the word to write for `data`."""
@@ -77,9 +77,9 @@ class CheckBits:
         if not self._count:
             return Read(word, Const(0, 1), Const(0, 1))
         code = word.as_unsigned()
-        found = zip(self._parities(list(code[: self._bits])), code[self._bits :], strict=True)
+        pairs = zip(self._parities(list(code[: self._bits])), code[self._bits :], strict=True)
         syndrome = Signal(self._count, name=f"{name}_syndrome")
-        m.d.comb += syndrome.eq(Cat(*(parity ^ check for parity, check in found)))
+        m.d.comb += syndrome.eq(Cat(*(parity ^ check for parity, check in pairs)))
         if not self._corrects:
             return Read(code[: self._bits], Const(0, 1), syndrome.any())
         data = Signal(self._bits, name=f"{name}_corrected")
@@ -88,7 +88,7 @@ class CheckBits:
 
     def _parities(self, data: Sequence[Value]) -> list[Value]:
         return [
-            reduce(xor, (bit for bit, column in zip(data, self._columns, strict=True) if column >> check & 1))
+            Cat(*(bit for bit, column in zip(data, self._columns, strict=True) if column >> check & 1)).xor()
             for check in range(self._count)
         ]
 

@@ -104,8 +104,8 @@ class PipelinedInstruction:
 
     def has(self, *opcodes: Opcode) -> Value:
         """Whether its opcode is one of `opcodes`, which are one alone or all of a kind."""
-        found = [self._net(f"is_{opcode.name.lower()}", self.fields.opcode == opcode) for opcode in sorted(opcodes)]
-        return found[0] if len(found) == 1 else self._net(_KINDS[frozenset(opcodes)], Cat(found).any())
+        matches = [self._net(f"is_{opcode.name.lower()}", self.fields.opcode == opcode) for opcode in sorted(opcodes)]
+        return matches[0] if len(matches) == 1 else self._net(_KINDS[frozenset(opcodes)], Cat(matches).any())
 
     def is_for(self, digit: int) -> Value:
         """Whether its constant is the number `digit`, as that of TAKE."""

@@ -116,8 +116,8 @@ class PipelinedLogic:
                     pair = self._constants.get(index)
                     factor = None if pair is None else chosen(pair, self._banks[own])
                     operands = [self.at(i, own) for i in node.operands]
-                    made = index in self._adders
-                    value = self._multiple(index) if made else logic(self._graph, node, operands, factor)
+                    of_adders = index in self._adders
+                    value = self._multiple(index) if of_adders else logic(self._graph, node, operands, factor)
                     self._m.d.comb += wire.eq(value)
                 self.wires.append(wire)
 
@@ -134,8 +134,8 @@ class PipelinedLogic:
             operand, products = next(group for group in by_operand(self._graph, together) if index in group[1])
             constants = [nodes[i].parameter for i in products]
             name = self.names[operand] if own == self._pipeline_stages[operand] else f"{self.names[operand]}_in{own}"
-            made = multiples(self._m, self.at(operand, own), nodes[operand].range, constants, name)
-            self._multiples |= dict(zip(products, made, strict=True))
+            values = multiples(self._m, self.at(operand, own), nodes[operand].range, constants, name)
+            self._multiples |= dict(zip(products, values, strict=True))
         return self._multiples[index]
 
 

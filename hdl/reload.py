@@ -212,16 +212,16 @@ class ReloadPort(wiring.Component):
         """Count the faults; return the bit of ``FAULTS`` that is read."""
         counts: list[Value] = []
         m.d.comb += self.acknowledge.eq(slave.o_start & _writes(slave, FAULTS))
-        for name, found in (("CORRECTED", self.corrected), ("UNCORRECTED", self.failed)):
+        for name, event in (("CORRECTED", self.corrected), ("UNCORRECTED", self.failed)):
             field = FAULTS.field(name)
             count = Signal(field.bits, name=name.lower())
             seen = Signal(field.bits, name=f"seen_{name.lower()}")  # a count must not change in the middle of a read
             with m.If(slave.o_check):
                 m.d.sync += seen.eq(count)
-            with m.If(found & ~count.all()):
+            with m.If(event & ~count.all()):
                 m.d.sync += count.eq(count + 1)
             with m.If(self.acknowledge):
-                m.d.sync += count.eq(found)
+                m.d.sync += count.eq(event)
             counts.append(seen)
         return _bit_of(Cat(*counts), slave.o_count)
 

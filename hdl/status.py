@@ -33,26 +33,26 @@ from sosmith.model.port import Port
 
 def at_rail(inputs: Sequence[Port], tdata: Value) -> Value:
     """Whether an input's code is the lowest or the highest of its port, `Flag.INPUT_AT_RAIL`."""
-    found: Value = Const(0, 1)
+    rail: Value = Const(0, 1)
     for port, code in zip(inputs, codes_of(inputs, tdata), strict=True):
         body = code[:-1]
         # At a rail, all bits below the top one are equal; the top bit says which rail that would be.
         ones, zeros = (code[-1], ~code[-1]) if not port.signed else (~code[-1], code[-1])
-        found = found | (body.all() & ones) | (~body.any() & zeros)
-    return found
+        rail = rail | (body.all() & ones) | (~body.any() & zeros)
+    return rail
 
 
 def outside_calibration(datapath: Datapath, tdata: Value) -> Value:
     """Whether an input lies outside the range of the calibration, `Flag.OUTSIDE_CALIBRATION`."""
-    found: Value = Const(0, 1)
+    outside: Value = Const(0, 1)
     for port, code, (low, high) in zip(
         datapath.inputs, codes_of(datapath.inputs, tdata), datapath.calibrated, strict=True
     ):
         if low > port.lowest:
-            found = found | (code < low)
+            outside = outside | (code < low)
         if high < port.highest:
-            found = found | (code > high)
-    return found
+            outside = outside | (code > high)
+    return outside
 
 
 def flag_count(datapath: Datapath) -> int:
@@ -63,7 +63,7 @@ def flag_count(datapath: Datapath) -> int:
 
 
 RAIL_ALONE, OF_INPUT = 1, 2
-"""Numbers of flags that come with a sample from a decimator: `input_at_rail`, or all that are told of inputs."""
+"""Numbers of flags that come with a sample from a decimator: `input_at_rail`, or all flags of inputs."""
 
 
 def members_beside_decimator(datapath: Datapath, given: int, *, before: bool) -> dict[str, In | Out]:
@@ -121,8 +121,8 @@ def status_of_result(
     """Return the flags of a result.
 
     If each channel has limits of wear of its own, these are read from a memory, with check bits as `protect` asks:
-    `code` must belong to the channel that `channel` was at the last clock with `enable`. Wear is not told of a sample
-    that comes before the filter has settled.
+    `code` must belong to the channel that `channel` was at the last clock with `enable`. Wear is not flagged for a
+    sample that comes before the filter has settled.
 
     Parameters
     ----------

@@ -43,11 +43,11 @@ def opened(path: Path) -> io.BufferedReader:
     # Without this flag, a pipe is opened once somebody writes into it, and not before.
     number = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
     try:
-        found = kind_of(os.fstat(number).st_mode)
-        if found == "a folder":
+        kind = kind_of(os.fstat(number).st_mode)
+        if kind == "a folder":
             raise OSError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
-        if found:
-            raise OSError(errno.EINVAL, f"{found}, where a regular file is needed", str(path))
+        if kind:
+            raise OSError(errno.EINVAL, f"{kind}, where a regular file is needed", str(path))
         return os.fdopen(number, "rb")
     except BaseException:
         os.close(number)
@@ -55,7 +55,7 @@ def opened(path: Path) -> io.BufferedReader:
 
 
 def check_input(path: Path) -> None:
-    """Check that `path` is neither a pipe, a socket nor a device; whether it is there is told by who reads it.
+    """Check that `path` is neither a pipe, a socket nor a device; whether it is there is for its reader to say.
 
     Raises
     ------
@@ -63,11 +63,11 @@ def check_input(path: Path) -> None:
         If it is one, itself or by links.
     """
     try:
-        found = kind_of(path.stat().st_mode)
+        kind = kind_of(path.stat().st_mode)
     except (OSError, ValueError):
         return
-    if found not in {None, "a folder"}:
-        raise SpecificationError(f"{path}: the input must be a regular file, not {found}")
+    if kind not in {None, "a folder"}:
+        raise SpecificationError(f"{path}: the input must be a regular file, not {kind}")
 
 
 def read_bytes(path: Path, *, what: str, max_bytes: int) -> bytes:
@@ -91,8 +91,8 @@ def read_bytes(path: Path, *, what: str, max_bytes: int) -> bytes:
         with opened(path) as file:
             content = file.read(max_bytes + 1)
     except OSError as error:
-        found = (error.strerror or str(error)).lower()
-        raise SpecificationError(f"{path}: {what} must be a readable file, not: {found}") from None
+        reason = (error.strerror or str(error)).lower()
+        raise SpecificationError(f"{path}: {what} must be a readable file, not: {reason}") from None
     except ValueError:
         raise SpecificationError(f"{str(path)!r} must be the path of a file, not an impossible one") from None
     if len(content) > max_bytes:

@@ -114,6 +114,6 @@ class Port:
         import numpy as np  # a specification has ports too, and is read without numpy
 
         if not np.all(np.isfinite(values)):
-            raise ValueError(f"values of {self.name} must be finite, not {values[~np.isfinite(values)][0]!r}")
+            raise ValueError(f"values of {self.name} must be finite, not {float(values[~np.isfinite(values)][0])}")
         codes = np.floor((np.asarray(values, dtype=np.float64) - float(self.zero)) / float(self.lsb) + 0.5)
         return np.clip(codes, self.lowest, self.highest).astype(np.int64)

@@ -98,25 +98,25 @@ def _scratch(directory: Path) -> Iterator[Path]:
         with suppress(OSError):
             _remove_left(place)
     with tempfile.TemporaryDirectory(prefix=_PREFIX, dir=directory) as scratch:
-        held = os.open(scratch, os.O_RDONLY)
+        descriptor = os.open(scratch, os.O_RDONLY)
         try:
             with suppress(OSError):  # a file system without locks
-                fcntl.flock(held, fcntl.LOCK_SH)
+                fcntl.flock(descriptor, fcntl.LOCK_SH)
             yield Path(scratch)
         finally:
-            os.close(held)
+            os.close(descriptor)
 
 
 def _remove_left(place: Path) -> None:
     import shutil
 
-    held = os.open(place, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+    descriptor = os.open(place, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
     try:
-        fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        if time.time() - os.fstat(held).st_mtime > _STALE:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        if time.time() - os.fstat(descriptor).st_mtime > _STALE:
             shutil.rmtree(place)
     finally:
-        os.close(held)
+        os.close(descriptor)
 
 
 def write_pieces(path: Path, pieces: Iterable[str]) -> None:
@@ -158,8 +158,8 @@ def check_file(path: Path) -> None:
         ) from None
     except ValueError:
         raise SpecificationError(f"{str(path)!r} must be the path of a file, not an impossible one") from None
-    if found := kind_of(mode):
-        raise SpecificationError(f"{path}: the output file must be a file, not {found}")
+    if kind := kind_of(mode):
+        raise SpecificationError(f"{path}: the output file must be a file, not {kind}")
 
 
 def _failure(directory: Path, error: OSError) -> SosmithError:

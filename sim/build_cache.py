@@ -116,10 +116,10 @@ class BuildCache:
         handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o600)
         try:
             fcntl.flock(handle, fcntl.LOCK_EX)
-            found = os.fstat(handle)
-            _check_owner(path, found)
+            status = os.fstat(handle)
+            _check_owner(path, status)
             secret = os.pread(handle, _KEY_BYTES + 1, 0)
-            if len(secret) != _KEY_BYTES or stat.S_IMODE(found.st_mode) & 0o077:
+            if len(secret) != _KEY_BYTES or stat.S_IMODE(status.st_mode) & 0o077:
                 secret = secrets.token_bytes(_KEY_BYTES)
                 os.fchmod(handle, 0o600)
                 os.ftruncate(handle, 0)
@@ -137,12 +137,12 @@ class BuildCache:
 
     def _entries(self) -> list[Path]:
         """All entries, whole or not, those first that were not used for the longest time."""
-        found = {}
+        used = {}
         for place in self._folder.iterdir():
             with contextlib.suppress(FileNotFoundError):  # removed meanwhile
                 if place.name != _LOCKS:
-                    found[place] = place.stat().st_mtime_ns
-        return sorted(found, key=lambda place: found[place])
+                    used[place] = place.stat().st_mtime_ns
+        return sorted(used, key=lambda place: used[place])
 
     def _shrink(self, kept: Path) -> None:
         entries = [place for place in self._entries() if place != kept]
@@ -178,10 +178,10 @@ class BuildCache:
             os.close(handle)
 
 
-def _check_owner(place: Path, found: os.stat_result) -> None:
-    if found.st_uid != os.geteuid():
+def _check_owner(place: Path, status: os.stat_result) -> None:
+    if status.st_uid != os.geteuid():
         raise SpecificationError(
-            f"{place} must belong to the user who runs this, not to user {found.st_uid}; "
+            f"{place} must belong to the user who runs this, not to user {status.st_uid}; "
             "set XDG_CACHE_HOME to a folder of your own"
         )
 
@@ -189,8 +189,8 @@ def _check_owner(place: Path, found: os.stat_result) -> None:
 def _is_whole(place: Path, secret: bytes) -> bool:
     try:
         _check_owner(place, place.stat())
-        told = json.loads((place / _DIGESTS).read_text(encoding="utf-8"))
-        return bool(told == _digests(place, secret))
+        recorded = json.loads((place / _DIGESTS).read_text(encoding="utf-8"))
+        return bool(recorded == _digests(place, secret))
     except (OSError, ValueError):
         return False
 

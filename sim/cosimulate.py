@@ -58,9 +58,9 @@ def first_copies(result: CosimulationResult, copies: int) -> CosimulationResult:
     if copies == 1:
         return result
     first = replace(result, codes=result.codes[::copies], status=result.status[::copies])
-    for found, once in ((result.codes, first.codes), (result.status, first.status)):
+    for values, once in ((result.codes, first.codes), (result.status, first.status)):
         wrong = np.flatnonzero(
-            (found != np.repeat(once, copies, axis=0)[: len(found)]).reshape(len(found), -1).any(axis=1)
+            (values != np.repeat(once, copies, axis=0)[: len(values)]).reshape(len(values), -1).any(axis=1)
         )
         if len(wrong):
             raise ShortfallError(f"result {wrong[0] // copies} must come out {copies} times, and changes meanwhile")

@@ -55,7 +55,7 @@ def with_cell_models(netlist: Netlist, *, scrambled: bool) -> Path:
     """
     device = netlist.board.device
     files = [*(share_folder() / name for name in _OF_YOSYS[device.family]), *_OURS[device.family]]
-    models = {found[1]: found[0] for file in files for found in _MODULE.finditer(file.read_text(encoding="utf-8"))}
+    models = {match[1]: match[0] for file in files for match in _MODULE.finditer(file.read_text(encoding="utf-8"))}
     needed = sorted(netlist.cells)
     for cell in needed:  # grows while it is iterated: models instantiate further cells
         if cell not in models:

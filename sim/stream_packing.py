@@ -36,8 +36,8 @@ def random_order(samples: int, channels: int, seed: int) -> Order:
 
 def completing(order: Order, samples: int) -> Order:
     """Return the channels of the results, of which a channel's first sample brings one, and each further group."""
-    found: Order = order[_turns(order) % samples == 0]
-    return found
+    completed: Order = order[_turns(order) % samples == 0]
+    return completed
 
 
 def pack(codes: Codes, order: Order, stream: StreamFacts) -> Beats:
@@ -125,8 +125,8 @@ def _joined(samples: npt.NDArray[np.uint64], width: int, lanes: int) -> npt.NDAr
     padded = np.append(samples, np.repeat(samples[-1:], -len(samples) % lanes)).astype("<u8")
     taken = padded.view(np.uint8).reshape(-1, 8)[:, : width // 8].reshape(len(padded) // lanes, -1)
     whole = np.pad(taken, ((0, 0), (0, -taken.shape[1] % 8)))
-    found: npt.NDArray[np.uint64] = np.ascontiguousarray(whole).view("<u8").astype(np.uint64)
-    return found[:, 0] if found.shape[1] == 1 else found
+    beats: npt.NDArray[np.uint64] = np.ascontiguousarray(whole).view("<u8").astype(np.uint64)
+    return beats[:, 0] if beats.shape[1] == 1 else beats
 
 
 def _apart(beats: npt.NDArray[np.uint64], width: int, lanes: int) -> npt.NDArray[np.uint64]:
@@ -136,8 +136,8 @@ def _apart(beats: npt.NDArray[np.uint64], width: int, lanes: int) -> npt.NDArray
     taken = np.ascontiguousarray(beats.astype("<u8")).view(np.uint8).reshape(len(beats), -1)
     each = taken[:, : lanes * width // 8].reshape(len(beats) * lanes, -1)
     whole = np.pad(each, ((0, 0), (0, 8 - each.shape[1])))
-    found: npt.NDArray[np.uint64] = np.ascontiguousarray(whole).view("<u8").astype(np.uint64)[:, 0]
-    return found
+    split_up: npt.NDArray[np.uint64] = np.ascontiguousarray(whole).view("<u8").astype(np.uint64)[:, 0]
+    return split_up
 
 
 def _check_channels(beats: Beats, order: Order) -> None:

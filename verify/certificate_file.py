@@ -41,10 +41,10 @@ def _rational(value: object) -> object:
     match = _RATIONAL.fullmatch(value) if isinstance(value, str) else None
     if match is None or int(match[2] or 1) == 0:
         raise ValueError('must be a rational number as a text "p/q"')
-    found = Fraction(int(match[1]), int(match[2] or 1))
-    if str(found) != value:
+    number = Fraction(int(match[1]), int(match[2] or 1))
+    if str(number) != value:
         raise ValueError('must be a rational number in lowest terms as a text "p/q", or "p"')
-    return found
+    return number
 
 
 Rational = Annotated[Fraction, BeforeValidator(_rational), PlainSerializer(str)]

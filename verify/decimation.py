@@ -158,15 +158,15 @@ def _behind(entry: DecimationEntry, port: PortEntry) -> PortEntry:
     bits = entry.width - entry.dropped
     require(2 <= bits <= _MAX_BITS, f"what leaves the decimator must have 2 to {_MAX_BITS} bits, not {bits}")
     lsb = _step(entry, port)
-    made = PortEntry(name=port.name, bits=bits, signed=port.signed, lsb=lsb, zero=port.zero, unit=port.unit)
+    output = PortEntry(name=port.name, bits=bits, signed=port.signed, lsb=lsb, zero=port.zero, unit=port.unit)
     half = 1 << entry.dropped >> 1
     for result in (least, most):
         rounded = (result + half) >> entry.dropped
         require(
-            made.lowest <= rounded <= made.highest,
-            f"what leaves the decimator must be in {made.lowest}..{made.highest}, not {rounded}",
+            output.lowest <= rounded <= output.highest,
+            f"what leaves the decimator must be in {output.lowest}..{output.highest}, not {rounded}",
         )
-    return made
+    return output
 
 
 def _check_aliasing(entry: DecimationEntry) -> None:

@@ -218,18 +218,18 @@ class Transfer:
     def sources(self) -> dict[Source, tuple[Fraction, Fraction]]:
         """Every source with the range of its values; the inputs come first."""
         nodes = self.stage.nodes
-        found: dict[Source, tuple[Fraction, Fraction]] = {}
+        ranges: dict[Source, tuple[Fraction, Fraction]] = {}
         for form in self._forms:
             for key in form:
                 if isinstance(key, tuple):
                     (op, index, kept), _ = key
                     unit = Fraction(2) ** -nodes[index].frac
                     if op in {Operation.INPUT, Operation.CONSTANT}:
-                        found[key[0]] = nodes[index].low * unit, nodes[index].high * unit
+                        ranges[key[0]] = nodes[index].low * unit, nodes[index].high * unit
                     else:
                         most = (2 ** (nodes[index].frac - kept) - 1) * unit
-                        found[key[0]] = (Fraction(0) if op is Operation.FLOOR else -most), most
-        return dict(sorted(found.items(), key=lambda item: item[0][0] is not Operation.INPUT))
+                        ranges[key[0]] = (Fraction(0) if op is Operation.FLOOR else -most), most
+        return dict(sorted(ranges.items(), key=lambda item: item[0][0] is not Operation.INPUT))
 
     @property
     def inputs(self) -> list[Source]:

@@ -129,10 +129,10 @@ def _row(polynomial: fmpq_poly) -> list[Fraction]:
 
 def _sums(factors: Sequence[Fraction], scale: Fraction) -> set[Fraction]:
     """Return all sums of the factors times digits, scaled."""
-    found = {Fraction(0)}
+    sums = {Fraction(0)}
     for factor in factors:
-        found = {total + factor * digit * scale for total, digit in product(found, (-1, 0, 1))}
-    return found
+        sums = {total + factor * digit * scale for total, digit in product(sums, (-1, 0, 1))}
+    return sums
 
 
 def _follow(name: str, start: Interval, increments: set[Fraction]) -> None:

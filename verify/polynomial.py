@@ -156,8 +156,8 @@ def output_error(certificate: Certificate, stage: StageEntry) -> tuple[Fraction,
     count = len(inputs_of(stage))
     require(count in {1, 2}, f"{stage.name} must have one or two inputs, not {count}")
     variables = [_variable(index, count) for index in range(count)]
-    made = _through(stage, variables, count)[stage.outputs[0]]
-    difference = made.plus(variables[0], -1).plus(_constant(port.zero / port.lsb, count))
+    polynomial = _through(stage, variables, count)[stage.outputs[0]]
+    difference = polynomial.plus(variables[0], -1).plus(_constant(port.zero / port.lsb, count))
     factor = difference.exact.pop((1, 0)[:count], Fraction(0)) + 1
     require(factor == 1, f"{stage.name} must add to its input and no more, not multiply it by {factor}")
     gain = difference.exact.pop((0, 1), Fraction(0))

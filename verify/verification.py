@@ -162,11 +162,11 @@ def _verified(certificate: Certificate, progress: Progress) -> Verdict:
 
 def _before_decimator(certificate: Certificate, progress: Progress) -> tuple[dict[str, Fraction], int]:
     """Prove the calibration before a decimator, if there is one; return its error in output LSBs and its nodes."""
-    ahead = calibration_alone(certificate)
-    if ahead is None:
+    calibration = calibration_alone(certificate)
+    if calibration is None:
         return {}, 0
-    proven = _verified(ahead, progress)
-    return {"calibration": proven.bound * ahead.output.lsb / certificate.output.lsb}, proven.nodes
+    proven = _verified(calibration, progress)
+    return {"calibration": proven.bound * calibration.output.lsb / certificate.output.lsb}, proven.nodes
 
 
 def _compare(what: str, claimed: Fraction | None, proven: Fraction | None) -> None:
@@ -295,10 +295,10 @@ class _Cascade:
             drives = self._at(index, model.stage.outputs, arrived)
         progress("sections", len(self._models), len(self._models))
         last = len(self._models) - 1
-        made, *errors = (self._driven(drive, last) for drive in drives)
+        signal, *errors = (self._driven(drive, last) for drive in drives)
         over = self._up_to(last)
         self.rounding = on_grid(magnitude(over, errors))
-        exceeded = deviation(over, made[0], ideal, exact[0], self._windows)
+        exceeded = deviation(over, signal[0], ideal, exact[0], self._windows)
         self.coefficients = on_grid(exceeded)
         # Both figures are rounded up: what that adds is room for another ideal filter.
         largest = max(Fraction(1), *(abs(end) for window in self._windows for end in window))
@@ -367,10 +367,10 @@ class _Cascade:
         (through, *_), *others = (self._driven(drive, index) for drive in self._at(index, [node], arrived))
         low = high = Fraction(0)
         for rough in (True, False):  # a rough range mostly fits
-            found = [
+            ranges = [
                 extremes(self._up_to(index), [(through, *window), *others], rough=rough) for window in self._windows
             ]
-            low, high = min(low for low, _ in found) * 2**bound.frac, max(high for _, high in found) * 2**bound.frac
+            low, high = min(low for low, _ in ranges) * 2**bound.frac, max(high for _, high in ranges) * 2**bound.frac
             if bound.low <= max(low, of.low) and min(high, of.high) <= bound.high:
                 return
         raise RejectedError(

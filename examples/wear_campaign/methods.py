@@ -152,7 +152,7 @@ def judged(made: Made, trace: Trace, core: CoreDesign, others: Sequence[Trace] =
     that each source of the budget has on average, as ``PART`` and its name.
     """
     quantized, reading = core.quantized, trace.reading
-    _, _, clearance = _measured(made, trace, core)
+    _, _, clearance = measured_by(made, trace, core)
     found = {
         "accuracy": accuracy_percent(clearance, trace.truth, reading),
         "order": float(made.order),
@@ -170,7 +170,7 @@ def judged(made: Made, trace: Trace, core: CoreDesign, others: Sequence[Trace] =
     )
     held: dict[str, list[float]] = {}
     for one in (trace, *others):
-        V, T, clearance = _measured(made, one, core)
+        V, T, clearance = measured_by(made, one, core)
         some = np.flatnonzero(one.reading)
         some = some[:: max(len(some) // HELD, 1)]
         off, V, T = np.abs(clearance - one.truth)[some], V[some], T[some]
@@ -183,7 +183,7 @@ def judged(made: Made, trace: Trace, core: CoreDesign, others: Sequence[Trace] =
     return found | {figure: float(np.mean(values)) for figure, values in held.items()}
 
 
-def _measured(made: Made, trace: Trace, core: CoreDesign) -> tuple[Values, Values, Values]:
+def measured_by(made: Made, trace: Trace, core: CoreDesign) -> tuple[Values, Values, Values]:
     """Return voltage in V, temperature in degC and filtered clearance in mm of a trace."""
     bench = bench_of(core)
     V, T = (port.decode(trace.codes[:, k]) for k, port in enumerate(bench.ports))

@@ -53,7 +53,9 @@ def section(rows: list[dict[str, Any]], wear: dict[str, Any], settings: dict[str
         f"{settings['seeds']} seeds and each of {len(own['sensors'])} true sensors: the paper's equation 5a, its "
         "equation 4, and a coil with a core; `bayes` takes each for a sensor of the type equation 5a. In double "
         "precision, with the paper's filter on the bench and that from spectra in the week. Mean accuracy in % with "
-        f"its {share:.0f} % interval, and the worst seed.",
+        f"its {share:.0f} % interval, and the worst seed. The true sensors of a seed share their streams of random "
+        f"numbers: scatter, noise and errors of the days are the same for all of them, so that the {len(mains)} cases "
+        "are fewer than as many independent results.",
         table(
             ["run", "true sensor", *(f"{name}, %" for name in METHODS.values()), "bayes over the paper, points"],
             [

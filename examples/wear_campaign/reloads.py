@@ -39,7 +39,7 @@ def one_week(core: CoreDesign, scenario: ScenarioFile, seed: int) -> list[dict[s
         except ShortfallError as error:
             mornings.append({"verdict": "refused", "reason": str(error)})
         else:
-            active = swap.made
+            active = swap.new_set
             bound = round(float(active.quantized.bound * lsb), 9)
             mornings.append({"verdict": "proven", "bound": bound})
     return mornings

@@ -101,8 +101,8 @@ def live(
         progress("week: prove and reload", number, len(calibrations))
         try:
             swap = check_swap(factory, before, set_for(factory, load(wanted)))
-            before, verdict = swap.made, f"proven, {float(swap.made.quantized.bound):.2f} LSB"
-            loaded.append(swap.made.quantized.datapath)
+            before, verdict = swap.new_set, f"proven, {float(swap.new_set.quantized.bound):.2f} LSB"
+            loaded.append(swap.new_set.quantized.datapath)
         except ShortfallError as error:
             verdict = f"refused: {error}"
             loaded.append(loaded[-1] if loaded else factory.datapath)  # keeps the active set

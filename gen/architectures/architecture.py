@@ -58,8 +58,8 @@ class Architecture(ABC):
         between. All products by constants are then made of adders.
     hold : bool
         Whether each result behind a decimator is handed out once for each of its samples.
-    ahead : Architecture or None
-        That of the calibration before a decimator; None without one.
+    calibration : Architecture or None
+        Hardware of the calibration before a decimator; None without one.
     """
 
     terms: ClassVar[Terms]
@@ -74,7 +74,7 @@ class Architecture(ABC):
     samples_per_clock: int = 1
     look_ahead: bool = False
     hold: bool = False
-    ahead: Architecture | None = None
+    calibration: Architecture | None = None
 
     @classmethod
     @abstractmethod
@@ -172,8 +172,8 @@ class Architecture(ABC):
         Those of a calibration before a decimator are among them, unless that alone has a program.
         """
         own = cost_of_graphs(self.graphs, self.adders)
-        apart = self.ahead is None or (self.program is None and self.ahead.program is not None)
-        return own if self.ahead is None or apart else self.ahead.cost.beside(own)
+        apart = self.calibration is None or (self.program is None and self.calibration.program is not None)
+        return own if self.calibration is None or apart else self.calibration.cost.beside(own)
 
     @property
     def multiplier_blocks(self) -> int:
@@ -184,7 +184,7 @@ class Architecture(ABC):
     @property
     def memory_bits(self) -> int | None:
         """Bits of memory, with those of what stands before a decimator; None if nothing has any."""
-        programs = [each.program for each in (self.ahead, self) if each is not None and each.program is not None]
+        programs = [each.program for each in (self.calibration, self) if each is not None and each.program is not None]
         return sum(each.words * (each.digit_bits + 1) for each in programs) if programs else None
 
     # Clocks. Those with an underscore are of what stands behind a decimator alone.
@@ -222,7 +222,7 @@ class Architecture(ABC):
         if self.decimator is None:
             return self._latency_cycles
         before = decimator_clocks.latency_cycles(self.decimator, self.channels)
-        before += 0 if self.ahead is None else self.ahead.latency_cycles
+        before += 0 if self.calibration is None else self.calibration.latency_cycles
         several = self.channels > 1  # which are let in when all is cleared
         still_cleared = 0 if several else self._cleared_cycles - decimator_clocks.reset_cycles(self.decimator)
         return max(before, still_cleared) + self._latency_cycles + self.hold
@@ -238,14 +238,14 @@ class Architecture(ABC):
         if self.decimator is None:
             return self._cleared_cycles + self._taken_cycles
         filled = decimator_clocks.reset_cycles(self.decimator, self.channels)
-        ahead = self.ahead
+        before = self.calibration
         if self.channels > 1:
-            cleared = max(self._cleared_cycles, 0 if ahead is None else ahead._cleared_cycles)
-            return max(cleared, filled) + (0 if ahead is None else ahead._taken_cycles)
-        if ahead is None:
+            cleared = max(self._cleared_cycles, 0 if before is None else before._cleared_cycles)
+            return max(cleared, filled) + (0 if before is None else before._taken_cycles)
+        if before is None:
             return filled
         # The calibration gives the first sample that the decimator fills with.
-        return ahead._cleared_cycles + ahead.latency_cycles + filled + decimator_clocks.FIRST_SAMPLE
+        return before._cleared_cycles + before.latency_cycles + filled + decimator_clocks.FIRST_SAMPLE
 
     @property
     def cycles_per_sample(self) -> int:
@@ -271,7 +271,7 @@ class Architecture(ABC):
         behind = self._cycles_per_sample
         if self.decimator is None:
             return behind
-        each = 1 if self.ahead is None else self.ahead.cycles_per_result
+        each = 1 if self.calibration is None else self.calibration.cycles_per_result
         if self.channels > 1:
             return max(decimator_clocks.cycles_per_result_of_many(self.decimator, each=each), behind)
         return max(decimator_clocks.cycles_per_result(self.decimator, self._taken_cycles, each=each), behind)
@@ -284,20 +284,20 @@ class Architecture(ABC):
 
     def component(self) -> Component:
         """Make the hardware; the top module has the name of the datapath."""
-        made = self._core()
+        core = self._core()
         if self.decimator is None:
-            return made
+            return core
         from sosmith.hdl.decimation.decimator import DecimatedCore  # only what makes hardware loads Amaranth
 
-        ahead = None if self.ahead is None else self.ahead._core(before=True)
-        return DecimatedCore(self.datapath, made, ahead, hold=self.hold, opens=self._cleared_cycles)
+        before = None if self.calibration is None else self.calibration._core(before=True)
+        return DecimatedCore(self.datapath, core, before, hold=self.hold, opens=self._cleared_cycles)
 
     @property
     def _flags_given(self) -> int:
         """Flags of a sample that a decimator hands on to what stands behind it."""
         from sosmith.hdl.status import OF_INPUT, RAIL_ALONE
 
-        return 0 if self.decimator is None else RAIL_ALONE if self.ahead is None else OF_INPUT
+        return 0 if self.decimator is None else RAIL_ALONE if self.calibration is None else OF_INPUT
 
     # Words.
 

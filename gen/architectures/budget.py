@@ -71,7 +71,7 @@ class Budget:
         needed = architecture.cycles_per_result
         if needed <= self.cycles:
             return
-        most, wanted = _told_apart(self.clock * self._at_once / (needed * self.channels), self.sample_rate)
+        most, wanted = _distinct_texts(self.clock * self._at_once / (needed * self.channels), self.sample_rate)
         many = f" with {self.channels:,} channels" if self.channels > 1 else ""
         per = "a sample" if self._at_once == 1 else f"for {self._at_once} samples"
         raise ShortfallError(
@@ -80,7 +80,7 @@ class Budget:
         )
 
 
-def _told_apart(most: Fraction, wanted: Fraction) -> tuple[str, str]:
+def _distinct_texts(most: Fraction, wanted: Fraction) -> tuple[str, str]:
     """Texts of two rates with enough digits to tell them apart; `most` is rounded down, so that it is achievable."""
     for digits in range(6, 17):
         context = decimal.Context(prec=digits, rounding=decimal.ROUND_FLOOR)

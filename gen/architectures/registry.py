@@ -39,11 +39,11 @@ def fitting(
     board: Board | None = None,
     *,
     look_ahead: bool = False,
-    ahead: Architecture | None = None,
+    calibration: Architecture | None = None,
 ) -> Architecture:
     """Return the hardware that an architecture makes of `datapath`, for a board if there is one.
 
-    `ahead` is that of the calibration before its decimator.
+    `calibration` is the hardware of the calibration before its decimator.
 
     Raises
     ------
@@ -60,7 +60,7 @@ def fitting(
         budget.samples_per_clock,
         look_ahead,
         budget.hold,
-        ahead,
+        calibration,
     )
     budget.check(architecture)
     return architecture

@@ -58,17 +58,17 @@ class SharedUnit(Architecture):
             If the datapath cannot be folded.
         """
         try:
-            made = program(self.datapath.behind_decimator, self.digit_bits, spare_words=SPARE_WORDS * self.reload)
+            folded = program(self.datapath.behind_decimator, self.digit_bits, spare_words=SPARE_WORDS * self.reload)
             for digit_bits in range(self.digit_bits - 1, 0, -1):
-                if not self.reload or instruction_bits(made) <= BITS:  # one register holds an instruction
+                if not self.reload or instruction_bits(folded) <= BITS:  # one register holds an instruction
                     break
-                made = program(self.datapath, digit_bits, spare_words=SPARE_WORDS)
+                folded = program(self.datapath, digit_bits, spare_words=SPARE_WORDS)
         except FoldingError as error:
             raise ShortfallError(unsuitable(self.name, error)) from None
         if not self.reload:
-            return made
-        roomy = replace(made, accumulator_bits=made.accumulator_bits + SPARE_ACCUMULATOR_BITS)
-        return roomy.padded(len(made.instructions) + len(made.instructions) // SPARE_INSTRUCTIONS)
+            return folded
+        roomy = replace(folded, accumulator_bits=folded.accumulator_bits + SPARE_ACCUMULATOR_BITS)
+        return roomy.padded(len(folded.instructions) + len(folded.instructions) // SPARE_INSTRUCTIONS)
 
     @property
     def multiplier_blocks(self) -> int:

@@ -6,14 +6,15 @@ from collections import Counter
 from collections.abc import Sequence
 
 from sosmith.gen.architectures.architecture import Architecture
-from sosmith.gen.estimate.graphs import Pipelined, of_pipelined
+from sosmith.gen.estimate.graphs import of_pipelined
+from sosmith.gen.estimate.memories import of_memory
 from sosmith.gen.estimate.online import of_units
+from sosmith.gen.estimate.pipelined import Pipelined
 from sosmith.gen.estimate.programs import of_program
 from sosmith.gen.estimate.quantities import (
     Quantities,
     flags_of,
     of_inputs,
-    of_memory,
     of_output_buffer,
     tree,
 )
@@ -38,8 +39,8 @@ def quantities_of(architecture: Architecture, device: Device) -> Quantities:
     if architecture.decimator is not None:
         made += _of_decimator(architecture.decimator, architecture.channels, device)
         made += of_inputs(architecture.datapath.inputs, architecture.datapath.calibrated)
-        if architecture.ahead is not None:
-            made += quantities_of(architecture.ahead, device)
+        if architecture.calibration is not None:
+            made += quantities_of(architecture.calibration, device)
     return made
 
 

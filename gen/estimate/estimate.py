@@ -139,12 +139,12 @@ def usual_estimates(architecture: Architecture, board: Board | None = None) -> t
 
 def on_board(architecture: Architecture, board: Board) -> Architecture:
     """Return the hardware that an architecture makes of the same datapath for a board."""
-    ahead = None if architecture.ahead is None else on_board(architecture.ahead, board)
+    before = None if architecture.calibration is None else on_board(architecture.calibration, board)
     return replace(
         architecture,
         blocks=blocks_for(architecture.blocks.available, board),
         digit_bits=architecture.digit_bits_on(board),
-        ahead=ahead,
+        calibration=before,
     )
 
 

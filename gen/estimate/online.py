@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections import Counter
 
 from sosmith.gen.architectures.architecture import Architecture
-from sosmith.gen.estimate.graphs import Pipelined, of_pipelined
+from sosmith.gen.estimate.graphs import of_pipelined
+from sosmith.gen.estimate.pipelined import Pipelined
 from sosmith.gen.estimate.quantities import Quantities, flags_of, of_inputs, of_output_buffer
 from sosmith.gen.fpga.boards import Device
 from sosmith.gen.word_lengths.online_units import online_cost

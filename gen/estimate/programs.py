@@ -5,19 +5,19 @@ from __future__ import annotations
 from collections import Counter
 
 from sosmith.gen.architectures.architecture import Architecture
-from sosmith.gen.estimate.graphs import clamp, of_product
+from sosmith.gen.estimate.graphs import clamp
+from sosmith.gen.estimate.memories import of_memory, of_rom
+from sosmith.gen.estimate.products import Product, of_product
 from sosmith.gen.estimate.quantities import (
     Quantities,
     check_bits,
     of_check_bits,
     of_inputs,
-    of_memory,
-    of_rom,
     parity,
 )
 from sosmith.gen.fpga.boards import Device
 from sosmith.gen.word_lengths.cost import Multiplication, Operand
-from sosmith.hdl.plan.folded_clocks import FOLDED_DEPTH, SERIAL_DEPTH, memory_depth
+from sosmith.hdl.plan.folded_clocks import FOLDED_DEPTH, SERIAL_DEPTH, memory_depth, word_slices
 from sosmith.hdl.plan.instructions import address_bits, encoded, instruction_bits
 from sosmith.hdl.plan.streams import channel_bits
 from sosmith.model.dataflow.graph import Op
@@ -39,7 +39,7 @@ def of_program(architecture: Architecture, device: Device) -> Quantities:
     made["shifts"] += 2 * word * serial
     if not serial:
         factor = Operand(word, signed=True)
-        made += of_product(Multiplication(factor, factor), device)
+        made += of_product(Product(Multiplication(factor, factor)), device)
     made["channels"] += channel_bits(channels)
     depth = SERIAL_DEPTH if serial else FOLDED_DEPTH
     made["registers"] += acc + word * (4 if serial else 3) + (depth - 1) * (instruction_bits(program) + 1)
@@ -68,7 +68,8 @@ def _memories(architecture: Architecture, program: Program, device: Device) -> Q
         made["guarded_ports"] += protect != "none"
         made["loaded"] += bits
     words, program_bits = word + check_bits(word, protect), bits + check_bits(bits, protect)
-    made += of_memory(device, depth, words)
+    for low, high in word_slices(depth, words):
+        made += of_memory(device, depth, high - low)
     if is_written:
         return made + of_memory(device, count, program_bits)
     guarded = [code | parity(code) << bits if protect != "none" else code for code in codes]

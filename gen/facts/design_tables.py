@@ -64,9 +64,9 @@ def budget_table(parts: Mapping[str, float], allowed: float, step: float, unit: 
     )
 
 
-def uncertainty_table(found: Mapping[str, Any]) -> Table:
-    """Say what a reading's uncertainty is made of where it is largest; `found` is the budget in the types of JSON."""
-    at, unit = found["at"], found["unit"]
+def uncertainty_table(budget: Mapping[str, Any]) -> Table:
+    """Say what a reading's uncertainty is made of where it is largest; `budget` is in the types of JSON."""
+    at, unit = budget["at"], budget["unit"]
     rows = [
         (
             one["source"],
@@ -79,7 +79,7 @@ def uncertainty_table(found: Mapping[str, Any]) -> Table:
         for one in at["contributions"]
     ]
     rows.append(("combined", "", "", "", plain_number(at["combined"]), _freedom(at["degrees_of_freedom"])))
-    expanded = f"expanded, {100 * found['probability']:g} %"
+    expanded = f"expanded, {100 * budget['probability']:g} %"
     factor = f"k = {plain_number(at['coverage_factor'])}"
     rows.append((expanded, "", "", factor, plain_number(at["expanded"]), ""))
     where = (
@@ -104,14 +104,14 @@ def limit_cycles_table(cycles: Sequence[LimitCycleFacts], facts: CoreFacts) -> T
     unit = ErrorUnit.of(facts)
     rows = [
         (
-            found.section,
-            "none, proven" if found.none else unit.number(found.largest),
-            "0" if found.none else plain_number(found.largest / facts.lsb),
-            unit.number(found.dead_band),
-            plain_number(found.dead_band / facts.lsb),
-            ", ".join(f"{float(weight):.4g}" for weight in found.lyapunov or ()) or "not needed",
+            each.section,
+            "none, proven" if each.none else unit.number(each.largest),
+            "0" if each.none else plain_number(each.largest / facts.lsb),
+            unit.number(each.dead_band),
+            plain_number(each.dead_band / facts.lsb),
+            ", ".join(f"{float(weight):.4g}" for weight in each.lyapunov or ()) or "not needed",
         )
-        for found in cycles
+        for each in cycles
     ]
     head = ("section", unit.titled("without input, at most"), "in LSB", unit.titled("dead band"), "in LSB")
     return Table(

@@ -136,17 +136,17 @@ class Decimation:
     def deviation(self, filter_: Filter, direct: Filter) -> float:
         """Largest deviation of decimator and corrected filter from a `direct` one in dB, at `SAMPLED` frequencies."""
         frequency = np.array([k * float(self.edge) / SAMPLED for k in range(1, SAMPLED + 1)])
-        made = self.gain(frequency) * np.abs(complex_response(filter_.sos, frequency, float(self.rate)))
+        decimated_gain = self.gain(frequency) * np.abs(complex_response(filter_.sos, frequency, float(self.rate)))
         wanted = np.abs(complex_response(direct.sos, frequency, float(self.sample_rate)))
-        ratios = (made / wanted).tolist()
+        ratios = (decimated_gain / wanted).tolist()
         return max(20 * math.log10(max(ratios)), -20 * math.log10(min(ratios)))
 
     def response(self, frequency: Array) -> Complex:
         """Response of the decimator at frequencies in Hz: its gain, and the phase of its delay."""
-        turns = (math.pi * self.stages * (self.factor - 1) / float(self.sample_rate) * frequency).ravel().tolist()
-        phases = np.array([complex(math.cos(turn), -math.sin(turn)) for turn in turns]).reshape(frequency.shape)
-        found: Complex = self._sines(frequency) ** self.stages * phases
-        return found
+        angles = (math.pi * self.stages * (self.factor - 1) / float(self.sample_rate) * frequency).ravel().tolist()
+        phases = np.array([complex(math.cos(angle), -math.sin(angle)) for angle in angles]).reshape(frequency.shape)
+        response: Complex = self._sines(frequency) ** self.stages * phases
+        return response
 
     def gain(self, frequency: Array) -> Array:
         """Magnitude of the decimator's response at frequencies in Hz."""
@@ -218,15 +218,15 @@ def stages_for(factor: int, spec: FilterSpec, sample_rate: Fraction, allowed: Fr
     """
     assert spec.cutoff is not None
     for stages in range(1, MAX_STAGES + 1):
-        found = Decimation(factor=factor, stages=stages, sample_rate=sample_rate, edge=spec.cutoff[0])
-        if found.worst_aliasing <= allowed:
-            return found
+        decimation = Decimation(factor=factor, stages=stages, sample_rate=sample_rate, edge=spec.cutoff[0])
+        if decimation.worst_aliasing <= allowed:
+            return decimation
     return None
 
 
-def decimated(spec: FilterSpec, found: Decimation) -> Filter:
+def decimated(spec: FilterSpec, decimation: Decimation) -> Filter:
     """Design the filter behind a decimator, with the correction of its droop."""
-    return found.corrected(design(spec, found.rate))
+    return decimation.corrected(design(spec, decimation.rate))
 
 
 def choose(spec: FilterSpec, sample_rate: Fraction, allowed: Fraction, bits: int) -> tuple[Decimation | None, str]:
@@ -257,27 +257,27 @@ def choose(spec: FilterSpec, sample_rate: Fraction, allowed: Fraction, bits: int
     """
     assert spec.cutoff is not None
 
-    def fits(found: Decimation) -> bool:
-        return bits + found.stages * (found.factor.bit_length() - 1) <= MAX_WIDTH
+    def fits(decimation: Decimation) -> bool:
+        return bits + decimation.stages * (decimation.factor.bit_length() - 1) <= MAX_WIDTH
 
     if spec.decimate != AUTO:
         factor = int(spec.decimate or 1)
-        made = stages_for(factor, spec, sample_rate, allowed)
-        if made is None or not fits(made):
+        decimation = stages_for(factor, spec, sample_rate, allowed)
+        if decimation is None or not fits(decimation):
             raise ShortfallError(
                 f"filter.decimate must be so small that a full-scale sine which folds into the pass band is at most "
                 f"output.max_error with {MAX_STAGES} stages of at most {MAX_WIDTH} bits, not {factor}"
             )
-        return made, f"by {factor}: asked for in the specification; {_why_stages(made)}"
+        return decimation, f"by {factor}: asked for in the specification; {_why_stages(decimation)}"
     direct = design(spec, sample_rate)
     longest = MAX_DELAY * group_delay(direct.exact) / sample_rate
     best, factor = None, 2
     while factor <= MAX_DECIMATION and factor * spec.cutoff[0] <= MAX_RATIO * sample_rate:
-        made = stages_for(factor, spec, sample_rate, allowed)
-        if made is not None and fits(made):
-            filter_ = decimated(spec, made)
-            if made.delay(filter_) <= longest and made.deviation(filter_, direct) <= MAX_DEVIATION:
-                best = made
+        decimation = stages_for(factor, spec, sample_rate, allowed)
+        if decimation is not None and fits(decimation):
+            filter_ = decimated(spec, decimation)
+            if decimation.delay(filter_) <= longest and decimation.deviation(filter_, direct) <= MAX_DEVIATION:
+                best = decimation
         factor *= 2
     limits = f"a delay at most {float(100 * (MAX_DELAY - 1)):g} % longer and a gain within {MAX_DEVIATION:g} dB"
     if best is None:
@@ -285,8 +285,9 @@ def choose(spec: FilterSpec, sample_rate: Fraction, allowed: Fraction, bits: int
     return best, f"by {best.factor}: the largest power of two with {limits}; {_why_stages(best)}"
 
 
-def _why_stages(found: Decimation) -> str:
-    return f"{found.stages} stages keep what folds into the pass band below {nearest_db(found.worst_aliasing):.1f} dB"
+def _why_stages(decimation: Decimation) -> str:
+    stages = "1 stage keeps" if decimation.stages == 1 else f"{decimation.stages} stages keep"
+    return f"{stages} what folds into the pass band below {nearest_db(decimation.worst_aliasing):.1f} dB"
 
 
 def nearest_db(gain: Fraction) -> float:

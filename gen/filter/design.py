@@ -213,7 +213,7 @@ def minimum_order(
     """
     fs = Fraction(sample_rate)
 
-    def found() -> tuple[int, float]:
+    def order_and_cutoff() -> tuple[int, float]:
         order, (edge,) = least_order(
             "butterworth",
             "lowpass",
@@ -223,7 +223,7 @@ def minimum_order(
         )
         return order, nearest_double(unwarped(edge, fs))
 
-    return evaluate(found)
+    return evaluate(order_and_cutoff)
 
 
 def design(spec: FilterSpec, sample_rate: Fraction | float) -> Filter:
@@ -386,19 +386,19 @@ def _normalized(rows: Sequence[Row]) -> tuple[str, tuple[Row, ...]]:
     The first section takes the remaining gain.
     """
     kind, z = _kind_and_reference(rows)
-    made, total = [], arb(1)
+    numerator_balls, total = [], arb(1)
     for row in rows:
         response = _response([row], z)
         # If the response is real, its sign is kept, so that a section that inverts the signal also has unity gain.
         gain = abs(response) if kind == "bandpass" else response.real
         if sign(gain) == 0:
-            made.append([arb(b) for b in row[:3]])
+            numerator_balls.append([arb(b) for b in row[:3]])
             continue
         total *= gain
-        made.append([arb(b) / gain for b in row[:3]])
+        numerator_balls.append([arb(b) / gain for b in row[:3]])
     if abs(nearest_double(total - 1)) > _UNITY:
-        made[0] = [b * total for b in made[0]]
-    numerators = [tuple(nearest_double(b) for b in numerator) for numerator in made]
+        numerator_balls[0] = [b * total for b in numerator_balls[0]]
+    numerators = [tuple(nearest_double(b) for b in numerator) for numerator in numerator_balls]
     return kind, tuple((*numerator, *row[3:]) for numerator, row in zip(numerators, rows, strict=True))
 
 

@@ -52,13 +52,13 @@ def exact_bilinear(filter_: DigitalFilter) -> tuple[Exact, ...]:
 
 def pole_factors(pairs: Sequence[acb], real: Sequence[arb]) -> list[Taps]:
     """Return the factors of a denominator: of each conjugate pair of poles, and of all real ones, at most two."""
-    made: list[Taps] = [(-2 * pole.real, pole.real**2 + pole.imag**2) for pole in pairs]
+    factors: list[Taps] = [(-2 * pole.real, pole.real**2 + pole.imag**2) for pole in pairs]
     if len(real) == 1:
-        made.append((-real[0],))
+        factors.append((-real[0],))
     elif real:
         first, second = real
-        made.append((-first - second, first * second))
-    return made
+        factors.append((-first - second, first * second))
+    return factors
 
 
 def exact_form(first: Sequence[arb], zeros: Sequence[Taps], poles: Sequence[Taps]) -> tuple[Exact, ...]:

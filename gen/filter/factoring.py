@@ -132,8 +132,8 @@ def _factored(content: TransferFunction | ZerosAndPoles, sample_rate: Fraction |
     grid = [_on_circle(k) for k in range(_GRID + 1)]
     sizes = [nearest_double(abs(digital(z))) for z in grid]
     passing = grid[sizes.index(max(sizes))]
-    made = paired(poles=digital.poles, zeros=digital.zeros)
-    rows = _signed(rounded(made, passing, abs(digital(passing))), negative=digital.gain < 0)
+    sections = paired(poles=digital.poles, zeros=digital.zeros)
+    rows = _signed(rounded(sections, passing, abs(digital(passing))), negative=digital.gain < 0)
     return Factored(rows, _deviation(rows, [digital(z) for z in grid]))
 
 
@@ -148,10 +148,10 @@ def _roots(polynomial: Sequence[Fraction], order: int) -> list[Root]:
     common = math.lcm(*(value.denominator for value in polynomial))
     padded = [*(int(value * common) for value in polynomial), *[0] * (order + 1 - len(polynomial))]
     # The library's type stubs omit the multiplicities.
-    found = cast("list[tuple[acb, int]]", fmpz_poly(padded[::-1]).complex_roots())
+    roots = cast("list[tuple[acb, int]]", fmpz_poly(padded[::-1]).complex_roots())
     return [
         Root(root, real=root.imag.is_zero())
-        for root, times in found
+        for root, times in roots
         for _ in range(int(times))
         if root.imag.is_zero() or root.imag > 0
     ]
@@ -221,16 +221,16 @@ def _sampled(content: ZerosAndPoles, sample_rate: Fraction) -> Factored:
         dc_gain=level,
     )
     sampled = impulse_invariant(prototype, Fraction(1, 4))
-    made, gain = sampled.sections(), sampled.level
-    rows = _signed(rounded(made, acb(1), abs(gain)), negative=gain < 0)
+    sections, gain = sampled.sections(), sampled.level
+    rows = _signed(rounded(sections, acb(1), abs(gain)), negative=gain < 0)
     grid = [_on_circle(k) for k in range(_GRID + 1)]
-    exact = [_product(made, z) * gain / _product(made, acb(1)) for z in grid]
+    exact = [_product(sections, z) * gain / _product(sections, acb(1)) for z in grid]
     return Factored(rows, _deviation(rows, exact))
 
 
-def _product(made: Sequence[Section], z: acb) -> acb:
+def _product(sections: Sequence[Section], z: acb) -> acb:
     value = acb(1)
-    for section in made:
+    for section in sections:
         (b0, b1, b2), (a0, a1, a2) = section.numerator, section.denominator
         value *= ((b0 * z + b1) * z + b2) / ((a0 * z + a1) * z + a2)
     return value
@@ -248,10 +248,10 @@ def _deviation(rows: Sequence[Row], exact: Sequence[acb]) -> float:
     apart = []
     for k, value in enumerate(exact):
         z = _on_circle(k)
-        found = acb(1)
+        response = acb(1)
         for b0, b1, b2, _, a1, a2 in rows:
-            found *= ((ball(b0) * z + ball(b1)) * z + ball(b2)) / ((z + ball(a1)) * z + ball(a2))
-        apart.append(float(abs(found - value).upper()))
+            response *= ((ball(b0) * z + ball(b1)) * z + ball(b2)) / ((z + ball(a1)) * z + ball(a2))
+        apart.append(float(abs(response - value).upper()))
     return max(apart) / largest
 
 

@@ -100,8 +100,8 @@ class LargestGain:
 
         At the present precision of FLINT, from a band or of the filter alone.
         """
-        found = self._on(low, high, band)
-        return found.middle, _bound(found, high - low)
+        factor = self._on(low, high, band)
+        return factor.middle, _bound(factor, high - low)
 
     def _largest(self, low: Fraction, band: int | None) -> Peak:
         with ctx.workprec(_PRECISION):
@@ -137,10 +137,10 @@ def band_gains(sections: tuple[Exact, ...], factor: int, stages: int) -> tuple[P
     return tuple(gains.of_band(band) for band in range(1, factor // 2 + 1))
 
 
-def _bound(found: _Factor, length: Fraction) -> arb:
+def _bound(factor: _Factor, length: Fraction) -> arb:
     """Bound a gain on an interval from above; infinite where nothing is known of it."""
-    steep = found.middle * (abs(found.slope) * ball(length / 2)).exp()
-    bounds = [bound.upper() for bound in (found.everywhere, steep) if bound.is_finite()]
+    steep = factor.middle * (abs(factor.slope) * ball(length / 2)).exp()
+    bounds = [bound.upper() for bound in (factor.everywhere, steep) if bound.is_finite()]
     return min(bounds, default=arb("inf"))
 
 
@@ -159,14 +159,14 @@ def _cic(factor: int, stages: int, band: int, low: Fraction, high: Fraction) -> 
 def _filter(sections: Sequence[Exact], low: Fraction, high: Fraction) -> _Factor:
     """Gain of sections on an interval of frequencies, of which ``d ln |B| / dp = 2 pi Im(u B'(u) / B(u))``."""
     u, everywhere = (acb(-2 * q).exp_pi_i() for q in (ball((low + high) / 2), _between(low, high)))
-    made = _Factor(arb(1), arb(1), arb(0))
+    product = _Factor(arb(1), arb(1), arb(0))
     for numerator, denominator in sections:
         for taps, power in ((numerator, 1), (denominator, -1)):
             b = [ball(tap) for tap in taps]
             value = _horner(b, everywhere)
             slope = 2 * arb.pi() * (everywhere * _horner([k * c for k, c in enumerate(b)][1:], everywhere) / value).imag
-            made = made.times(_Factor(abs(_horner(b, u)) ** power, abs(value) ** power, power * slope))
-    return made
+            product = product.times(_Factor(abs(_horner(b, u)) ** power, abs(value) ** power, power * slope))
+    return product
 
 
 def _horner(taps: Sequence[arb], u: acb) -> acb:

@@ -251,8 +251,8 @@ def frequency_grid(facts: FilterFacts, points: int = 1200) -> Array:
 
 def _lowest_pole_frequency(facts: FilterFacts) -> float:
     """Distance of the nearest pole from z = 1, as a frequency in Hz: where the response starts to fall."""
-    found = poles(facts.ideal_sos) - 1
-    distances = np.hypot(found.real, found.imag)
+    offsets = poles(facts.ideal_sos) - 1
+    distances = np.hypot(offsets.real, offsets.imag)
     distance = float(np.min(distances)) if len(distances) else 1.0
     return max(distance, 1e-9) * facts.sample_rate / (2 * np.pi)
 
@@ -352,11 +352,11 @@ def measure_response(facts: FilterFacts) -> ResponseMeasures:
     if not passbands(facts):
         inside = ideal >= level - HALF_POWER_DB
     stop = _within(grid, stopbands(facts))
-    found: list[complex] = poles(facts.quantized_sos).tolist()
+    quantized_poles: list[complex] = poles(facts.quantized_sos).tolist()
     return ResponseMeasures(
         max_deviation_db_passband=float(np.max(np.abs(quantized - ideal)[inside])),
         stopband_attenuation_db=float(level - np.max(quantized[stop])) if stop.any() else None,
         passband_loss_db=float(level - np.min(quantized[inside])),
         passband_gain_db=float(np.max(quantized[inside]) - level),
-        largest_pole_radius=max((math.hypot(pole.real, pole.imag) for pole in found), default=0.0),
+        largest_pole_radius=max((math.hypot(pole.real, pole.imag) for pole in quantized_poles), default=0.0),
     )

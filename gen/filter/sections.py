@@ -88,18 +88,18 @@ def paired(*, poles: Sequence[Root], zeros: Sequence[Root]) -> list[Section]:
         _sorted([root for root in roots if not root.real]) + _sorted([root for root in [*roots, *origin] if root.real])
         for roots in (poles, zeros)
     )
-    made = []
+    nearest_first = []
     while left:
-        made.append(_next(left, free))
-    return made[::-1]
+        nearest_first.append(_next(left, free))
+    return nearest_first[::-1]
 
 
-def rounded(made: Sequence[Section], passing: acb, level: arb) -> tuple[Row, ...]:
+def rounded(cascade: Sequence[Section], passing: acb, level: arb) -> tuple[Row, ...]:
     """Round sections, each scaled to unity gain at one frequency, except the first, which takes the total gain.
 
     Parameters
     ----------
-    made : sequence of Section
+    cascade : sequence of Section
     passing : acb
         Point on the unit circle where the gain is set.
     level : arb
@@ -111,7 +111,7 @@ def rounded(made: Sequence[Section], passing: acb, level: arb) -> tuple[Row, ...
         If a number does not round to one double.
     """
     rows = []
-    for index, section in enumerate(made):
+    for index, section in enumerate(cascade):
         denominator = [nearest_double(value) for value in section.denominator]
         gain = _magnitude([ball(value) for value in denominator], passing) / _magnitude(section.numerator, passing)
         if index == 0:
@@ -135,9 +135,9 @@ def _sorted(roots: list[Root]) -> list[Root]:
 
 def _with_equal_zeros(filter_: DigitalFilter, zero: int) -> list[Section]:
     one, zero_ball = arb(1), arb(0)
-    made = [Section((one, arb(-zero), zero_ball), (one, -pole, zero_ball)) for pole in filter_.real_poles]
+    of_real_poles = [Section((one, arb(-zero), zero_ball), (one, -pole, zero_ball)) for pole in filter_.real_poles]
     pairs = sorted((Root(pole, real=False) for pole in filter_.pole_pairs), key=lambda pole: (-_margin(pole), pole.key))
-    return made + [Section((one, arb(-2 * zero), one), _pair(pole)) for pole in pairs]
+    return of_real_poles + [Section((one, arb(-2 * zero), one), _pair(pole)) for pole in pairs]
 
 
 def _next(poles: list[Root], zeros: list[Root]) -> Section:

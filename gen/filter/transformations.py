@@ -125,8 +125,8 @@ def _band(real: Sequence[arb], pairs: Sequence[acb], centre: arb) -> tuple[tuple
                 real_roots += [far, centre / far]
     for pole in pairs:
         root = (pole**2 - centre).sqrt()
-        for found in (pole + root, pole - root):
-            pair_roots.append(found if sign(found.imag) > 0 else found.conjugate())
+        for place in (pole + root, pole - root):
+            pair_roots.append(place if sign(place.imag) > 0 else place.conjugate())
     return tuple(real_roots), tuple(pair_roots)
 
 

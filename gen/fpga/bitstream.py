@@ -166,15 +166,15 @@ def build(
             progress(_STEPS.get(command[0], "placement and routing"))
             _carry_out(tools[command[0]], command[1:], place, board)
         report = json.loads((place / "report.json").read_text(encoding="utf-8"))
-        made = place / f"{name}.{_SUFFIX[board.device.family]}"
+        bitstream_file = place / f"{name}.{_SUFFIX[board.device.family]}"
         clocks = tuple(
-            Clock(clock, round(found["achieved"], 2), round(found["constraint"], 2))
-            for clock, found in sorted(report["fmax"].items())
+            Clock(clock, round(timing["achieved"], 2), round(timing["constraint"], 2))
+            for clock, timing in sorted(report["fmax"].items())
         )
         return Bitstream(
             board=board,
             name=name,
-            content=made.read_bytes(),
+            content=bitstream_file.read_bytes(),
             used={
                 kind: (cells["used"], cells["available"])
                 for kind, cells in sorted(report["utilization"].items())
@@ -193,11 +193,11 @@ def _translated(command: Sequence[str]) -> list[str]:
     if words[0] != "nextpnr-gowin":
         return words
     options = {"--family": "family", "--cst": "cst"}
-    made = ["nextpnr-himbaechel-gowin"]
+    translated = ["nextpnr-himbaechel-gowin"]
     rest = iter(words[1:])
     for word in rest:
-        made += ["--vopt", f"{options[word]}={next(rest)}"] if word in options else [word]
-    return made
+        translated += ["--vopt", f"{options[word]}={next(rest)}"] if word in options else [word]
+    return translated
 
 
 def _carry_out(tool: Tool, arguments: Sequence[str], folder: Path, board: Board) -> None:
@@ -216,7 +216,11 @@ def _carry_out(tool: Tool, arguments: Sequence[str], folder: Path, board: Board)
 
 def _slowest_path(report: dict[str, Any]) -> tuple[Step, ...]:
     """Return the path between registers with the longest delay."""
-    inside = [found["path"] for found in report["critical_paths"] if "<async>" not in found["from"] + found["to"]]
+    inside = [
+        candidate["path"]
+        for candidate in report["critical_paths"]
+        if "<async>" not in candidate["from"] + candidate["to"]
+    ]
     if not inside:
         return ()
     longest = max(inside, key=lambda path: sum(step["delay"] for step in path))

@@ -42,8 +42,8 @@ class Netlist:
 def synthesize(sv: Path, top: str, board: Board, folder: Path) -> Netlist:
     """Synthesize the core in `sv` for `board`; takes seconds, and a minute more on the very first call.
 
-    Files go to `folder`, made if missing. An existing netlist is reused if it was made from the same text by the same
-    version of Yosys.
+    Files go to `folder`, created if missing. An existing netlist is reused if it was made from the same text by the
+    same version of Yosys.
 
     Parameters
     ----------
@@ -70,13 +70,13 @@ def synthesize(sv: Path, top: str, board: Board, folder: Path) -> Netlist:
     fingerprint = hashlib.sha256(text + f"{script}{version}".encode()).hexdigest()
     record, netlist = folder / "synthesis.json", folder / "netlist.v"
     if record.exists() and netlist.exists():
-        made = json.loads(record.read_text(encoding="utf-8"))
-        if made["fingerprint"] == fingerprint:
-            return Netlist(board, netlist, made["cells"], version)
+        earlier = json.loads(record.read_text(encoding="utf-8"))
+        if earlier["fingerprint"] == fingerprint:
+            return Netlist(board, netlist, earlier["cells"], version)
     record.unlink(missing_ok=True)  # leftovers of an interrupted run must not pass for a valid netlist
     write_files(folder, {"core.sv": text.decode()})
     run_yosys(script, folder)
-    found = json.loads((folder / "stat.json").read_text(encoding="utf-8"))["design"]["num_cells_by_type"]
-    cells = {kind: count for kind, count in sorted(found.items()) if not kind.startswith("$")}
+    counts = json.loads((folder / "stat.json").read_text(encoding="utf-8"))["design"]["num_cells_by_type"]
+    cells = {kind: count for kind, count in sorted(counts.items()) if not kind.startswith("$")}
     write_files(folder, {"synthesis.json": to_json({"fingerprint": fingerprint, "cells": cells})})
     return Netlist(board, netlist, cells, version)

@@ -92,10 +92,10 @@ def find_tool(name: str) -> Tool:
     kind = _KINDS[name]
     native = shutil.which(name)
     if native is not None and kind.least is not None:
-        told = subprocess.run([native, "--version"], capture_output=True, text=True, check=False)
-        found = re.search(r"(\d+)\.(\d+)", told.stdout + told.stderr)
-        if found and (int(found[1]), int(found[2])) >= kind.least:
-            return Tool(name, Path(native), found[0])
+        answer = subprocess.run([native, "--version"], capture_output=True, text=True, check=False)
+        match = re.search(r"(\d+)\.(\d+)", answer.stdout + answer.stderr)
+        if match and (int(match[1]), int(match[2])) >= kind.least:
+            return Tool(name, Path(native), match[0])
     script = shutil.which(kind.script, path=str(Path(sys.executable).parent)) or shutil.which(kind.script)
     try:
         version = metadata.version(kind.package)

@@ -53,6 +53,6 @@ def project(verilog: str, top: str, board: Board, *, wiring: Wiring = PLAIN) -> 
         If the board has too few pins for the converters.
     """
     name = f"{top}_{board.name}"
-    made = board_plan(verilog, top, name, board, wiring)
+    plan = board_plan(verilog, top, name, board, wiring)
     wanted = [f"{top}.sv", *(f"{name}{kind}" for kind in _KINDS)]
-    return Project(board, name, {file: text_of(made, file) for file in wanted})
+    return Project(board, name, {file: text_of(plan, file) for file in wanted})

@@ -35,7 +35,7 @@ class BoardBuild:
     core_verilog : str
         The core alone, whose digest the board tells.
     bitstream : Bitstream
-        What the programs made of it.
+        What the programs produced from it.
     """
 
     design: CoreDesign
@@ -67,24 +67,24 @@ class BoardBuild:
     @cached_property
     def summary(self) -> dict[str, Any]:
         """The facts about it as a tree of JSON values: the content of ``build.json``."""
-        made = self.bitstream
+        bitstream = self.bitstream
         return build_facts(self.design, self.board, self.rate, self.core_verilog) | {
-            "passed": made.met,
+            "passed": bitstream.met,
             "bitstream": None
-            if not made.met
+            if not bitstream.met
             else {
-                "file": made.file,
-                "bytes": len(made.content),
-                "sha256": hashlib.sha256(made.content).hexdigest(),
+                "file": bitstream.file,
+                "bytes": len(bitstream.content),
+                "sha256": hashlib.sha256(bitstream.content).hexdigest(),
             },
-            "utilisation": {kind: {"used": used, "available": there} for kind, (used, there) in made.used.items()},
+            "utilisation": {kind: {"used": used, "available": there} for kind, (used, there) in bitstream.used.items()},
             "clocks": [
                 {"name": clock.name, "achieved_mhz": clock.achieved, "wanted_mhz": clock.wanted}
-                for clock in made.clocks
+                for clock in bitstream.clocks
             ],
-            "slowest_path": [{"kind": step.kind, "ns": step.delay, "to": step.end} for step in made.path],
+            "slowest_path": [{"kind": step.kind, "ns": step.delay, "to": step.end} for step in bitstream.path],
             "seed": SEED,
-            "tools": dict(made.versions),
+            "tools": dict(bitstream.versions),
         }
 
     def write(self, folder: Path) -> list[Path]:
@@ -97,16 +97,16 @@ class BoardBuild:
         ToolError
             If the disk is full.
         """
-        made = self.bitstream
+        bitstream = self.bitstream
         contents = {
             f"{top_name(self.design)}.sv": self.verilog.encode(),
-            "build.log": made.log.encode(),
+            "build.log": bitstream.log.encode(),
             "build.json": to_json(self.summary).encode(),
         }
-        if made.met:
-            contents = {made.file: made.content} | contents
+        if bitstream.met:
+            contents = {bitstream.file: bitstream.content} | contents
         else:
-            (folder / made.file).unlink(missing_ok=True)
+            (folder / bitstream.file).unlink(missing_ok=True)
         return write_contents(folder, contents)
 
 
@@ -126,7 +126,7 @@ def build_facts(design: CoreDesign, board: Board, rate: int, core: str) -> dict[
     """
     clock = wiring_of(design, board).clock(board)
     devices = [each.reading.converter.title for each in design.spec.converters]
-    made = {
+    facts = {
         "name": design.datapath.name,
         "sosmith_version": __version__,
         "board": board.name,
@@ -143,8 +143,8 @@ def build_facts(design: CoreDesign, board: Board, rate: int, core: str) -> dict[
     }
     frame = schedule_of(design, clock).frame if design.spec.converters else None
     if frame is None:
-        return made
-    return made | {
+        return facts
+    return facts | {
         "sample_rate": {
             "hz": float(clock / frame.clocks),
             "ppm": round(float(frame.deviation(clock, design.spec.sample_rate)) * 1e6, 1),
@@ -175,8 +175,8 @@ def build_board(
         If the design does not fit the link.
     """
     core, verilog = texts(design, board, rate, progress)
-    made = build(verilog, top_name(design), board, progress, wiring=wiring_of(design, board))
-    return BoardBuild(design, rate, verilog, core, made)
+    bitstream = build(verilog, top_name(design), board, progress, wiring=wiring_of(design, board))
+    return BoardBuild(design, rate, verilog, core, bitstream)
 
 
 def board_cost(
@@ -191,7 +191,7 @@ def board_cost(
     board : Board
         The board.
     cache : Path or None
-        Folder of the summaries, made if missing; None to keep nothing.
+        Folder of the summaries, created if missing; None to keep nothing.
     progress : callable
         Called with the name of each step.
 
@@ -203,17 +203,19 @@ def board_cost(
     core, verilog = texts(design, board, RATE, progress)
     name = f"{fingerprint(verilog, board)}.json"
     if cache is not None and (cache / name).exists():
-        found: dict[str, Any] = json.loads((cache / name).read_text(encoding="utf-8"))
-        return found
+        cached: dict[str, Any] = json.loads((cache / name).read_text(encoding="utf-8"))
+        return cached
     bitstream = build(verilog, top_name(design), board, progress, wiring=wiring_of(design, board))
-    made = BoardBuild(design, RATE, verilog, core, bitstream).summary
+    summary = BoardBuild(design, RATE, verilog, core, bitstream).summary
     if cache is not None:
-        write_contents(cache, {name: to_json(made).encode()})
-    return made
+        write_contents(cache, {name: to_json(summary).encode()})
+    return summary
 
 
 def texts(design: CoreDesign, board: Board, rate: int, progress: Callable[[str], None]) -> tuple[str, str]:
     """Return the SystemVerilog of the core, and of the board's top."""
     progress("SystemVerilog of the board")
     core = core_verilog(design)
-    return core, board_verilog(design, clock=wiring_of(design, board).clock(board), rate=rate, core=core)
+    wiring = wiring_of(design, board)
+    waits = wiring.pll is not None
+    return core, board_verilog(design, clock=wiring.clock(board), rate=rate, core=core, waits=waits)

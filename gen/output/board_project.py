@@ -66,5 +66,5 @@ def board_project(
     """Make the project of a design for a board; parameters and errors as for `build_board`, but nothing is built."""
     core, verilog = texts(design, board, rate, progress)
     progress("project files")
-    made = project(verilog, top_name(design), board, wiring=wiring_of(design, board))
-    return BoardProject(design, rate, core, made)
+    vendor_project = project(verilog, top_name(design), board, wiring=wiring_of(design, board))
+    return BoardProject(design, rate, core, vendor_project)

@@ -24,7 +24,9 @@ def top_name(design: CoreDesign) -> str:
     return f"{design.datapath.name}_board"
 
 
-def board_top(design: CoreDesign, *, clock: Fraction, rate: int = RATE, core: str | None = None) -> BoardTop:
+def board_top(
+    design: CoreDesign, *, clock: Fraction, rate: int = RATE, core: str | None = None, waits: bool = False
+) -> BoardTop:
     """Return the top of a board that has the core of a design.
 
     Parameters
@@ -37,6 +39,8 @@ def board_top(design: CoreDesign, *, clock: Fraction, rate: int = RATE, core: st
         Line rate in baud.
     core : str or None
         The core's SystemVerilog, whose digest the identity has; None to make it.
+    waits : bool
+        Whether the board keeps its reset until its clock has its frequency, as that of a PLL; the link then waits too.
 
     Raises
     ------
@@ -59,13 +63,15 @@ def board_top(design: CoreDesign, *, clock: Fraction, rate: int = RATE, core: st
     schedule = schedule_of(design, clock) if design.spec.converters else None
     text = core or core_verilog(design)
     source: Literal["link", "converter"] = "link" if schedule is None else "converter"
-    memory = identity(design, text, baud=rate, clock=float(clock), source=source).memory
+    about = identity(design, text, baud=rate, clock=float(clock), source=source)
     return BoardTop(
         design.architecture.component(),
-        memory,
+        about.memory,
         ratio=clock / rate,
         channels=design.spec.channels,
         schedule=schedule,
+        packing=about.packing,
+        waits=waits,
     )
 
 
@@ -87,9 +93,9 @@ def schedule_of(design: CoreDesign, clock: Fraction) -> Schedule:
     """
     spec, ports = design.spec, design.datapath.inputs
     if ports != tuple(each.reading.port for each in spec.converters):
-        found = " and ".join(port.name for port in ports)
+        names = " and ".join(port.name for port in ports)
         wanted = " and ".join(each.reading.port.name for each in spec.converters)
-        raise SpecificationError(f"the core must have the inputs {wanted} of the converters, not {found}")
+        raise SpecificationError(f"the core must have the inputs {wanted} of the converters, not {names}")
     if spec.dac is not None and spec.dac.port != design.datapath.output:
         raise SpecificationError(
             f"the core must have the output {spec.dac.port.name} of the converter, not {design.datapath.output.name}"
@@ -134,9 +140,11 @@ def wiring_of(design: CoreDesign, board: Board) -> Wiring:
     )
 
 
-def board_verilog(design: CoreDesign, *, clock: Fraction, rate: int = RATE, core: str | None = None) -> str:
+def board_verilog(
+    design: CoreDesign, *, clock: Fraction, rate: int = RATE, core: str | None = None, waits: bool = False
+) -> str:
     """Return the SystemVerilog of a design's board, with the top module `top_name`.
 
     Parameters and errors are those of `board_top`.
     """
-    return to_verilog(to_rtlil(board_top(design, clock=clock, rate=rate, core=core), top_name(design)))
+    return to_verilog(to_rtlil(board_top(design, clock=clock, rate=rate, core=core, waits=waits), top_name(design)))

@@ -18,7 +18,7 @@ from sosmith.gen.proof.cascade_proof import (
     StageModel,
     TransferFunction,
     error_drives,
-    made_response,
+    quantized_response,
     through,
 )
 from sosmith.gen.proof.linear_model import linear_models
@@ -96,7 +96,7 @@ def certificate(
     """
     datapath = quantized.datapath
     sections = quantized.filter.exact if quantized.filter is not None else ()
-    made = Certificate(
+    unsealed = Certificate(
         format=FORMAT,
         name=datapath.name,
         about=about,
@@ -112,23 +112,23 @@ def certificate(
         stages=tuple(_stage(stage) for stage in datapath.stages),
         claims=_claims(quantized, sections).model_copy(update={"online": None if online is None else _units(online)}),
     )
-    return sealed(made)
+    return sealed(unsealed)
 
 
 def _decimation(quantized: Quantized) -> DecimationEntry | None:
-    decimator, found, filter_ = quantized.datapath.decimator, quantized.decimation, quantized.filter
-    if decimator is None or found is None or filter_ is None:
+    decimator, decimation, filter_ = quantized.datapath.decimator, quantized.decimation, quantized.filter
+    if decimator is None or decimation is None or filter_ is None:
         return None
     return DecimationEntry(
         factor=decimator.factor,
         stages=decimator.stages,
         width=decimator.width,
         dropped=decimator.dropped,
-        correction=found.correction,
-        edge=found.edge / found.sample_rate,
-        aliasing=tuple(map(on_grid, found.aliasing)),
-        bands=tuple(BandEntry(gain=on_grid(peak.gain), at=peak.at) for peak in found.bands(filter_)),
-        calibration=None if quantized.ahead is None else _calibration(quantized.ahead),
+        correction=decimation.correction,
+        edge=decimation.edge / decimation.sample_rate,
+        aliasing=tuple(map(on_grid, decimation.aliasing)),
+        bands=tuple(BandEntry(gain=on_grid(peak.gain), at=peak.at) for peak in decimation.bands(filter_)),
+        calibration=None if quantized.calibration is None else _calibration(quantized.calibration),
     )
 
 
@@ -165,18 +165,18 @@ def about(design: CoreDesign, texts: Mapping[str, str]) -> AboutEntry:
 
 def _item(design: CoreDesign) -> ItemEntry:
     """Say what a core is, as its proof and its user need it."""
-    found, interface, datapath = design.architecture, core_facts(design).interface, design.datapath
+    architecture, interface, datapath = design.architecture, core_facts(design).interface, design.datapath
     everything = tuple((port.lowest, port.highest) for port in datapath.inputs)
     return ItemEntry(
         core=design.core,
-        architecture=found.name,
-        ahead=None if found.ahead is None else found.ahead.name,
-        channels=found.channels,
-        samples=found.samples_per_clock,
+        architecture=architecture.name,
+        ahead=None if architecture.calibration is None else architecture.calibration.name,
+        channels=architecture.channels,
+        samples=architecture.samples_per_clock,
         start="steady" if design.quantized.steady else "zero",
-        hold=found.hold,
-        protect=found.protect,
-        reload=found.reload,
+        hold=architecture.hold,
+        protect=architecture.protect,
+        reload=architecture.reload,
         keep=design.spec.hardware.keep,
         flags=dict(interface.outputs.flags),
         calibrated=() if datapath.calibrated == everything else datapath.calibrated,
@@ -309,7 +309,7 @@ def _closer(
     low = Fraction(0) if steady else low
     return _Closer(
         rounding=on_grid(_magnitude(error_drives(stages))),
-        coefficients=on_grid(difference(made_response(stages), exact, low, high, _ACCURACY).magnitude),
+        coefficients=on_grid(difference(quantized_response(stages), exact, low, high, _ACCURACY).magnitude),
         gain=_gain(exact),
     )
 

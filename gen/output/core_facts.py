@@ -476,13 +476,13 @@ def _section(name: str, graph: Graph, feedback: tuple[int, ...] | None) -> Secti
 
 
 def _limit_cycles(name: str, graph: Graph, output: Port) -> LimitCycleFacts:
-    found = limit_cycles(graph)
+    cycles = limit_cycles(graph)
     return LimitCycleFacts(
         section=name,
-        largest=float(found.largest * output.lsb),
-        dead_band=float(found.dead_band * output.lsb),
-        none=found.none,
-        lyapunov=None if found.lyapunov is None else tuple(found.lyapunov),
+        largest=float(cycles.largest * output.lsb),
+        dead_band=float(cycles.dead_band * output.lsb),
+        none=cycles.none,
+        lyapunov=None if cycles.lyapunov is None else tuple(cycles.lyapunov),
     )
 
 
@@ -502,7 +502,7 @@ def _reload(design: CoreDesign) -> ReloadFacts | None:
 
 def _in_order(datapath: Datapath) -> Sequence[Datapath]:
     """Return what stands before a decimator, if anything does, and the datapath itself."""
-    return (datapath,) if datapath.ahead is None else (datapath.ahead, datapath)
+    return (datapath,) if datapath.calibration is None else (datapath.calibration, datapath)
 
 
 def _formats(stage: Stage, datapath: Datapath) -> Sequence[NodeFormat]:

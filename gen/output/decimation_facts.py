@@ -45,7 +45,7 @@ class AliasingFacts:
 
 
 @dataclass(frozen=True, kw_only=True)
-class AheadFacts:
+class CalibrationFacts:
     """The calibration before a decimator.
 
     Attributes
@@ -108,7 +108,7 @@ class DecimationFacts:
         in the output's unit, both proven.
     direct_largest_db : float
         Largest gain of the filter without a decimator at these frequencies.
-    calibration : AheadFacts or None
+    calibration : CalibrationFacts or None
         What stands before it; None if it takes the input itself.
     """
 
@@ -127,7 +127,7 @@ class DecimationFacts:
     largest_db: float
     largest: float
     direct_largest_db: float
-    calibration: AheadFacts | None = None
+    calibration: CalibrationFacts | None = None
 
     @property
     def own_delay(self) -> float:
@@ -137,40 +137,40 @@ class DecimationFacts:
     @property
     def entries(self) -> dict[str, Any]:
         """All of it as a tree; of a calibration nothing if there is none."""
-        found = asdict(self)
+        tree = asdict(self)
         if self.calibration is None:
-            del found["calibration"]
-        return found
+            del tree["calibration"]
+        return tree
 
 
-def decimation_facts(made: CoreDesign) -> DecimationFacts | None:
+def decimation_facts(core: CoreDesign) -> DecimationFacts | None:
     """Collect the facts about the decimator of a core; None for a core without one."""
-    found, decimator, filter_ = made.quantized.decimation, made.datapath.decimator, made.quantized.filter
-    if found is None or decimator is None or filter_ is None:
+    decimation, decimator, filter_ = core.quantized.decimation, core.datapath.decimator, core.quantized.filter
+    if decimation is None or decimator is None or filter_ is None:
         return None
-    direct = design(made.spec.filter, made.spec.sample_rate)
-    gains, peaks, rate = found.aliasing, found.bands(filter_), found.rate
+    direct = design(core.spec.filter, core.spec.sample_rate)
+    gains, peaks, rate = decimation.aliasing, decimation.bands(filter_), decimation.rate
     largest = max(peak.gain for peak in peaks)
-    low, high = made.datapath.decimated_range
+    low, high = core.datapath.decimated_range
     amplitude = decimator.input.lsb * (high - low) / 2
     return DecimationFacts(
         factor=decimator.factor,
         stages=decimator.stages,
         width=decimator.width,
         dropped=decimator.dropped,
-        sample_rate=float(found.rate),
-        correction=float(found.correction),
-        held=made.architecture.hold,
-        cycles_per_result=made.architecture.cycles_per_result,
-        deviation_db=found.deviation(filter_, direct),
-        delay=float(found.delay(filter_)),
+        sample_rate=float(decimation.rate),
+        correction=float(decimation.correction),
+        held=core.architecture.hold,
+        cycles_per_result=core.architecture.cycles_per_result,
+        deviation_db=decimation.deviation(filter_, direct),
+        delay=float(decimation.delay(filter_)),
         aliasing=tuple(
             AliasingFacts(
-                low=float(band * rate - found.edge),
-                high=float(min(band * rate + found.edge, found.sample_rate / 2)),
+                low=float(band * rate - decimation.edge),
+                high=float(min(band * rate + decimation.edge, decimation.sample_rate / 2)),
                 gain_db=nearest_db(gain),
                 whole_low=float((band - _HALF) * rate),
-                whole_high=float(min((band + _HALF) * rate, found.sample_rate / 2)),
+                whole_high=float(min((band + _HALF) * rate, decimation.sample_rate / 2)),
                 largest_db=nearest_db(peak.gain),
                 largest_at=float(peak.at * rate),
             )
@@ -179,18 +179,18 @@ def decimation_facts(made: CoreDesign) -> DecimationFacts | None:
         worst_aliasing=float(max(gains) * amplitude),
         largest_db=nearest_db(largest),
         largest=float(largest * amplitude),
-        direct_largest_db=nearest_db(LargestGain(direct.exact).from_frequency(_HALF / found.factor).gain),
-        calibration=_ahead(made),
+        direct_largest_db=nearest_db(LargestGain(direct.exact).from_frequency(_HALF / decimation.factor).gain),
+        calibration=_calibration_facts(core),
     )
 
 
-def _ahead(made: CoreDesign) -> AheadFacts | None:
-    quantized, architecture = made.quantized.ahead, made.architecture.ahead
+def _calibration_facts(core: CoreDesign) -> CalibrationFacts | None:
+    quantized, architecture = core.quantized.calibration, core.architecture.calibration
     if quantized is None or architecture is None:
         return None
     port, program = quantized.datapath.output, architecture.program
     low, high = (float(port.zero + code * port.lsb) for code in quantized.datapath.result_range)
-    return AheadFacts(
+    return CalibrationFacts(
         architecture=architecture.name,
         cycles_per_sample=architecture.cycles_per_sample,
         latency_cycles=architecture.latency_cycles,
@@ -232,20 +232,20 @@ class RateCosts:
     architecture: str
 
 
-def rate_costs(made: CoreDesign) -> RateCosts:
+def rate_costs(core: CoreDesign) -> RateCosts:
     """Return what a core with a filter costs."""
-    quantized, architecture = made.quantized, made.architecture
-    filter_, found, factor = quantized.filter, quantized.decimation, 1
-    decimator = made.datapath.decimator
+    quantized, architecture = core.quantized, core.architecture
+    filter_, decimation, factor = quantized.filter, quantized.decimation, 1
+    decimator = core.datapath.decimator
     assert filter_ is not None
-    delay = group_delay(filter_.exact) / made.spec.sample_rate
-    if found is not None:
-        delay, factor = found.delay(filter_), found.factor
+    delay = group_delay(filter_.exact) / core.spec.sample_rate
+    if decimation is not None:
+        delay, factor = decimation.delay(filter_), decimation.factor
     return RateCosts(
         clocks_per_sample=architecture.cycles_per_result / factor,
         memory_bits=architecture.memory_bits,
-        decimator_bits=0 if decimator is None else _kept_bits(decimator, made.spec.channels),
-        bound=float(quantized.bound * made.datapath.output.lsb),
+        decimator_bits=0 if decimator is None else _kept_bits(decimator, core.spec.channels),
+        bound=float(quantized.bound * core.datapath.output.lsb),
         delay=float(delay),
         architecture=_named(architecture),
     )
@@ -256,13 +256,15 @@ def _kept_bits(decimator: Decimator, channels: int) -> int:
 
 
 def _named(architecture: Architecture) -> str:
-    ahead = architecture.ahead
+    calibration = architecture.calibration
     return (
-        architecture.name if ahead is None or ahead.name == architecture.name else f"{ahead.name}, {architecture.name}"
+        architecture.name
+        if calibration is None or calibration.name == architecture.name
+        else f"{calibration.name}, {architecture.name}"
     )
 
 
-def direct_design(made: CoreDesign) -> CoreDesign:
+def direct_design(core: CoreDesign) -> CoreDesign:
     """Design the same core without a decimator.
 
     Raises
@@ -270,10 +272,10 @@ def direct_design(made: CoreDesign) -> CoreDesign:
     ShortfallError
         If no formats meet the specification.
     """
-    spec, options = made.spec, made.options
+    spec, options = core.spec, core.options
     return design_core(
         replace(spec, filter=replace(spec.filter, decimate=None)),
-        core=made.core,
+        core=core.core,
         realization=options.get("realization"),
         board=find_board(options["board"]) if "board" in options else None,
     )

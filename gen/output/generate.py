@@ -36,7 +36,7 @@ def generate(
     design : CoreDesign
         The core.
     directory : Path
-        Folder for the files, made if missing.
+        Folder for the files, created if missing.
     progress : callable
         Called with the name of each step.
     facts : CoreFacts or None

@@ -26,7 +26,7 @@ from sosmith.gen.output.module_lines import module_lines
 from sosmith.gen.output.pins import pins
 from sosmith.gen.quantity import frequency
 from sosmith.gen.version import __version__
-from sosmith.model.templates import render
+from sosmith.model.templates import in_comment, render
 
 _LINE = 112
 """Characters of a line, without the comment sign, for equations of many terms."""
@@ -37,11 +37,11 @@ def with_comments(text: str, design: CoreDesign, facts: CoreFacts) -> str:
     stages = {stage.name for stage in design.datapath.stages}
     others = module_lines(design)
 
-    def described(found: re.Match[str]) -> str:
-        part = found["part"]
+    def described(match: re.Match[str]) -> str:
+        part = match["part"]
         if part in stages:
-            return _described(part, found[0], facts)
-        return "".join(f"// {line}\n" for line in others.get(part.removeprefix("behind_"), ())) + found[0]
+            return _described(part, match[0], facts)
+        return "".join(f"// {line}\n" for line in others.get(part.removeprefix("behind_"), ())) + match[0]
 
     module = re.compile(rf"^module {re.escape(facts.name)}_(?P<part>\w+)\(.*?^endmodule$", re.MULTILINE | re.DOTALL)
     return _header(design, facts) + module.sub(described, text)
@@ -52,9 +52,9 @@ def _described(stage: str, module: str, facts: CoreFacts) -> str:
     above = [line for section in _sections(stage, facts) for line in _section_lines(section)]
     for row in facts.formats:
         if row.stage == stage:
-            line = f"{row.node}: {row.format}, {row.low:.6g} to {row.high:.6g} {row.unit}".rstrip()
-            module, found = re.subn(_declaration(row.node), rf"  // {line}\n\g<0>", module, count=1, flags=re.MULTILINE)
-            above += [line] * (not found)
+            line = f"{row.node}: {row.format}, {row.low:.6g} to {row.high:.6g} {in_comment(row.unit)}".rstrip()
+            module, count = re.subn(_declaration(row.node), rf"  // {line}\n\g<0>", module, count=1, flags=re.MULTILINE)
+            above += [line] * (not count)
     depth = max(map(int, re.findall(r"^  reg valid(\d+) ", module, re.MULTILINE)), default=0)
     above.append(
         f"{stage}: {depth} {'clock' if depth == 1 else 'clocks'} from a sample to its result, one sample a clock"
@@ -68,7 +68,7 @@ def _declaration(net: str) -> str:
 
 
 def _header(design: CoreDesign, facts: CoreFacts) -> str:
-    found = pins(design, facts.interface)
+    core_pins = pins(design, facts.interface)
     return render(
         __package__,
         "header.sv.jinja",
@@ -78,8 +78,8 @@ def _header(design: CoreDesign, facts: CoreFacts) -> str:
         sha256=hashlib.sha256(design.spec.text.encode()).hexdigest(),
         what=_promise(facts),
         timing=_timing(design, facts),
-        pins=found,
-        width=max(len(pin.name) for pin in found),
+        pins=core_pins,
+        width=max(len(pin.name) for pin in core_pins),
         recursions=[line for section in facts.sections for line in _section_lines(section)],
     )
 
@@ -87,17 +87,17 @@ def _header(design: CoreDesign, facts: CoreFacts) -> str:
 def _title(design: CoreDesign, facts: CoreFacts) -> str:
     inputs = " and ".join(field.port.name for field in facts.interface.inputs.fields)
     (output,) = facts.interface.outputs.fields
-    made = " ".join(filter(None, (facts.architecture, facts.realization)))
+    hardware = " ".join(filter(None, (facts.architecture, facts.realization)))
     channels = "1 channel" if facts.channels == 1 else f"{facts.channels} channels"
     rate = frequency(float(design.spec.sample_rate))
     if facts.decimation is not None:
         rate += f", decimated by {facts.decimation.factor}"
-    return f"{inputs} to {output.port.name}, {channels} at {rate}, {made}"
+    return f"{inputs} to {output.port.name}, {channels} at {rate}, {hardware}"
 
 
 def _promise(facts: CoreFacts) -> Sequence[str]:
     (output,) = facts.interface.outputs.fields
-    bound = f"{facts.error_bound:.6g} {facts.unit}".rstrip()
+    bound = f"{facts.error_bound:.6g} {in_comment(facts.unit)}".rstrip()
     return (
         f"Proven for all inputs in range: |{output.port.name} - exact| <= {bound}.",
         f"{facts.name}.certificate.json has the proof; `sosmith verify` repeats it.",
@@ -111,9 +111,9 @@ def _timing(design: CoreDesign, facts: CoreFacts) -> Sequence[str]:
     if lanes > 1:
         taken, its = f"A beat of {lanes} samples is taken every {every} at best", "its beat"
     if facts.decimation is not None:
-        found = facts.decimation
-        taken = f"{found.factor} samples are taken every {found.cycles_per_result} clocks at best"
-        taken += ", and a result is handed out as many times" * found.held
+        decimation = facts.decimation
+        taken = f"{decimation.factor} samples are taken every {decimation.cycles_per_result} clocks at best"
+        taken += ", and a result is handed out as many times" * decimation.held
         its = "the last of its samples"
     ready = facts.interface.reset_cycles
     first = f", the first {ready} clocks after reset" if ready else ""

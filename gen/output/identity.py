@@ -11,10 +11,15 @@ from sosmith.gen.core import CoreDesign, refuse_decimated_channels
 from sosmith.gen.output.core_facts import interface_facts
 from sosmith.gen.reload.register_writes import bank_size
 from sosmith.gen.version import __version__
+from sosmith.model.dataflow.status import Flag
 from sosmith.model.errors import SpecificationError
 from sosmith.model.link.identity import CONVERTER_FLAGS, Identity, Quantity, Reload, first_fault
-from sosmith.model.link.protocol import VERSION, samples_per_message
+from sosmith.model.link.packing import Packing
+from sosmith.model.link.protocol import VERSION, results_per_second, samples_per_message
 from sosmith.model.port import Port
+
+_ROOM = 1.1
+"""What of the line must be free for other requests, as a factor of what results need."""
 
 
 def identity(
@@ -55,7 +60,7 @@ def _identity(
 ) -> Identity:
     datapath, fingerprint = design.datapath, design.architecture.fingerprint
     words, _ = (0, 0) if fingerprint is None else bank_size(design.architecture)
-    made = Identity(
+    of_one_sample = Identity(
         protocol=VERSION,
         name=datapath.name,
         core=design.core,
@@ -73,7 +78,39 @@ def _identity(
         flags=dict(interface_facts(design).outputs.flags) | ({} if source == "link" else CONVERTER_FLAGS),
         reload=None if fingerprint is None else Reload(design=fingerprint, words=words),
     )
-    return made.model_copy(update={"samples": samples_per_message(made.sample_bytes, made.result_bytes)})
+    of_one_sample = of_one_sample.model_copy(
+        update={"samples": samples_per_message(of_one_sample.sample_bytes, of_one_sample.result_bytes)}
+    )
+    return of_one_sample.model_copy(update={"packed": _packed(design, of_one_sample)})
+
+
+def _packed(design: CoreDesign, identity: Identity) -> tuple[int, ...] | None:
+    """Return the flags of packed results, if the line carries the sample rate with them, and not without."""
+    needed = _ROOM * identity.sample_rate * identity.channels
+    flags = _possible(design, identity.source)
+    count = Packing(identity.output_port, flags).per_message(
+        1 if identity.source == "converter" else identity.sample_bytes
+    )
+    plain, packed = (results_per_second(identity.baud, each) for each in (identity.samples, count))
+    return flags if plain < needed <= packed else None
+
+
+def _possible(design: CoreDesign, source: str) -> tuple[int, ...]:
+    """Bits of the flags that a result can have: with registers, any."""
+    datapath = design.datapath
+    if design.architecture.fingerprint is not None:
+        return tuple(int(flag) for flag in Flag)
+    ranges = zip(datapath.inputs, datapath.calibrated, strict=True)
+    can = {
+        Flag.INPUT_AT_RAIL: True,
+        Flag.OUTSIDE_CALIBRATION: any((port.lowest, port.highest) != limits for port, limits in ranges),
+        Flag.OUTPUT_SATURATED: True,
+        Flag.WEAR_WARNING: bool(datapath.wear),
+        Flag.WEAR_CRITICAL: bool(datapath.wear),
+        Flag.SETTLING: datapath.settles,
+        Flag.FAULT: source == "converter" or design.spec.hardware.protect != "none",
+    }
+    return tuple(int(flag) for flag in Flag if can[flag])
 
 
 def _check(design: CoreDesign) -> None:

@@ -39,7 +39,7 @@ def manifest(facts: CoreFacts) -> dict[str, Any]:
         "error_bound_proven": True,
         "error_parts": dict(facts.error_parts),
         "error_unit": facts.unit,
-        "limit_cycles": [limit_cycle_entry(found) for found in facts.limit_cycles],
+        "limit_cycles": [limit_cycle_entry(cycles) for cycles in facts.limit_cycles],
         "aliasing": None if facts.aliasing is None else _entry(facts.aliasing),
         "decimation": None if facts.decimation is None else _decimation(facts.decimation),
         "cost": {
@@ -50,10 +50,10 @@ def manifest(facts: CoreFacts) -> dict[str, Any]:
     }
 
 
-def limit_cycle_entry(found: LimitCycleFacts) -> dict[str, Any]:
+def limit_cycle_entry(cycles: LimitCycleFacts) -> dict[str, Any]:
     """Return the facts about a section's limit cycles as JSON values; the weights are rationals as strings."""
-    weights = None if found.lyapunov is None else [str(weight) for weight in found.lyapunov]
-    return _entry(found) | {"lyapunov": weights}
+    weights = None if cycles.lyapunov is None else [str(weight) for weight in cycles.lyapunov]
+    return _entry(cycles) | {"lyapunov": weights}
 
 
 def _decimation(facts: DecimationFacts) -> dict[str, Any]:

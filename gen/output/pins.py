@@ -12,6 +12,7 @@ from sosmith.gen.output.core_facts import InterfaceFacts, StreamFacts
 from sosmith.hdl.axi_stream import core_members
 from sosmith.hdl.bus.axi_lite import slave_members
 from sosmith.model.reload.registers import ADDRESS_BITS
+from sosmith.model.templates import in_comment
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,7 +62,7 @@ def pins(design: CoreDesign, interface: InterfaceFacts) -> tuple[Pin, ...]:
     )
     if design.architecture.fingerprint is not None:
         members |= slave_members(ADDRESS_BITS)
-    found = [
+    core_pins = [
         Pin(
             name=name,
             width=Shape.cast(member.shape).width,
@@ -71,7 +72,7 @@ def pins(design: CoreDesign, interface: InterfaceFacts) -> tuple[Pin, ...]:
         for name, member in members.items()
     ]
     buses = ["", "s_axis", "m_axis", "s_axil"]
-    return tuple(sorted(found, key=lambda pin: buses.index(pin.bus)))
+    return tuple(sorted(core_pins, key=lambda pin: buses.index(pin.bus)))
 
 
 def _in_lanes(stream: StreamFacts) -> list[str]:
@@ -91,7 +92,7 @@ def _meaning(name: str, interface: InterfaceFacts) -> str:
             port = field.port
             kind = "two's complement" if port.signed else "unsigned"
             offset = f"{float(port.zero):g} + " if port.zero else ""
-            value = f"{offset}{float(port.lsb):.9g} * code {port.unit}".rstrip()
+            value = f"{offset}{float(port.lsb):.9g} * code {in_comment(port.unit)}".rstrip()
             parts.append(f"[{field.offset + port.bits - 1}:{field.offset}] {port.name}, {kind}, = {value}")
         return "; ".join(parts)
     if name.endswith("tuser"):

@@ -94,8 +94,8 @@ def _limits(drives: Drives, *, steady: bool) -> Extent:
         return extent(list(drives.values()))
     zero, through = Fraction(0), drives[INPUT]
     windows = [Drive(through.response, zero, through.high), Drive(through.response, through.low, zero)]
-    found = [extent(list({**drives, INPUT: window}.values())) for window in windows]
-    return Extent(min(one.low for one in found), max(one.high for one in found))
+    extents = [extent(list({**drives, INPUT: window}.values())) for window in windows]
+    return Extent(min(one.low for one in extents), max(one.high for one in extents))
 
 
 def coefficient_extent(
@@ -107,18 +107,18 @@ def coefficient_extent(
     steady: bool = False,
 ) -> Extent:
     """Limits of the output of the stages' transfer functions minus that of the ideal sections."""
-    return _deviation(made_response(stages), through(ideal), low, high, steady=steady)
+    return _deviation(quantized_response(stages), through(ideal), low, high, steady=steady)
 
 
-def _deviation(made: Response, exact: Response, low: Fraction, high: Fraction, *, steady: bool) -> Extent:
+def _deviation(quantized: Response, exact: Response, low: Fraction, high: Fraction, *, steady: bool) -> Extent:
     """Limits of a response minus the exact one; if `steady`, for the input in each of its windows."""
     if not steady:
-        return difference(made, exact, low, high)
-    limits = difference(made, exact, Fraction(0), high)  # of the opposite window, they are the opposite ones
+        return difference(quantized, exact, low, high)
+    limits = difference(quantized, exact, Fraction(0), high)  # of the opposite window, they are the opposite ones
     return Extent(-limits.magnitude, limits.magnitude)
 
 
-def made_response(stages: Sequence[StageModel]) -> Response:
+def quantized_response(stages: Sequence[StageModel]) -> Response:
     """Impulse response of the stages without their quantizers."""
     wires = [IMPULSE]
     for stage in stages:
@@ -143,12 +143,12 @@ def rounding_gains(stages: Sequence[StageModel]) -> list[dict[str, Fraction]]:
     gains = []
     for stage in reversed(stages):
         after = [wire.all_pole(model.denominator) for wire, model in zip(wires, stage, strict=True)]
-        found = {
+        extents = {
             source.name: extent([Drive(response.taps(source.numerators[model.output]), source.low, source.high)])
             for response, model in zip(after, stage, strict=True)
             for source in model.quantizers
         }
-        gains.append({name: (e.high - e.low) / 2 for name, e in found.items()})
+        gains.append({name: (e.high - e.low) / 2 for name, e in extents.items()})
         wires = [
             _sum(
                 response.taps(model.transfers[model.entries.index(k)])

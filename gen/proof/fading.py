@@ -95,11 +95,11 @@ class Pair:
                     more = math.ceil(left * Fraction(2) ** node.frac) if node.op is Op.BOUND else 0
                     low, high = result.get(node.name, (node.low, node.high))
                     result[node.name] = min(low, node.low - more), max(high, node.high + more)
-        for index, found in extents.items():
+        for index, limits in extents.items():
             node = self.other.nodes[index]
             unit = Fraction(2) ** node.frac
             low, high = result[node.name]
-            result[node.name] = min(low, math.floor(found.low * unit)), max(high, math.ceil(found.high * unit))
+            result[node.name] = min(low, math.floor(limits.low * unit)), max(high, math.ceil(limits.high * unit))
         return result
 
     def mismatch(self, state: int) -> Fraction:
@@ -163,12 +163,12 @@ class Fading:
         additions: list[Drives] = []
         for k in range(states + len(pair.other.outputs)):
             key = number, k, "difference", 0
-            found = starts[pair.differences[k]] if k in pair.differences else Extent(Fraction(0), Fraction(0))
+            start = starts[pair.differences[k]] if k in pair.differences else Extent(Fraction(0), Fraction(0))
             mismatch = pair.mismatch(k) if k < states else Fraction(0)
             left = RESIDUE if mismatch else Fraction(0)
             if mismatch:
                 self._mismatches[key] = mismatch
-            additions.append({key: _drive(found, left)})
+            additions.append({key: _drive(start, left)})
         models = [_symmetric(model) for model in linear_models(pair.after)]
         lanes = [Lane(number, model, [*self._wires, *additions]) for model in models]
         moved: dict[int, Extent] = {}
@@ -222,8 +222,8 @@ def _symmetric(model: LinearModel) -> LinearModel:
 
 def merged(drives: Drives, kept: set[Key], rest: Key) -> Drives:
     """Replace all sources except those in `kept` by one that takes any value within their limits at each sample."""
-    found = extent([drive for key, drive in drives.items() if key not in kept])
-    return {key: drive for key, drive in drives.items() if key in kept} | {rest: _drive(found)}
+    limits = extent([drive for key, drive in drives.items() if key not in kept])
+    return {key: drive for key, drive in drives.items() if key in kept} | {rest: _drive(limits)}
 
 
 def added(a: Extent, b: Extent) -> Extent:

@@ -195,7 +195,7 @@ def _numerators(
     length = 2 * len(graph.delays) + 1
     responses = _impulse_responses(graph, forms, key, watched, length)
     under = fmpq_poly([fmpq(c.numerator, c.denominator) for c in denominator])
-    return {i: _trim(_fractions((fmpq_poly(found) * under).coeffs()[:length])) for i, found in responses.items()}
+    return {i: _trim(_fractions((fmpq_poly(response) * under).coeffs()[:length])) for i, response in responses.items()}
 
 
 _Key = tuple[str, int, int]

@@ -105,7 +105,7 @@ class Nodes:
         self._denominator = fmpq_poly([1])
         for denominator in denominators:
             self._denominator *= polynomial(denominator)
-        self._turns = math.gcd(*(power_of(denominator) for denominator in denominators if len(denominator) > 1))
+        self._interleaved = math.gcd(*(power_of(denominator) for denominator in denominators if len(denominator) > 1))
         """M of a denominator in powers of ``w**M``."""
         self.degree = len(radii)
         self.bits = bits
@@ -114,12 +114,12 @@ class Nodes:
         self.gain = math.ceil(math.prod((1 / (1 - radius) for radius in radii), start=Fraction(1)))
         """Bound on ``L1(1/D)``."""
         self.spread = 2 * (1 + (1 << self.degree)) * self.gain
-        """Bound on the error of `impulse` and `around`, in units of ``2**-fine``."""
+        """Bound on the error of `impulse` and `samples_at`, in units of ``2**-fine``."""
         self._length, self.block = self._lengths(max(radii, default=Fraction(0)), block)
         self.blocks = 0
         self.residue = Fraction(0)
         self.fine = bits + self.gain.bit_length() + self.spread.bit_length() + _GUARD_BITS
-        """Fraction bits of `impulse` and `around`."""
+        """Fraction bits of `impulse` and `samples_at`."""
         self._wider, self._neighbours = 1, _NEIGHBOURS
         while True:
             try:
@@ -153,7 +153,7 @@ class Nodes:
         """Return at least `length` samples of the response of 1/D from its beginning, within `spread`."""
         return self._continued([1 << self.fine], length)
 
-    def around(self, place: int, more: int) -> list[int]:
+    def samples_at(self, place: int, more: int) -> list[int]:
         """Return d samples of the response of 1/D up to `place`, one of `places`, and `more` behind it.
 
         They are within `spread`, as are those from the beginning. The first d are within two units, and what follows
@@ -162,10 +162,10 @@ class Nodes:
         """
         if place in self._distant:
             return self._continued(self._distant[place][::-1], self.degree + more)
-        made = [*([0] * self.degree), *self.impulse(place + more + 1)]
-        return made[place + 1 : place + 1 + self.degree + more]
+        padded = [*([0] * self.degree), *self.impulse(place + more + 1)]
+        return padded[place + 1 : place + 1 + self.degree + more]
 
-    def _continued(self, made: list[int], length: int) -> list[int]:
+    def _continued(self, response: list[int], length: int) -> list[int]:
         """Continue a response to `length` samples, in units of ``2**-fine``.
 
         Each sample is rounded down, and before it the coefficients so little that it costs less than another unit. That
@@ -174,9 +174,9 @@ class Nodes:
         shift = self.fine + self.gain.bit_length() + self.degree.bit_length()
         scale = int(self._denominator.denom())
         weights = [-((int(c) << shift) // scale) for c in self._denominator.numer().coeffs()][1:]
-        while len(made) < length:
-            made.append(sum(map(mul, weights, made[: -len(weights) - 1 : -1])) >> shift)
-        return made
+        while len(response) < length:
+            response.append(sum(map(mul, weights, response[: -len(weights) - 1 : -1])) >> shift)
+        return response
 
     def _reach(self, window: int) -> dict[int, list[int]]:
         """Find the d samples up to each place far from the beginning, the last one first, within two units."""
@@ -187,12 +187,12 @@ class Nodes:
             with ctx.workprec(self.fine + more):
                 rows = decimated(self._denominator, doublings, count, width)
                 try:
-                    made = _rounded([value for row in rows for value in row], self.fine).reshape(count, width)
+                    samples = _rounded([value for row in rows for value in row], self.fine).reshape(count, width)
                     break
                 except _CoarseError:
                     more *= 2
         return {
-            (k << doublings) - back: made[k, back : back + self.degree].tolist()
+            (k << doublings) - back: samples[k, back : back + self.degree].tolist()
             for k in range(count)
             for back in range(self._neighbours)
             if (k << doublings) - back >= _FIRST
@@ -215,9 +215,9 @@ class Nodes:
         rows = {at: beginning[at + d : at : -1] for at in range(min(window, _FIRST))} | self._distant
         candidates = sorted(rows)
         picked, least = _pivots(np.array([rows[at] for at in candidates], dtype=object), self.fine)
-        if not least and self._neighbours < self._turns:
-            # M responses take turns: neighbours that miss too many of these are too few at any precision.
-            self._neighbours = self._turns
+        if not least and self._neighbours < self._interleaved:
+            # M responses are interleaved: neighbours that miss too many of these are too few at any precision.
+            self._neighbours = self._interleaved
             raise _CoarseError(0)
         short = self.bits + self.spread.bit_length() + _SLACK_BITS - least.bit_length()
         if short > 0:
@@ -234,10 +234,10 @@ class Nodes:
             except ZeroDivisionError:
                 raise _CoarseError(self.fine) from None
             wanted = [beginning[at + d : at : -1] for at in range(size)]
-            wanted += [self.around(at, size)[: -d - 1 : -1] for at in self.places]
-            found = (balls(wanted) * inverse).entries()
-            self.weights = _rounded(found[: size * d], self.bits).reshape(size, d)
-            self._multiply(arb_mat(d, d, found[size * d :]))
+            wanted += [self.samples_at(at, size)[: -d - 1 : -1] for at in self.places]
+            entries = (balls(wanted) * inverse).entries()
+            self.weights = _rounded(entries[: size * d], self.bits).reshape(size, d)
+            self._multiply(arb_mat(d, d, entries[size * d :]))
         growth = math.prod(max(norm, Fraction(1)) for norm in self.norms)
         if self._wider < _WINDOWS and growth > _LARGEST_GROWTH:
             self._wider *= 2

@@ -41,7 +41,7 @@ def prove_residuals(schedule: OnlineSchedule) -> tuple[Fraction, ...]:
     for section, increment, exponent in zip(schedule.sections, increments, schedule.exponents, strict=False):
         begins = section.largest / 2 ** (section.leading + 1) + increment
         steps = section.digits - min(section.first_step(exponent), -section.delay)
-        held = (
+        holds = (
             increment <= MOST_INCREMENT
             and begins <= _LIMIT
             and section.delay >= section.finer + QUIET_STEPS
@@ -49,7 +49,7 @@ def prove_residuals(schedule: OnlineSchedule) -> tuple[Fraction, ...]:
             and schedule.interval >= section.delay + LOOP_CLOCKS
             and schedule.period >= steps
         )
-        if not held:
+        if not holds:
             raise ShortfallError(
                 f"{section.name} must keep its residual in [-3/4, 3/4) with a delay of {section.delay} digits, "
                 f"increments of at most {float(increment):.4g} and {schedule.period} clocks"

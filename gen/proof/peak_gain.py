@@ -79,10 +79,10 @@ def extent(drives: Sequence[Drive], accuracy: int = ACCURACY) -> Extent:
     if not live:
         return Extent(ZERO, ZERO)
     under = common([drive.response for drive in live])
-    made = recursion((under,), accuracy)
+    sums = recursion((under,), accuracy)
     joined = _joined([(drive.response.over(under), drive.low, drive.high) for drive in live])
     driven = [((n,), Response(n, under).at_zero_frequency, low, high) for n, low, high in joined]
-    return _extent(made, driven, under, accuracy)
+    return _extent(sums, driven, under, accuracy)
 
 
 def difference(one: Response, other: Response, low: Fraction, high: Fraction, accuracy: int = CLOSER) -> Extent:
@@ -93,9 +93,9 @@ def difference(one: Response, other: Response, low: Fraction, high: Fraction, ac
     if not one.minus(other).numerator:
         return Extent(ZERO, ZERO)
     # The other one goes first and chooses the length of blocks: it is the filter wanted, whatever is tried.
-    made = recursion((common([other]), common([one])), accuracy)
+    sums = recursion((common([other]), common([one])), accuracy)
     gain = one.at_zero_frequency - other.at_zero_frequency
-    return _extent(made, [((-other.numerator, one.numerator), gain, low, high)], None, accuracy)
+    return _extent(sums, [((-other.numerator, one.numerator), gain, low, high)], None, accuracy)
 
 
 _Driven = tuple[Numerators, Fraction, Fraction, Fraction]
@@ -103,29 +103,29 @@ _Driven = tuple[Numerators, Fraction, Fraction, Fraction]
 
 
 def _extent(
-    made: Recursion, driven: Sequence[_Driven], under: tuple[Coefficients, ...] | None, accuracy: int
+    sums: Recursion, driven: Sequence[_Driven], under: tuple[Coefficients, ...] | None, accuracy: int
 ) -> Extent:
     """Limits of a sum of responses, over one denominator with the factors `under`, or over several."""
     numerators = [one[0] for one in driven]
     centres = [(low + high) / 2 for *_, low, high in driven]
     radii = [(high - low) / 2 for *_, low, high in driven]
-    sizes = [total.magnitude + total.uncertainty for total in made.totals(numerators)]
+    sizes = [total.magnitude + total.uncertainty for total in sums.totals(numerators)]
     middle = sum((c * gain for (_, gain, *_), c in zip(driven, centres, strict=True)), ZERO)
     reach = sum((r * size for r, size in zip(radii, sizes, strict=True)), ZERO)
     if all(low <= 0 <= high for *_, low, high in driven):
         return Extent(middle - reach, middle + reach)
-    more = None if under is None else _overshoot(made, driven, under, sizes)
+    more = None if under is None else _overshoot(sums, driven, under, sizes)
     if more is not None and more <= reach / (1 << accuracy):
         return Extent(min(middle - reach - more, ZERO), max(middle + reach + more, ZERO))
     above, below = (
-        made.highest([Weighted(n, side * c, r) for n, c, r in zip(numerators, centres, radii, strict=True)])
+        sums.highest([Weighted(n, side * c, r) for n, c, r in zip(numerators, centres, radii, strict=True)])
         for side in (1, -1)
     )
     return Extent(-below, above)
 
 
 def _overshoot(
-    made: Recursion, driven: Sequence[_Driven], under: tuple[Coefficients, ...], sizes: Sequence[Fraction]
+    sums: Recursion, driven: Sequence[_Driven], under: tuple[Coefficients, ...], sizes: Sequence[Fraction]
 ) -> Fraction | None:
     """Bound on how far sums up to some sample leave the limits of the whole sums; None if nothing is known."""
     steady = fmpq_poly([0])
@@ -141,7 +141,7 @@ def _overshoot(
     denominator = reduce(mul, map(polynomial, under), fmpq_poly([1]))
     falling = (denominator * (steady(1) / denominator(1)) - steady) / fmpq_poly([1, -1])
     _, rising, *ends = max(others, key=lambda one: one[0])
-    return made.excess((falling,), (rising,), *ends)
+    return sums.excess((falling,), (rising,), *ends)
 
 
 def _rational(value: Fraction) -> fmpq:
@@ -152,20 +152,20 @@ def _joined(
     drives: Sequence[tuple[fmpq_poly, Fraction, Fraction]],
 ) -> list[tuple[fmpq_poly, Fraction, Fraction]]:
     """Join drives whose numerators are multiples of one another; drop those with a numerator of zero."""
-    found: dict[tuple[str, ...], tuple[fmpq_poly, Fraction, Fraction]] = {}
+    by_shape: dict[tuple[str, ...], tuple[fmpq_poly, Fraction, Fraction]] = {}
     for numerator, low, high in drives:
         leading = numerator.leading_coefficient()
         if not leading:
             continue
         key = tuple(map(str, (numerator / leading).coeffs()))
-        if key not in found:
-            found[key] = numerator, low, high
+        if key not in by_shape:
+            by_shape[key] = numerator, low, high
             continue
-        first, before_low, before_high = found[key]
+        first, before_low, before_high = by_shape[key]
         ratio = leading / first.leading_coefficient()
         ends = [Fraction(int(ratio.p), int(ratio.q)) * end for end in (low, high)]
-        found[key] = first, before_low + min(ends), before_high + max(ends)
-    return list(found.values())
+        by_shape[key] = first, before_low + min(ends), before_high + max(ends)
+    return list(by_shape.values())
 
 
 def peak_gain(sections: Sequence[tuple[Coefficients, Coefficients]]) -> Fraction:

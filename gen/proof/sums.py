@@ -154,8 +154,8 @@ class Recursion:
         named = {_key(numerator): numerator for numerator in numerators}
         missing = [key for key in named if key not in self._totals]
         for keys in self._portions(missing, {key: self._start(named[key]) for key in missing}):
-            found = self._samples([named[key] for key in keys])
-            self._totals.update((key, self._total(samples)) for key, samples in zip(keys, found, strict=True))
+            samples_of_all = self._samples([named[key] for key in keys])
+            self._totals.update((key, self._total(samples)) for key, samples in zip(keys, samples_of_all, strict=True))
         return [self._totals[_key(numerator)] for numerator in numerators]
 
     def highest(self, weighted: Sequence[Weighted]) -> Fraction:
@@ -268,13 +268,13 @@ class Recursion:
         """Compute responses over one denominator; 0 in blocks that only others last for."""
         bits = self._bits
         impulse = table.impulse(start)
-        around = [table.around(place, start)[::-1] for place in table.places]
+        windows = [table.samples_at(place, start)[::-1] for place in table.places]
         heads, firsts, errors = [], [], []
         for numerator in numerators:
             scale = int(numerator.denom()) << table.fine - bits
             taps = [int(value) for value in numerator.numer().coeffs()]
             heads.append([sum(map(mul, taps, impulse[at::-1])) // scale for at in range(start)])
-            firsts.append([sum(map(mul, taps, samples)) // scale for samples in around])
+            firsts.append([sum(map(mul, taps, samples)) // scale for samples in windows])
             errors.append(2 + sum(map(abs, taps)) * table.spread // scale)
         count = len(firsts)
         nodes = np.array(firsts, dtype=object).reshape(count, table.degree).T.reshape(table.degree, 1, count)
@@ -295,8 +295,8 @@ class Recursion:
 
     def _product(self, power: Integers, nodes: Integers) -> Integers:
         d, *shape = nodes.shape
-        made = fmpz_mat(d, d, power.ravel().tolist()) * fmpz_mat(d, math.prod(shape), nodes.ravel().tolist())
-        result = np.array([int(value) >> self._bits for value in made.entries()], dtype=object)
+        product = fmpz_mat(d, d, power.ravel().tolist()) * fmpz_mat(d, math.prod(shape), nodes.ravel().tolist())
+        result = np.array([int(value) >> self._bits for value in product.entries()], dtype=object)
         return result.reshape(d, *shape)
 
     # Signs and sums.
@@ -336,25 +336,25 @@ class Recursion:
 
     def _total(self, samples: _Samples) -> Total:
         unit = Fraction(1, 1 << self._bits)
-        found = Fraction(sum(map(abs, samples.head)), 1 << self._bits)
+        total = Fraction(sum(map(abs, samples.head)), 1 << self._bits)
         uncertainty = len(samples.head) * samples.error * unit
         if self._degree and self._in_doubles:
             values, rough, exact = self._in_all_blocks(samples)
             summed = Fraction(math.fsum(np.abs(values).sum(axis=0).tolist()))
             unsure = Fraction(math.fsum((rough + exact).tolist()) * _SLACK)
-            found += summed
+            total += summed
             # Each column was added up in doubles; there is room for whoever verifies it in doubles, too.
             rounding = (self._block + 8) * Fraction(_ROUNDING) + _ROOM
             uncertainty += self._block * unsure + summed * rounding + self._tail(samples)
         elif self._degree:
             signs = self._signs(samples)
-            found += sum(self._block_sums(signs.signs, samples.nodes)) * unit * unit
+            total += sum(self._block_sums(signs.signs, samples.nodes)) * unit * unit
             sizes = Fraction(float(np.abs(samples.values).sum()) * _SLACK)
             off = self._block * (self._blocks * self._widest * samples.error + 2 * sizes) * unit
             # Seven times: the samples themselves are off once. A sign found in doubles no better than this may be wrong
             # where the sample is within three times this; that counts twice.
             uncertainty += 7 * off + self._tail(samples)
-        return Total(found, _short(uncertainty))
+        return Total(total, _short(uncertainty))
 
     def _tail(self, samples: _Samples) -> Fraction:
         """Bound on the sum of the magnitudes behind the last block."""
@@ -366,14 +366,14 @@ class Recursion:
         self, samples: Sequence[_Samples], factors: Sequence[tuple[int, int]], start: int, best: int
     ) -> int:
         """Largest running sum within the blocks, from `start` on."""
-        found = [self._signs(part) for part in samples]
+        signs_of_all = [self._signs(part) for part in samples]
         largest = max(abs(value) for pair in factors for value in pair)
         shift = max(0, largest.bit_length() - 60)
         weights = [(math.ldexp(c, -shift), math.ldexp(r, -shift)) for c, r in factors]
         steps = np.zeros((self._block, self._blocks))
         unsure = np.zeros(self._blocks)
         sums = [0] * self._blocks
-        for part, signs, (centre, radius), (c, r) in zip(samples, found, factors, weights, strict=True):
+        for part, signs, (centre, radius), (c, r) in zip(samples, signs_of_all, factors, weights, strict=True):
             for sign, factor in ((np.ones_like(signs.signs), centre), (signs.signs, radius)):
                 if factor:
                     sums = [a + factor * b for a, b in zip(sums, self._block_sums(sign, part.nodes), strict=True)]
@@ -390,14 +390,14 @@ class Recursion:
         if len(close) > _CLOSE:
             return max(high)
         for k in close:
-            best = max(best, starts[k] + self._highest_in_block(k, samples, found, factors))
+            best = max(best, starts[k] + self._highest_in_block(k, samples, signs_of_all, factors))
         return best
 
     def _highest_in_block(
-        self, k: int, samples: Sequence[_Samples], found: Sequence[_Signs], factors: Sequence[tuple[int, int]]
+        self, k: int, samples: Sequence[_Samples], signs_of_all: Sequence[_Signs], factors: Sequence[tuple[int, int]]
     ) -> int:
         steps = np.zeros(self._block, dtype=object)
-        for part, signs, (centre, radius) in zip(samples, found, factors, strict=True):
+        for part, signs, (centre, radius) in zip(samples, signs_of_all, factors, strict=True):
             values = (self._exact_weights * part.nodes[:, k]).sum(axis=1)
             steps = steps + values * (centre + radius * signs.signs[:, k].astype(np.int64).astype(object))
         return max(accumulate(map(int, steps), initial=0))

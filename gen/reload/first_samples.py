@@ -23,9 +23,9 @@ Limits = tuple[Fraction, Fraction]
 """Smallest and largest value, in output LSBs."""
 
 
-def samples_of(made: Quantized) -> Limits:
+def samples_of(quantized: Quantized) -> Limits:
     """Return the range of the samples of a design that starts from the first of them."""
-    (stage,) = (stage for stage in made.datapath.stages if isinstance(stage, StartStage))
+    (stage,) = (stage for stage in quantized.datapath.stages if isinstance(stage, StartStage))
     return stage.x.limits
 
 
@@ -40,15 +40,15 @@ def first_samples(hardware: Quantized) -> Limits:
     return low - more if low < 0 else max(low - more, zero), high + more if high > 0 else min(high + more, zero)
 
 
-def held_codes(made: Quantized, held: Limits) -> dict[str, tuple[int, int]]:
+def held_codes(quantized: Quantized, first_range: Limits) -> dict[str, tuple[int, int]]:
     """Return the codes of the signals of the start, by name, with first samples in a range."""
-    (stage,) = (stage for stage in made.datapath.stages if isinstance(stage, StartStage))
+    (stage,) = (stage for stage in quantized.datapath.stages if isinstance(stage, StartStage))
     unit = Fraction(2) ** stage.x.frac
-    low, high = math.floor(held[0] * unit), math.ceil(held[1] * unit)
+    low, high = math.floor(first_range[0] * unit), math.ceil(first_range[1] * unit)
     return {"held": (low, high), "change": (low - high, high - low)}
 
 
-def check_samples(made: Quantized, held: Limits) -> None:
+def check_samples(quantized: Quantized, first_range: Limits) -> None:
     """Check that the samples of a design stay within the range of first samples that may be held.
 
     Raises
@@ -56,12 +56,12 @@ def check_samples(made: Quantized, held: Limits) -> None:
     ShortfallError
         If they do not.
     """
-    low, high = samples_of(made)
-    if low < held[0] or high > held[1]:
-        lsb, unit = made.datapath.output.lsb, f" {made.datapath.output.unit}".rstrip()
-        ends, found = (tuple(float(end * lsb) for end in pair) for pair in (held, (low, high)))
+    low, high = samples_of(quantized)
+    if low < first_range[0] or high > first_range[1]:
+        lsb, unit = quantized.datapath.output.lsb, f" {quantized.datapath.output.unit}".rstrip()
+        ends, own = (tuple(float(end * lsb) for end in pair) for pair in (first_range, (low, high)))
         raise ShortfallError(
             f"the calibration's values must stay within {ends[0]:.6g}..{ends[1]:.6g}{unit}, the range of first samples "
-            f"that may be held, not {found[0]:.6g}..{found[1]:.6g}: stop the samples and reset the core before the "
+            f"that may be held, not {own[0]:.6g}..{own[1]:.6g}: stop the samples and reset the core before the "
             "first one with the new set"
         )

@@ -8,7 +8,7 @@ from fractions import Fraction
 from typing import cast
 
 from sosmith.gen.filter.design import Filter
-from sosmith.gen.proof.cascade_proof import made_response
+from sosmith.gen.proof.cascade_proof import quantized_response
 from sosmith.gen.proof.linear_model import linear_models
 from sosmith.gen.realizations.registry import REALIZATIONS, Section
 from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
@@ -27,7 +27,7 @@ _DOUBLE = 53
 
 
 def with_constants(
-    made: Quantized, ideal: Filter | None, polynomial: Polynomial | None, *, finer: int = 0, room: int = 0
+    design: Quantized, ideal: Filter | None, polynomial: Polynomial | None, *, finer: int = 0, room: int = 0
 ) -> Quantized:
     """Return the design for another filter or another polynomial, with the same fraction bits of all signals.
 
@@ -35,7 +35,7 @@ def with_constants(
 
     Parameters
     ----------
-    made : Quantized
+    design : Quantized
         The design.
     ideal : Filter or None
         The other filter; None to keep the present one. Sections are matched in order of the distance of their poles
@@ -53,63 +53,67 @@ def with_constants(
     ShortfallError
         If the filter or polynomial does not have this structure, or is unstable with these fraction bits.
     """
-    before = _input_stage(made, polynomial)
-    filled = ideal or made.filter
+    before = _input_stage(design, polynomial)
+    filled = ideal or design.filter
     sections: Sequence[Section] = ()
     proof = None
     if filled is not None:
         if ideal is not None:
-            filled = _ranked(ideal, cast("Filter", made.filter), made.realization)
-        formats = _lifted(chosen_formats(made.sections), finer)
+            filled = _ranked(ideal, cast("Filter", design.filter), design.realization)
+        formats = _lifted(chosen_formats(design.sections), finer)
         if ideal is not None:
-            formats = _with_coefficients_of(filled, formats, made.realization)
+            formats = _with_coefficients_of(filled, formats, design.realization)
         formats = _lifted(formats, room - finer)
-        if made.steady:
-            before = starting_like(before, gain_at_zero(filled), made.held)
-        sections, proof = cascade(filled, made.realization, formats, before.output, steady=made.steady)
-        if made.steady and not made.datapath.restarts:  # which would take another first sample
-            before = _with_any_first_sample(before, first_samples(made), sections, filled)
-    datapath = made.datapath
-    found = assembled(
+        if design.steady:
+            before = starting_like(before, gain_at_zero(filled), design.first_sample)
+        sections, proof = cascade(filled, design.realization, formats, before.output, steady=design.steady)
+        if design.steady and not design.datapath.restarts:  # which would take another first sample
+            before = _with_any_first_sample(before, first_samples(design), sections, filled)
+    datapath = design.datapath
+    other = assembled(
         name=datapath.name,
         inputs=datapath.inputs,
         output=datapath.output,
         ideal=filled,
-        polynomial=polynomial or made.polynomial,
-        realization=made.realization,
+        polynomial=polynomial or design.polynomial,
+        realization=design.realization,
         gain=Fraction(1) if filled is None else gain_of(filled),
         input_stage=before,
         sections=sections,
         proof=proof,
     )
-    flagged = with_settling(found.datapath, made.settling)
-    return replace(found, datapath=replace(flagged, calibrated=datapath.calibrated, wear=datapath.wear))
+    flagged = with_settling(other.datapath, design.settling)
+    return replace(other, datapath=replace(flagged, calibrated=datapath.calibrated, wear=datapath.wear))
 
 
-def _with_any_first_sample(before: InputStage, held: Limits, sections: Sequence[Section], ideal: Filter) -> InputStage:
-    """Return an input stage with the error of the start for first samples in the range `held`.
+def _with_any_first_sample(
+    before: InputStage, first_range: Limits, sections: Sequence[Section], ideal: Filter
+) -> InputStage:
+    """Return an input stage with the error of the start for first samples in `first_range`.
 
-    With the difference D of the made filter and the ideal one, the coefficients' error is that of ``D (x - x0)``. It is
-    proven for x0 in the range of x; for each unit that x0 lies outside it may be larger by ``|D(1)|``.
+    With the difference D of the quantized filter and the ideal one, the coefficients' error is that of ``D (x - x0)``.
+    It is proven for x0 in the range of x; for each unit that x0 lies outside it may be larger by ``|D(1)|``.
     """
     assert before.start is not None
     start = before.start
     _, span = before.output.limits  # of the samples less a first one: as wide as the range of the samples
-    wider = held[1] - held[0] - span
-    off = made_response([linear_models(section.graph) for section in sections]).at_zero_frequency - gain_at_zero(ideal)
-    gain = Fraction(0) if start.held is None else start.held.gain * Fraction(2) ** -start.held.gain_frac
-    error = abs(gain - gain_at_zero(ideal)) * max(-held[0], held[1]) + abs(off) * max(wider, Fraction(0))
+    wider = first_range[1] - first_range[0] - span
+    realized = quantized_response([linear_models(section.graph) for section in sections])
+    off = realized.at_zero_frequency - gain_at_zero(ideal)
+    first = start.first_sample
+    gain = Fraction(0) if first is None else first.gain * Fraction(2) ** -first.gain_frac
+    error = abs(gain - gain_at_zero(ideal)) * max(-first_range[0], first_range[1]) + abs(off) * max(wider, Fraction(0))
     return replace(before, start=replace(start, error=error))
 
 
-def _input_stage(made: Quantized, polynomial: Polynomial | None) -> InputStage:
+def _input_stage(design: Quantized, polynomial: Polynomial | None) -> InputStage:
     """Make the input stage, for another polynomial if it is not None."""
-    datapath = made.datapath
+    datapath = design.datapath
     stages = tuple(stage for stage in datapath.stages if isinstance(stage, HornerStep))
-    if polynomial is None or made.polynomial is None:
+    if polynomial is None or design.polynomial is None:
         behind = datapath.stages[len(stages)].graph
-        return InputStage(stages=stages, output=behind.input_ranges[0], error=made.input_error)
-    room = [len(row) for row in normalised(made.polynomial, datapath.inputs, datapath.output)]
+        return InputStage(stages=stages, output=behind.input_ranges[0], error=design.input_error)
+    room = [len(row) for row in normalised(design.polynomial, datapath.inputs, datapath.output)]
     exact = normalised(polynomial, datapath.inputs, datapath.output)
     counts = [len(row) for row in exact]
     if len(counts) > len(room) or any(count > most for count, most in zip(counts, room, strict=False)):

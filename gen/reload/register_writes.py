@@ -16,30 +16,30 @@ from sosmith.model.reload.registers import BITS, CRC, DATA, VERSION, Register
 
 def bank_size(architecture: Architecture) -> tuple[int, int]:
     """Return the number of words in a bank of a core, and the number of bits used in each."""
-    made = architecture.program
-    if made is not None:
-        return len(made.instructions), instruction_bits(made)
+    program = architecture.program
+    if program is not None:
+        return len(program.instructions), instruction_bits(program)
     return sum(constant.words for constant in constants(architecture.datapath)), BITS
 
 
-def register_writes(hardware: CoreDesign, made: OtherSet, version: int) -> list[tuple[Register, int]]:
+def register_writes(hardware: CoreDesign, new_set: OtherSet, version: int) -> list[tuple[Register, int]]:
     """List the register writes, in order, that make a core switch to a set.
 
     Parameters
     ----------
     hardware : CoreDesign
         Design of the core.
-    made : OtherSet
+    new_set : OtherSet
         The set, as `check_swap` returns it.
     version : int
         Value of ``VERSION`` once the set is active, 32 bits.
     """
     if not 0 <= version < 1 << 32:
         raise ValueError(f"version must be in 0..4294967295, not {version}")
-    if made.program is None:
-        words = parallel_bank(hardware, made)
+    if new_set.program is None:
+        words = parallel_bank(hardware, new_set)
     else:
-        words = [encoded(instruction, made.program) for instruction in made.program.instructions]
+        words = [encoded(instruction, new_set.program) for instruction in new_set.program.instructions]
     crc = zlib.crc32(b"".join(word.to_bytes(4, "little") for word in (version, *words)))
     return [(VERSION, version), *((DATA, word) for word in words), (CRC, crc)]
 
@@ -56,12 +56,12 @@ def reload_json(hardware: CoreDesign, swap: Swap, version: int) -> dict[str, Any
         "design": hardware.architecture.fingerprint,
         "version": version,
         "words": words,
-        "error_bound": float(swap.made.quantized.bound * output.lsb),
-        "error_parts": {part: float(value * output.lsb) for part, value in swap.made.quantized.budget.items()},
+        "error_bound": float(swap.new_set.quantized.bound * output.lsb),
+        "error_parts": {part: float(value * output.lsb) for part, value in swap.new_set.quantized.budget.items()},
         "error_unit": output.unit,
         "restarts": hardware.architecture.restarts,
         "transient_samples": swap.samples,
-        "error_after_transient": float((swap.made.quantized.bound + (RESIDUE if swap.samples else 0)) * output.lsb),
+        "error_after_transient": float((swap.new_set.quantized.bound + (RESIDUE if swap.samples else 0)) * output.lsb),
         "state_use": float(swap.use),
-        "writes": [[register.address, word] for register, word in register_writes(hardware, swap.made, version)],
+        "writes": [[register.address, word] for register, word in register_writes(hardware, swap.new_set, version)],
     }

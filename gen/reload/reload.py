@@ -62,7 +62,7 @@ class Swap:
 
     Attributes
     ----------
-    made : OtherSet
+    new_set : OtherSet
         The new set. Its program, if any, allows for all values that the swap can cause.
     samples : int
         Length of the transient: from then on the error is at most the set's bound plus
@@ -71,7 +71,7 @@ class Swap:
         Largest share of its hardware range that any state may use, at most 1.
     """
 
-    made: OtherSet
+    new_set: OtherSet
     samples: int
     use: Fraction
 
@@ -92,10 +92,10 @@ def own_set(hardware: CoreDesign) -> OtherSet:
     return OtherSet(quantized=quantized, program=hardware.architecture.program)
 
 
-def _check_settling(hardware: CoreDesign, made: Quantized) -> None:
+def _check_settling(hardware: CoreDesign, other: Quantized) -> None:
     """Check that the hardware counts far enough for a set, if it flags samples until the filter has settled."""
     counted = hardware.quantized.settling
-    samples = samples_to_settle(made.datapath) if counted else 0
+    samples = samples_to_settle(other.datapath) if counted else 0
     if samples > counted:
         raise ShortfallError(
             f"the set must settle within {counted:,} samples, to which the hardware counts, not {samples:,}"
@@ -203,10 +203,10 @@ def room_of(hardware: CoreDesign) -> int:
     A program aligns the least significant bit of a state with a digit boundary, so states often have more fraction bits
     than in the datapath. It is 0 in the parallel architecture, where every bit has its own wire.
     """
-    made = hardware.architecture.program
-    if made is None or not hardware.quantized.sections:
+    unit_program = hardware.architecture.program
+    if unit_program is None or not hardware.quantized.sections:
         return 0
-    fracs = {location.name: location.frac for location in made.locations if location.is_state}
+    fracs = {location.name: location.frac for location in unit_program.locations if location.is_state}
     lifted = with_constants(hardware.quantized, None, None, room=1)
     return min(
         (
@@ -219,10 +219,10 @@ def room_of(hardware: CoreDesign) -> int:
     )
 
 
-def parallel_bank(hardware: CoreDesign, made: OtherSet) -> list[int]:
+def parallel_bank(hardware: CoreDesign, new_set: OtherSet) -> list[int]:
     """Contents of a bank in the parallel architecture."""
     loadable = constants(hardware.datapath)
-    return packed(values_of(made.quantized.datapath, loadable), loadable)
+    return packed(values_of(new_set.quantized.datapath, loadable), loadable)
 
 
 def check_swap(hardware: CoreDesign, active: OtherSet | None, other: OtherSet) -> Swap:
@@ -244,32 +244,34 @@ def check_swap(hardware: CoreDesign, active: OtherSet | None, other: OtherSet) -
         If a signal could exceed its range in the hardware.
     """
     if active is None or hardware.architecture.restarts or not other.quantized.sections:
-        return Swap(made=other, samples=0, use=_use(hardware, other.quantized.datapath, other.program))
+        return Swap(new_set=other, samples=0, use=_use(hardware, other.quantized.datapath, other.program))
     old, new = active.quantized, other.quantized
-    held = first_samples(hardware.quantized) if new.steady else None
-    if held is not None:
-        check_samples(old, held)
-        check_samples(new, held)
-    found = transient(old, new, held)
-    first = len(new.datapath.stages) - 1 - len(found.ranges)
+    first_range = first_samples(hardware.quantized) if new.steady else None
+    if first_range is not None:
+        check_samples(old, first_range)
+        check_samples(new, first_range)
+    transition = transient(old, new, first_range)
+    first = len(new.datapath.stages) - 1 - len(transition.ranges)
     ranges: list[dict[str, tuple[int, int]]] = [{} for _ in new.datapath.stages]
-    ranges[first : first + len(found.ranges)] = found.ranges
-    if held is not None:
-        ranges[first - 1] = held_codes(new, held)
+    ranges[first : first + len(transition.ranges)] = transition.ranges
+    if first_range is not None:
+        ranges[first - 1] = held_codes(new, first_range)
     try:
         during = with_ranges(new.datapath, ranges)
-        made = _fitted(hardware, during, "swap")
+        new_program = _fitted(hardware, during, "swap")
     except ValueError as error:
         raise ShortfallError(f"the swap must fit the hardware: {error}; {ADVICE}") from None
     except ShortfallError as error:
         raise ShortfallError(f"{error}; {ADVICE}") from None
-    return Swap(made=replace(other, program=made), samples=found.samples, use=_use(hardware, during, made))
+    return Swap(
+        new_set=replace(other, program=new_program), samples=transition.samples, use=_use(hardware, during, new_program)
+    )
 
 
-def _use(hardware: CoreDesign, during: Datapath, made: Program | None) -> Fraction:
+def _use(hardware: CoreDesign, during: Datapath, new_program: Program | None) -> Fraction:
     """Largest share of its hardware range that a state of the filter may use, among those that are not just inputs."""
     shares = []
-    locations = {} if made is None else {location.name: location for location in made.locations}
+    locations = {} if new_program is None else {location.name: location for location in new_program.locations}
     own = hardware.datapath
     for before, stage, roomy in zip(own.stages, during.stages, with_room(own).stages, strict=True):
         if isinstance(before, StartStage | OutputStage):
@@ -279,9 +281,9 @@ def _use(hardware: CoreDesign, during: Datapath, made: Program | None) -> Fracti
             if stage.graph.nodes[node.operands[0]].op in {Op.INPUT, Op.FRACTION, Op.DELAY}:
                 continue
             (low, high), shift = _word(roomy.graph.nodes[index]), 0
-            if made is not None:
+            if new_program is not None:
                 location = locations[f"{stage.name}.{node.name}"]
-                high = (1 << made.digit_bits * location.digits) - 1
+                high = (1 << new_program.digit_bits * location.digits) - 1
                 low, shift = -high - 1, location.frac - node.frac
             shares += [Fraction(node.low << shift, low or -1), Fraction(node.high << shift, high)]
     return max(shares, default=Fraction(0))
@@ -315,22 +317,22 @@ def _ends(ranges: tuple[tuple[int, int], ...]) -> str:
 def _fitted(hardware: CoreDesign, datapath: Datapath, what: str) -> Program | None:
     """Check that the hardware can run `datapath`; return its program, if there is one. `what` names it in messages."""
     architecture, spec = hardware.architecture, hardware.spec
-    limited = [_is_limited(made) for made in (hardware.datapath, datapath)]
-    if limited[1] and not limited[0]:
+    are_limited = [_is_limited(each) for each in (hardware.datapath, datapath)]
+    if are_limited[1] and not are_limited[0]:
         raise ShortfallError(f"the {what} must keep the output within its range, as the hardware does not limit it")
     if not isinstance(architecture, SharedUnit):
         _check_parallel(hardware.datapath, datapath, what)
         return None
     before = architecture.program
     try:
-        made = program(datapath, before.digit_bits, like=before).padded(len(before.instructions))
+        new_program = program(datapath, before.digit_bits, like=before).padded(len(before.instructions))
     except ValueError as error:  # FoldingError is one
         raise ShortfallError(f"the {what} must fit the hardware: {error}") from None
     budget = Budget(clock=spec.hardware.clock, sample_rate=spec.sample_rate, channels=architecture.channels)
-    needed = architecture.clocks_of(made)
+    needed = architecture.clocks_of(new_program)
     if needed > budget.cycles:
         raise ShortfallError(f"the {what} must take at most {budget.cycles:,} clocks a sample, not {needed:,}")
-    return made
+    return new_program
 
 
 def _is_limited(datapath: Datapath) -> bool:

@@ -44,7 +44,7 @@ class Transient:
     samples: int
 
 
-def transient(active: Quantized, other: Quantized, held: tuple[Fraction, Fraction] | None = None) -> Transient:
+def transient(active: Quantized, other: Quantized, first_range: tuple[Fraction, Fraction] | None = None) -> Transient:
     """Bound all signals when `other` takes over from `active`, at any sample and for all inputs in range.
 
     An earlier swap may have left an error of up to `RESIDUE` in every state.
@@ -53,7 +53,7 @@ def transient(active: Quantized, other: Quantized, held: tuple[Fraction, Fractio
     ----------
     active, other : Quantized
         Filters in the same number of sections, with the same states.
-    held : (Fraction, Fraction) or None
+    first_range : (Fraction, Fraction) or None
         Range of the first samples that may be held, which contains that of all samples; None for filters that start
         from zero.
 
@@ -63,11 +63,11 @@ def transient(active: Quantized, other: Quantized, held: tuple[Fraction, Fractio
         If their states differ.
     """
     pairs = [Pair(a.graph, b.graph, b.name) for a, b in zip(active.sections, other.sections, strict=True)]
-    if held is None:
+    if first_range is None:
         return _transient(pairs, *_input_values(active, other))
     # Whatever is held, the samples less that lie in a window of this width that contains 0, and limits are linear in
     # where it lies.
-    span, zero = held[1] - held[0], Fraction(0)
+    span, zero = first_range[1] - first_range[0], Fraction(0)
     above, below = _transient(pairs, zero, span), _transient(pairs, -span, zero)
     ranges = tuple(
         {name: (min(a[name][0], b[name][0]), max(a[name][1], b[name][1])) for name in a}
@@ -89,17 +89,17 @@ def _transient(pairs: Sequence[Pair], low: Fraction, high: Fraction) -> Transien
         lanes = [Lane(number, model, wires) for model in linear_models(pair.together)]
         outputs = [lane.at(lane.model.output) for lane in lanes]
         starts = {lane.model.output: extent(list(d.values())) for lane, d in zip(lanes, outputs, strict=True)}
-        found = {node: extent(list(lane.at(pair.place[node]).values())) for node, lane in pair.bounds(lanes).items()}
+        limits = {node: extent(list(lane.at(pair.place[node]).values())) for node, lane in pair.bounds(lanes).items()}
         moved = fading.section(number, pair, starts)
         count = len(pair.active.outputs)
         wires = [merged(drives, {INPUT}, (number, k, "rounding", 0)) for k, drives in enumerate(outputs[:count])]
-        ranges.append(pair.ranges({node: added(found[node], moved[node]) for node in found}))
+        ranges.append(pair.ranges({node: added(limits[node], moved[node]) for node in limits}))
     return Transient(ranges=tuple(ranges), samples=fading.samples)
 
 
 def _input_values(active: Quantized, other: Quantized) -> tuple[Fraction, Fraction]:
     """Smallest and largest value at the input of the first section."""
-    nodes = [made.sections[0].graph.nodes[made.sections[0].graph.inputs[0]] for made in (active, other)]
+    nodes = [quantized.sections[0].graph.nodes[quantized.sections[0].graph.inputs[0]] for quantized in (active, other)]
     units = [Fraction(2) ** -node.frac for node in nodes]
     return (
         min(node.low * unit for node, unit in zip(nodes, units, strict=True)),

@@ -102,19 +102,19 @@ def _transient(evidence: Evidence) -> int:
     return int(np.argmin(np.append(flagged, False)))
 
 
-def behaviour_entry(found: Behaviour) -> dict[str, Any]:
+def behaviour_entry(measured: Behaviour) -> dict[str, Any]:
     """Return the entries of `report.json`; lengths of time in s."""
-    error, step = found.true_error, found.step
+    error, step = measured.true_error, measured.step
     return {
         "true_error": None
         if error is None
-        else {"max_abs": error.max_abs, "rms": error.rms, "mean": error.mean, "readings": found.readings},
-        "delay": None if found.delay is None else {"seconds": found.delay, "frequency": found.delay_hz},
+        else {"max_abs": error.max_abs, "rms": error.rms, "mean": error.mean, "readings": measured.readings},
+        "delay": None if measured.delay is None else {"seconds": measured.delay, "frequency": measured.delay_hz},
         "settling": None
         if step is None
         else {
-            "seconds": found.settling,
-            "half_lsb_seconds": found.settling_to_lsb,
+            "seconds": measured.settling,
+            "half_lsb_seconds": measured.settling_to_lsb,
             "overshoot_percent": None if step.overshoot is None else 100 * step.overshoot,
         },
     }

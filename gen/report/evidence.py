@@ -60,7 +60,7 @@ class Evidence:
         The uncertainty budget of a reading, in the types of JSON; None if nothing is known of what the calibration is
         worth.
     provenance : Provenance or None
-        What the run is told by; None if unknown.
+        What identifies the run; None if unknown.
     specification : str
         Name of the specification's file, ``""`` if unknown.
     files : Mapping of str to str

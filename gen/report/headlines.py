@@ -30,12 +30,12 @@ class _Run:
 
     evidence: Evidence
     summary: Summary
-    found: Behaviour
+    measured: Behaviour
 
 
-def headlines(evidence: Evidence, summary: Summary, found: Behaviour) -> list[dict[str, Any]]:
+def headlines(evidence: Evidence, summary: Summary, measured: Behaviour) -> list[dict[str, Any]]:
     """Return groups with `title` and `facts` in JSON types, from the top of the page, none without a fact."""
-    run = _Run(evidence, summary, found)
+    run = _Run(evidence, summary, measured)
     groups = {
         "The measurement": list(_measurement(run)),
         "The arithmetic": list(_arithmetic(run)),
@@ -64,10 +64,10 @@ def _measurement(run: _Run) -> Iterator[Fact]:
     if (sound := run.summary["sound"]) is not None:
         yield from _sound(sound)
     evidence, unit = run.evidence, run.evidence.facts.unit
-    error, accuracy = run.found.true_error, run.summary["accuracy_percent"]
+    error, accuracy = run.measured.true_error, run.summary["accuracy_percent"]
     if error is not None:
         beside = f"RMS {in_own_unit(error.rms, unit)}, mean {in_own_unit(error.mean, unit)}"
-        over = count(run.found.readings, "reading")
+        over = count(run.measured.readings, "reading")
         yield Fact("Largest error against the true value", error.max_abs, unit, f"{beside}, over {over}")
     if accuracy["hardware"] is not None:
         without = accuracy["unfiltered"] if evidence.facts.filter is not None else None
@@ -80,10 +80,10 @@ def _measurement(run: _Run) -> Iterator[Fact]:
         low, high = (plain_number(worth["expanded"][key]) for key in ("smallest", "largest"))
         share = f"with a probability of {100 * worth['probability']:g} %"
         yield Fact("Uncertainty of a reading", f"±{low} to ±{high} {worth['unit']}", sentence=share)
-    if run.found.delay is not None and run.found.delay_hz is not None:
-        yield _delay(evidence, run.found.delay, run.found.delay_hz)
-    if run.found.settling is not None and run.found.settling_to_lsb is not None and run.found.step is not None:
-        yield _settling(run.found.settling, run.found.settling_to_lsb, run.found)
+    if run.measured.delay is not None and run.measured.delay_hz is not None:
+        yield _delay(evidence, run.measured.delay, run.measured.delay_hz)
+    if run.measured.settling is not None and run.measured.settling_to_lsb is not None and run.measured.step is not None:
+        yield _settling(run.measured.settling, run.measured.settling_to_lsb, run.measured)
 
 
 def _sound(sound: Mapping[str, Any]) -> Iterator[Fact]:
@@ -109,14 +109,14 @@ def _delay(evidence: Evidence, delay: float, at: float) -> Fact:
     return Fact("Delay of the filter", delay, "s", f"{where}: {plain_number(delay * rate)} samples", quantity)
 
 
-def _settling(time: float, to_lsb: float, found: Behaviour) -> Fact:
-    assert found.step is not None
+def _settling(time: float, to_lsb: float, measured: Behaviour) -> Fact:
+    assert measured.step is not None
     parts = [
-        "after a step, to within 1 %" if found.step.passes_constants else "after a step, to 1 % of its peak",
+        "after a step, to within 1 %" if measured.step.passes_constants else "after a step, to 1 % of its peak",
         f"to half an LSB, over the whole range, {quantity(to_lsb, 's')}",
     ]
-    if found.step.overshoot is not None:
-        parts.append(f"overshoot {plain_number(100 * found.step.overshoot)} %")
+    if measured.step.overshoot is not None:
+        parts.append(f"overshoot {plain_number(100 * measured.step.overshoot)} %")
     return Fact("Settling time", time, "s", "; ".join(parts), quantity)
 
 

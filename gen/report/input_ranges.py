@@ -52,11 +52,11 @@ class InputRange:
 
 def input_ranges(traces: Sequence[Trace]) -> tuple[InputRange, ...]:
     """Return the use of each input's range by the traces of all channels, in the order of the inputs."""
-    found = []
+    ranges = []
     for k, port in enumerate(traces[0].ports):
         columns = [trace.codes[:, k] for trace in traces]
         low, high = port.decode(np.array([port.lowest, port.highest + 1]))
-        found.append(
+        ranges.append(
             InputRange(
                 name=port.name,
                 unit=port.unit,
@@ -70,31 +70,31 @@ def input_ranges(traces: Sequence[Trace]) -> tuple[InputRange, ...]:
                 synthetic=traces[0].seed is not None and traces[0].truth is None,
             )
         )
-    return tuple(found)
+    return tuple(ranges)
 
 
 def limited_inputs(ranges: Sequence[InputRange]) -> Iterator[str]:
     """Say which inputs were outside their ranges: no result is accurate to what the trace meant."""
-    for found in ranges:
-        if found.limited:
-            low, high = (quantity(value, found.unit) for value in (found.low, found.high))
+    for each in ranges:
+        if each.limited:
+            low, high = (quantity(value, each.unit) for value in (each.low, each.high))
             yield (
-                f"The input {found.name} must stay in its range, {low} to {high}: {_share(found.limited, found)} of "
+                f"The input {each.name} must stay in its range, {low} to {high}: {_share(each.limited, each)} of "
                 "the values in the trace do not, and were limited to it: scale the trace, or widen "
-                f"input.{found.name}.range."
+                f"input.{each.name}.range."
             )
 
 
 def inputs_at_an_end(ranges: Sequence[InputRange]) -> Iterator[str]:
     """Say which inputs have codes at an end of their ranges, and how many."""
-    for found in ranges:
-        if found.at_end > found.limited and not found.synthetic:
+    for each in ranges:
+        if each.at_end > each.limited and not each.synthetic:
             yield (
-                f"{_share(found.at_end, found)} of the codes of {found.name} are at an end of its range: if the trace "
+                f"{_share(each.at_end, each)} of the codes of {each.name} are at an end of its range: if the trace "
                 "was measured, the converter was overdriven there, and the accuracy is that of a clipped signal."
             )
 
 
-def _share(part: int, found: InputRange) -> str:
-    percent = 100 * part / found.samples
-    return f"{percent:.3g} %" if percent >= 0.01 else f"{part:,} of {found.samples:,}"
+def _share(part: int, whole: InputRange) -> str:
+    percent = 100 * part / whole.samples
+    return f"{percent:.3g} %" if percent >= 0.01 else f"{part:,} of {whole.samples:,}"

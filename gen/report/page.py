@@ -221,14 +221,16 @@ def histogram_caption(evidence: Evidence) -> str:
     """Say how many errors the rounding of the output alone could explain."""
     inside = float(np.mean(np.abs(evidence.run.error) <= evidence.facts.lsb / 2))
     if inside == 1:
-        found = "All samples lie between the dotted lines at ±½\u00a0LSB, where rounding the output alone leaves them."
+        sentence = (
+            "All samples lie between the dotted lines at ±½\u00a0LSB, where rounding the output alone leaves them."
+        )
     else:
         share = f"{100 * inside:.3g}" if inside < 0.995 else "More than 99"
-        found = (
+        sentence = (
             f"{share} % of the samples lie between the dotted lines at ±½\u00a0LSB, as far as rounding the output "
             "alone reaches; to the others, errors from before the output have added."
         )
-    return f"One LSB is {_amount(evidence.facts.lsb, evidence.facts.unit)}. {found}"
+    return f"One LSB is {_amount(evidence.facts.lsb, evidence.facts.unit)}. {sentence}"
 
 
 def _histogram_figure(evidence: Evidence) -> Figure:
@@ -250,35 +252,35 @@ def _alternatives_figure(evidence: Evidence) -> Figure:
 
 
 def _alternatives_table(evidence: Evidence, summary: Summary) -> Table:
-    found = [(f"{evidence.realization} (this design)", summary["error"]["max_abs"], summary["error"]["rms"])]
-    found += [(other.name, other.max_abs, other.rms) for other in evidence.rivals]
+    errors = [(f"{evidence.realization} (this design)", summary["error"]["max_abs"], summary["error"]["rms"])]
+    errors += [(other.name, other.max_abs, other.rms) for other in evidence.rivals]
     unit = _unit(evidence)
     rows = [
         (name, unit.number(largest), plain_number(largest / evidence.facts.lsb), unit.number(rms))
-        for name, largest, rms in found
+        for name, largest, rms in errors
     ]
     head = ("realization", unit.titled("largest error"), "in LSB", unit.titled("RMS"))
     return Table("", rows, head, numbers=(1, 2, 3))
 
 
-def _uncertainty_caption(found: Mapping[str, Any]) -> str:
-    at, unit = found["at"], found["unit"]
-    smallest, largest = (plain_number(found["expanded"][key]) for key in ("smallest", "largest"))
+def _uncertainty_caption(budget: Mapping[str, Any]) -> str:
+    at, unit = budget["at"], budget["unit"]
+    smallest, largest = (plain_number(budget["expanded"][key]) for key in ("smallest", "largest"))
     text = (
-        f"{100 * found['probability']:g} % of readings are within ±{smallest} to ±{largest} {unit} of the true value. "
+        f"{100 * budget['probability']:g} % of readings are within ±{smallest} to ±{largest} {unit} of the true value. "
         f"The table is for {plain_number(at['clearance'])} {unit}, at {plain_number(at['voltage_V'])} V and "
         f"{plain_number(at['temperature_C'])} °C, where it is largest."
     )
-    return text + (f" Not stated: {', '.join(found['not_stated'])}." if found["not_stated"] else "")
+    return text + (f" Not stated: {', '.join(budget['not_stated'])}." if budget["not_stated"] else "")
 
 
 _BANDS = 8
-"""Bands of a decimator that are told one by one; the gain falls from band to band."""
+"""Bands of a decimator that are listed one by one; the gain falls from band to band."""
 
 
-def _decimation_table(found: DecimationFacts) -> Table:
+def _decimation_table(decimation: DecimationFacts) -> Table:
     """Tell what folds from each band around a multiple of the lower rate, into the pass band and anywhere."""
-    shown, others = found.aliasing[:_BANDS], found.aliasing[_BANDS:]
+    shown, others = decimation.aliasing[:_BANDS], decimation.aliasing[_BANDS:]
     rows = [
         (
             f"{_hertz((band.whole_low,))} to {_hertz((band.whole_high,))}",
@@ -297,21 +299,21 @@ def _decimation_table(found: DecimationFacts) -> Table:
     return Table("", rows, head, numbers=(1, 2, 4))
 
 
-def _decimation_caption(found: DecimationFacts, unit: str) -> str:
-    worst, rate = _amount(found.worst_aliasing, unit), _hertz((found.sample_rate,))
-    held = ", which leaves as many times" if found.held else ""
-    before = found.calibration
+def _decimation_caption(decimation: DecimationFacts, unit: str) -> str:
+    worst, rate = _amount(decimation.worst_aliasing, unit), _hertz((decimation.sample_rate,))
+    repeated = ", which leaves as many times" if decimation.held else ""
+    before = decimation.calibration
     calibrated = "" if before is None else f"Every sample is calibrated first, within {_amount(before.error, unit)}. "
     what = "the input" if before is None else "the calibration's result"
     return (
-        f"{calibrated}{found.factor} samples make one result{held}, by {count(found.stages, 'stage')} of integrators "
-        f"and combs of {found.width} bits, and the filter works at {rate}. A sine over the whole range of {what} in "
-        f"one of the bands on the right comes out in the pass band with an amplitude of at most {worst}; one at any "
-        f"frequency from half that rate on, wherever it comes out, with at most {_amount(found.largest, unit)} "
-        f"({decibels(found.largest_db)}), where a filter without a decimator has "
-        f"{decibels(found.direct_largest_db)}. At {SAMPLED} frequencies in the pass band the gain is "
-        f"within {plain_number(found.deviation_db)} dB of that without a decimator, and decimator and filter together "
-        f"delay by {_amount(found.delay, 's')}."
+        f"{calibrated}{decimation.factor} samples make one result{repeated}, by {count(decimation.stages, 'stage')} of "
+        f"integrators and combs of {decimation.width} bits, and the filter works at {rate}. A sine over the whole "
+        f"range of {what} in one of the bands on the right comes out in the pass band with an amplitude of at most "
+        f"{worst}; one at any frequency from half that rate on, wherever it comes out, with at most "
+        f"{_amount(decimation.largest, unit)} ({decibels(decimation.largest_db)}), where a filter without a decimator "
+        f"has {decibels(decimation.direct_largest_db)}. At {SAMPLED} frequencies in the pass band the gain is "
+        f"within {plain_number(decimation.deviation_db)} dB of that without a decimator, and decimator and "
+        f"filter together delay by {_amount(decimation.delay, 's')}."
     )
 
 
@@ -452,22 +454,22 @@ def _netlist_in_words(netlist: Netlist) -> str:
 
 
 def _evidence_tables(evidence: Evidence) -> tuple[Table, Table]:
-    """List with their SHA-256 what the run is told by, and what else was made or derived for it."""
-    told, derived = [], []
+    """List with their SHA-256 what the run is given, and what else was made or derived for it."""
+    given, derived = [], []
     known = evidence.provenance
     if known is not None:
-        told.append(("specification", evidence.specification or "given as values", known.specification_sha256))
+        given.append(("specification", evidence.specification or "given as values", known.specification_sha256))
         derived = [
             ("exact calculation", "inputs, polynomial, ideal sections, output", known.reference_sha256),
             ("datapath", "integer model", known.datapath_sha256),
         ]
     certificate = [name for name in evidence.files if name.endswith(".certificate.json")]
-    told += [("certificate", name, evidence.files[name]) for name in certificate]
-    told += [] if known is None else [("trace", evidence.run.scenario, known.trace_sha256)]
+    given += [("certificate", name, evidence.files[name]) for name in certificate]
+    given += [] if known is None else [("trace", evidence.run.scenario, known.trace_sha256)]
     others = [name for name in evidence.files if name not in certificate]
     derived += [("" if k else "generated files", name, evidence.files[name]) for k, name in enumerate(others)]
     head = ("", "", "SHA-256")
-    return Table("", told, head, code=(2,)), Table("", derived, head, code=(2,))
+    return Table("", given, head, code=(2,)), Table("", derived, head, code=(2,))
 
 
 def _evidence_facts(evidence: Evidence) -> list[tuple[str, str]]:
@@ -497,8 +499,8 @@ def _run_facts(evidence: Evidence) -> list[tuple[str, str]]:
 def render_page(evidence: Evidence, summary: Summary) -> str:
     """Return the whole page; `summary` is what `sosmith.gen.report.report.summarise` makes of `evidence`."""
     shown, facts = evidence.shown, evidence.facts
-    found = behaviour(evidence)
-    told_by, derived = _evidence_tables(shown)
+    measured = behaviour(evidence)
+    given, derived = _evidence_tables(shown)
     parts: dict[str, Any] = {}
     if shown.uncertainty is not None:
         parts["uncertainty"] = uncertainty_table(shown.uncertainty)
@@ -508,7 +510,7 @@ def render_page(evidence: Evidence, summary: Summary) -> str:
         parts["alternatives_table"] = _alternatives_table(shown, summary)
     if shown.facts.filter is not None:
         parts |= _filter_figures(shown.facts, shown.facts.filter, evidence.facts.decimation)
-        parts["step"] = None if found.step is None else _step_figure(found.step)
+        parts["step"] = None if measured.step is None else _step_figure(measured.step)
         parts["response"] = _response_table(shown.facts.filter, summary["frequency_response"])
     if (
         summary["sound"] is not None
@@ -525,13 +527,13 @@ def render_page(evidence: Evidence, summary: Summary) -> str:
         summary=summary,
         reasons=_reasons(evidence, summary),
         unbroken=unbroken,
-        told_by=told_by,
+        given=given,
         derived=derived,
-        told_facts=_evidence_facts(shown),
-        trace=_trace_figure(shown, found.transient),
+        given_facts=_evidence_facts(shown),
+        trace=_trace_figure(shown, measured.transient),
         close_up=_close_up_figure(shown),
         looks=_looks(shown),
-        samples=viewer_data(shown, found.transient),
+        samples=viewer_data(shown, measured.transient),
         error=_error_figure(shown),
         histogram=_histogram_figure(shown),
         budget=budget_table(facts.error_parts, facts.max_error, facts.lsb, facts.unit),

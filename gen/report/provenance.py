@@ -1,4 +1,4 @@
-"""What a run is told by: digests of specification, exact calculation, trace and datapath; the hardware's cost."""
+"""What identifies a run: digests of specification, exact calculation, trace and datapath; the hardware's cost."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Provenance:
     trace_sha256 : str
         Of the input codes of all channels, with the inputs' formats and the sample rate.
     datapath_sha256 : str
-        Of the datapath, told as its C model, whatever its name.
+        Of the datapath, as its C model, whatever its name.
     cycles_per_sample : float
         Largest number of clocks between samples that the hardware needs, without waiting: a whole number but where a
         beat holds several samples, or behind a decimator, where it is the average.
@@ -114,30 +114,30 @@ def hardware_cost(design: CoreDesign, netlist: Netlist | None = None) -> dict[st
         designs do not exceed; of a program ``instructions``, ``memory_words`` and ``accumulator_bits``, with those of
         one before a decimator but without the decimator. What is not known is None.
     """
-    made: dict[str, Any] = dict.fromkeys(_OF_COST)
-    program, ahead = design.architecture.program, design.architecture.ahead
-    programs = [each for each in (program, None if ahead is None else ahead.program) if each is not None]
+    cost: dict[str, Any] = dict.fromkeys(_OF_COST)
+    program, calibration = design.architecture.program, design.architecture.calibration
+    programs = [each for each in (program, None if calibration is None else calibration.program) if each is not None]
     if programs:
-        made |= {
+        cost |= {
             "instructions": sum(len(each.instructions) for each in programs),
             "memory_words": sum(each.words for each in programs),
             "accumulator_bits": sum(each.accumulator_bits for each in programs),
         }
     if netlist is not None:
         board = netlist.board
-        made["luts"] = board.device.luts(netlist.cells)
-        made["multiplier_blocks"] = netlist.cells.get(board.device.multiplier or "", 0)
-        return {"source": "synthesis", "board": board.name, "device": board.device.title, **made}
-    found = estimated(design.architecture, find_board(USUAL[0]))
-    assert found is not None
-    made |= {
-        "luts": found.luts,
-        "multiplier_blocks": found.multiplier_blocks,
-        "register_bits": found.flip_flops,
-        "memory_bits": found.memory_bits,
-        "within": found.tested.nine_in_ten,
+        cost["luts"] = board.device.luts(netlist.cells)
+        cost["multiplier_blocks"] = netlist.cells.get(board.device.multiplier or "", 0)
+        return {"source": "synthesis", "board": board.name, "device": board.device.title, **cost}
+    estimate = estimated(design.architecture, find_board(USUAL[0]))
+    assert estimate is not None
+    cost |= {
+        "luts": estimate.luts,
+        "multiplier_blocks": estimate.multiplier_blocks,
+        "register_bits": estimate.flip_flops,
+        "memory_bits": estimate.memory_bits,
+        "within": estimate.tested.nine_in_ten,
     }
-    return {"source": "estimate", "board": None, "device": found.device, **made}
+    return {"source": "estimate", "board": None, "device": estimate.device, **cost}
 
 
 def _port(port: Port) -> list[Any]:

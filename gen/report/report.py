@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from sosmith.gen.filter.response import ResponseMeasures, measure_response
+from sosmith.gen.output.core_facts import CoreFacts
 from sosmith.gen.output.manifest import limit_cycle_entry
 from sosmith.gen.quantity import quantity
 from sosmith.gen.report.behaviour import behaviour, behaviour_entry, readings_of
@@ -21,28 +22,28 @@ from sosmith.gen.report.page import render_page
 from sosmith.gen.report.provenance import Provenance
 from sosmith.gen.report.sound import sound_entry
 from sosmith.gen.version import __version__
-from sosmith.model.reference.accuracy import accuracy_percent, error_statistics, sqnr_db
+from sosmith.model.reference.accuracy import ErrorStatistics, accuracy_percent, error_statistics, sqnr_db
 from sosmith.model.text_files import to_json, write_files
 
 
 def _shortfalls(evidence: Evidence, max_abs: float, measures: ResponseMeasures | None) -> list[str]:
     """Reasons why the run did not pass, one sentence each; none if it did."""
-    found = []
+    shortfalls = []
     facts, run = evidence.facts, evidence.run
     if run.mismatches:
         where = "" if run.first_mismatch is None else f", first at sample {run.first_mismatch:,}"
-        found.append(
+        shortfalls.append(
             f"The hardware differs from the integer model at {run.mismatches:,} of {run.samples:,} samples{where}."
         )
     error = quantity(max_abs, facts.unit)
     if max_abs > facts.error_bound:
-        found.append(f"The largest error is {error}, over the limit of {quantity(facts.error_bound, facts.unit)}.")
+        shortfalls.append(f"The largest error is {error}, over the limit of {quantity(facts.error_bound, facts.unit)}.")
     if max_abs > facts.max_error:
         asked = quantity(facts.max_error, facts.unit)
-        found.append(f"The largest error is {error}, more than the {asked} that the specification allows.")
+        shortfalls.append(f"The largest error is {error}, more than the {asked} that the specification allows.")
     if facts.filter is not None and measures is not None:
-        found += mask_shortfalls(facts.filter, measures)
-    return [*found, *limited_inputs(evidence.input_ranges)]
+        shortfalls += mask_shortfalls(facts.filter, measures)
+    return [*shortfalls, *limited_inputs(evidence.input_ranges)]
 
 
 def _notes(evidence: Evidence) -> list[str]:
@@ -110,7 +111,7 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
     statistics = error_statistics(run.error)
     measures = None if facts.filter is None else measure_response(facts.filter)
     shortfalls = _shortfalls(evidence, statistics.max_abs, measures)
-    found = behaviour(evidence)
+    measured = behaviour(evidence)
     summary: dict[str, Any] = {
         "name": facts.name,
         "core": facts.core,
@@ -118,7 +119,7 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
         "passed": not shortfalls,
         "shortfalls": shortfalls,
         "notes": _notes(evidence),
-        "inputs": [found.entry for found in evidence.input_ranges],
+        "inputs": [each.entry for each in evidence.input_ranges],
         "samples": run.samples,
         "channels": run.channels,
         "cycles": run.cycles,
@@ -130,17 +131,8 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
         "bit_exact": run.mismatches == 0,
         "mismatches": run.mismatches,
         "first_mismatch": run.first_mismatch,
-        "error": {
-            "max_abs": statistics.max_abs,
-            "max_lsb": statistics.max_abs / facts.lsb,
-            "rms": statistics.rms,
-            "mean": statistics.mean,
-            "bound": facts.error_bound,
-            "proven": True,
-            "parts": dict(facts.error_parts),
-            "unit": facts.unit,
-        },
-        **behaviour_entry(found),
+        "error": _error(facts, statistics),
+        **behaviour_entry(measured),
         "max_error": facts.max_error,
         "lsb": facts.lsb,
         "range": list(facts.range),
@@ -154,7 +146,7 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
         "alternatives": [
             {"name": other.name, "max_abs": other.max_abs, "rms": other.rms} for other in evidence.alternatives
         ],
-        "limit_cycles": [limit_cycle_entry(found) for found in facts.limit_cycles],
+        "limit_cycles": [limit_cycle_entry(cycles) for cycles in facts.limit_cycles],
         "realization": evidence.realization,
         "architecture": facts.architecture,
         "cycles_per_second": evidence.cycles_per_second,
@@ -164,15 +156,34 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
         "files": dict(evidence.files),
         "tools": dict(evidence.tools),
         "provenance": None if evidence.provenance is None else _entry(evidence.provenance),
-        "curves": {
-            "error": error_over_time(evidence),
-            "spectrum": error_spectrum(evidence),
-            "filter": filter_curve(facts.filter),
-        },
+        "curves": _curves(evidence),
     }
-    summary["facts"] = headlines(evidence, summary, found)
+    summary["facts"] = headlines(evidence, summary, measured)
     cleaned: dict[str, Any] = _without_infinities(summary)
     return cleaned
+
+
+def _error(facts: CoreFacts, statistics: ErrorStatistics) -> dict[str, Any]:
+    """Errors in the output's unit, and the largest one in its LSBs too."""
+    return {
+        "max_abs": statistics.max_abs,
+        "max_lsb": statistics.max_abs / facts.lsb,
+        "rms": statistics.rms,
+        "mean": statistics.mean,
+        "bound": facts.error_bound,
+        "proven": True,
+        "parts": dict(facts.error_parts),
+        "unit": facts.unit,
+    }
+
+
+def _curves(evidence: Evidence) -> dict[str, Any]:
+    """Curves that pages of comparisons draw."""
+    return {
+        "error": error_over_time(evidence),
+        "spectrum": error_spectrum(evidence),
+        "filter": filter_curve(evidence.facts.filter),
+    }
 
 
 def _entry(provenance: Provenance) -> dict[str, Any]:
@@ -200,7 +211,7 @@ def _without_infinities(value: Any) -> Any:
 
 
 def write_report(evidence: Evidence, directory: Path) -> dict[str, Any]:
-    """Write `report.json` and `report.html` into `directory`, made if missing, and return the summary.
+    """Write `report.json` and `report.html` into `directory`, created if missing, and return the summary.
 
     Raises
     ------

@@ -215,7 +215,7 @@ def run_of(
     *,
     cycles: int = 0,
 ) -> Run:
-    """Hold what hardware made of `traces`, one for each channel, against integer model and exact chain.
+    """Compare what hardware computed from `traces`, one for each channel, with integer model and exact chain.
 
     Parameters
     ----------
@@ -244,7 +244,7 @@ def run_of(
     unsettled = (status >> Flag.SETTLING & 1).astype(np.bool_) if datapath.settles else None
     received = np.asarray(received, dtype=_smallest(datapath.output))
     del expected, flags, status  # the exact chain takes as much memory
-    if datapath.decimator is not None:  # what is told of a sample is told of those that bring a result
+    if datapath.decimator is not None:  # only samples that bring a result can be compared
         traces = [trace.every(datapath.decimator.factor) for trace in traces]
     run = Run(
         scenario=traces[0].name,

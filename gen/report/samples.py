@@ -24,7 +24,7 @@ def viewer_data(evidence: Evidence, transient: int) -> dict[str, Any]:
     -------
     dict
         ``start`` and ``step``: time of sample 0 and between samples, in s. ``samples``: length of the run; ``stride``:
-        samples of the run for each one held. ``lsb`` and ``zero``: value = zero + lsb * code. ``index``, ``code``,
+        samples of the run for each one kept. ``lsb`` and ``zero``: value = zero + lsb * code. ``index``, ``code``,
         ``error``, ``truth`` and ``unfiltered`` as `packed` makes them, the last two possibly None. ``value``,
         ``fine`` and ``true_error``: factor and unit in which values, errors and errors against the true value are
         shown. ``limits``: of the error, with their colours. ``focus``: first and last sample to show at first;

@@ -43,7 +43,7 @@ def levels(values: Array, rate: float) -> tuple[Array, Array]:
     """Return frequencies in Hz, without zero, and the mean level there in dB of full scale, by Welch's method.
 
     A sine over the whole scale is at 0 dB, or up to 0.4 dB below where it lies between two lines. What is no sine, such
-    as noise, is told by the power in a line, which goes with the length of a segment of up to `_SEGMENT` samples.
+    as noise, is shown by the power in a line, which grows with the length of a segment of up to `_SEGMENT` samples.
     """
     window = np.kaiser(min(_SEGMENT, len(values)) + 1, _BETA)[:-1]  # of a period, with its largest value in the middle
     frequency, power = welch(values, rate, window)

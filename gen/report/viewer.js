@@ -46,9 +46,9 @@
   let dragged = null;
 
   function worst() {
-    let found = 0;
-    for (let i = 1; i < count; i++) if (Math.abs(error[i]) > Math.abs(error[found])) found = i;
-    return found;
+    let largest = 0;
+    for (let i = 1; i < count; i++) if (Math.abs(error[i]) > Math.abs(error[largest])) largest = i;
+    return largest;
   }
 
   // The first point at or after a sample.
@@ -101,11 +101,11 @@
   function ticks(low, high, wanted) {
     const rough = (high - low) / wanted, power = 10 ** Math.floor(Math.log10(rough));
     const step = power * [1, 2, 5, 10].find((each) => each * power >= rough * 0.999);
-    const places = Math.max(0, -Math.floor(Math.log10(step) + 1e-9)), found = [];
+    const places = Math.max(0, -Math.floor(Math.log10(step) + 1e-9)), labelled = [];
     for (let k = Math.ceil(low / step - 1e-9); k * step <= high * (1 + 1e-12) + 1e-12 * step; k++) {
-      found.push([k * step, (k * step).toFixed(Math.min(places, 12)).replace("-", "−")]);
+      labelled.push([k * step, (k * step).toFixed(Math.min(places, 12)).replace("-", "−")]);
     }
-    return found;
+    return labelled;
   }
 
   const margin = { left: 74, right: 10, top: 8, gap: 16, bottom: 40 };

@@ -21,7 +21,20 @@ FIR_FAMILIES = ("equiripple", "least_squares", "kaiser", "halfband")
 MAX_TAPS = 256
 """Most taps of an FIR filter."""
 
+FAMILY_HINTS = {
+    **dict.fromkeys(("fir", "firwin", "remez", "window", "hamming"), " (did you mean equiripple or kaiser?)"),
+    "cauer": " (did you mean elliptic?)",
+    "ellip": " (did you mean elliptic?)",
+    "butter": " (did you mean butterworth?)",
+}
+"""What to say to names of families that there are elsewhere."""
+
 KINDS = ("lowpass", "highpass", "bandpass", "bandstop")
+_OTHER_KINDS = (("lp", "lpf", "low"), ("hp", "hpf", "high"), ("bp", "bpf"), ("bs", "notch"))
+KIND_HINTS = {
+    other: f" (did you mean {kind}?)" for kind, others in zip(KINDS, _OTHER_KINDS, strict=True) for other in others
+}
+"""What to say to other names of kinds."""
 LOSSES = {
     "chebyshev1": ("passband_loss",),
     "chebyshev2": ("stopband_loss",),

@@ -270,13 +270,13 @@ def check_combinations(spec: Specified) -> None:
 
 def _without_option(spec: Specified, terms: Terms, option: Option, refusal: Refusal) -> UnfitError:
     """Return the error about an architecture that lacks an option: of the key that is easier to do without."""
-    told = refusal._replace(reason=refusal.reason.format(name=terms.name))
+    named = refusal._replace(reason=refusal.reason.format(name=terms.name))
     if not option.first:
         beside = f'hardware.architecture = "{terms.name}"'
-        return _unfit(told, option.without, beside, option.key, literal(option.of(spec)))
+        return _unfit(named, option.without, beside, option.key, literal(option.of(spec)))
     others = ["auto", *(name for name, each in TERMS.items() if each.takes((option,)))]
     expected = " or ".join(map(literal, others)) if len(others) < 3 else f"one of {', '.join(map(literal, others))}"
-    return _unfit(told, expected, option.phrase(spec), "hardware.architecture", literal(terms.name))
+    return _unfit(named, expected, option.phrase(spec), "hardware.architecture", literal(terms.name))
 
 
 def _unfit(refusal: Refusal, expected: str, beside: str, where: str, value: str) -> UnfitError:

@@ -92,11 +92,11 @@ def _check_pipeline(document: Document) -> None:
 
 def _check_inputs(document: Document) -> None:
     names = list(document.input)
-    found = ", ".join(literal(name) for name in names) or "none"
+    given = ", ".join(literal(name) for name in names) or "none"
     if document.calibration is not None and set(names) != set(CALIBRATION_INPUTS):
-        raise UnfitError("the two tables voltage and temperature with [calibration]", found, where="input")
+        raise UnfitError("the two tables voltage and temperature with [calibration]", given, where="input")
     if document.calibration is None and len(names) != 1:
-        raise UnfitError("a single table if there is no [calibration]", found, where="input")
+        raise UnfitError("a single table if there is no [calibration]", given, where="input")
     for name, table in document.input.items():
         try:
             identifier(name)
@@ -130,8 +130,8 @@ def _check_converter(
         raise UnfitError(expected, "missing", where=f"{where}.range")
     without = () if by_range else ("range", "supply") if isinstance(device, Converter) else ("supply",)
     for key in without:
-        if (found := getattr(table, key)) is not None:
-            raise UnfitError(f"left out for {table.device}", literal(found), where=f"{where}.{key}")
+        if (given := getattr(table, key)) is not None:
+            raise UnfitError(f"left out for {table.device}", literal(given), where=f"{where}.{key}")
 
 
 def _check_range(table: InputTable, where: str) -> None:
@@ -145,8 +145,8 @@ def _check_calibration(document: Document) -> None:
     if calibration is None:
         return
     if (calibration.coefficients is None) == (calibration.data is None):
-        found = "none of them" if calibration.data is None else "both"
-        raise UnfitError("given by one of coefficients and data", found, where="calibration")
+        given = "none of them" if calibration.data is None else "both"
+        raise UnfitError("given by one of coefficients and data", given, where="calibration")
     if calibration.coefficients is not None and not any(map(any, calibration.coefficients)):
         raise UnfitError("a polynomial that is not zero", "zeros only", where="calibration.coefficients")
     check_coefficients(calibration)
@@ -330,24 +330,35 @@ def _check_band(table: FilterTable, key: str, kind: str, sample_rate: Fraction) 
     """Check the frequencies of `key` by themselves, and return them."""
     frequencies: tuple[Fraction, ...] = getattr(table, key)
     where = f"filter.{key}"
-    found = _frequencies(frequencies)
+    given = _frequencies(frequencies)
     if _is_band(kind) and len(frequencies) != 2:
-        raise UnfitError(f"two frequencies [low, high] for {kind}", found, where=where)
+        raise UnfitError(f"two frequencies [low, high] for {kind}", given, where=where)
     if not _is_band(kind) and len(frequencies) != 1:
-        raise UnfitError(f"one frequency for {kind}", found, where=where)
+        raise UnfitError(f"one frequency for {kind}", given, where=where)
     if not all(0 < frequency < sample_rate / 2 for frequency in frequencies):
-        raise UnfitError(f"above 0 and below half the sample_rate ({literal(sample_rate / 2)} Hz)", found, where=where)
-    margin = MARGIN * sample_rate
-    if not all(margin <= frequency <= sample_rate / 2 - margin for frequency in frequencies):
-        raise UnfitError(
-            f"at least a millionth of the sample_rate ({literal(margin)} Hz) away from 0 and from half the"
-            " sample_rate, as no word length suffices for a filter closer to them",
-            found,
-            where=where,
-        )
+        raise UnfitError(f"above 0 and below half the sample_rate ({literal(sample_rate / 2)} Hz)", given, where=where)
+    _check_margin(table, frequencies, kind, sample_rate, where)
     if list(frequencies) != sorted(set(frequencies)):
-        raise UnfitError("rising, [low, high]", found, where=where)
+        raise UnfitError("rising, [low, high]", given, where=where)
     return frequencies
+
+
+def _check_margin(
+    table: FilterTable, frequencies: Sequence[Fraction], kind: str, sample_rate: Fraction, where: str
+) -> None:
+    """Check that no pole lies too close to the unit circle, at the rate at which the filter works."""
+    factor = 1 if table.decimate in {None, AUTO} else int(table.decimate)
+    margin = MARGIN * sample_rate
+    if all(margin / factor <= frequency <= sample_rate / 2 - margin for frequency in frequencies):
+        return
+    rate = "the sample_rate" if factor == 1 else f"the sample_rate / {factor}"
+    cure = " without filter.decimate" if kind == "lowpass" and factor == 1 and frequencies[0] < margin else ""
+    raise UnfitError(
+        f"at least a millionth of {rate} ({literal(margin / factor)} Hz) away from 0 and from half the sample_rate,"
+        f" as no word length suffices for a filter closer to them{cure}",
+        _frequencies(frequencies),
+        where=where,
+    )
 
 
 def _frequencies(frequencies: Sequence[Fraction]) -> str:
@@ -374,13 +385,13 @@ def _check_decimation(document: Document) -> None:
         raise UnfitError("false without filter.decimate, as every sample has a result", "true", where="filter.hold")
     if table.decimate is None or table.is_fir:  # the table of combinations has the second
         return
-    found, where = literal(table.decimate), "filter.decimate"
+    given, where = literal(table.decimate), "filter.decimate"
     if table.order is None or table.cutoff is None:
-        raise UnfitError("left out unless the filter is given by order and cutoff", found, where=where, later=True)
+        raise UnfitError("left out unless the filter is given by order and cutoff", given, where=where, later=True)
     if table.kind != "lowpass":
-        raise UnfitError(f"left out for {table.kind}, whose pass band would alias", found, where=where)
+        raise UnfitError(f"left out for {table.kind}, whose pass band would alias", given, where=where)
     if table.method == "impulse_invariant":
-        raise UnfitError("left out with impulse_invariant", found, where=where, later=True)
+        raise UnfitError("left out with impulse_invariant", given, where=where, later=True)
     most = MAX_RATIO * document.sample_rate / table.cutoff[0]
     factor = 2 if table.decimate == AUTO else int(table.decimate)
     if factor > most:
@@ -389,7 +400,7 @@ def _check_decimation(document: Document) -> None:
             "lower sample rate"
             if most >= 2
             else f"left out, as the cutoff would be more than {MAX_RATIO} of the lower sample rate",
-            found,
+            given,
             where=where,
         )
     if document.converter:

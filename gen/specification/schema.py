@@ -17,7 +17,9 @@ from sosmith.gen.specification.choices import (
     ARCHITECTURES,
     AUTO,
     FAMILIES,
+    FAMILY_HINTS,
     FIR_FAMILIES,
+    KIND_HINTS,
     KINDS,
     MAX_DECIMATION,
     MAX_TAPS,
@@ -173,8 +175,8 @@ class CalibrationTable(Table):
 class FilterTable(Table):
     """``[filter]``: given by order and cutoff, by edges and losses, by sections, or by taps."""
 
-    family: Annotated[str | None, PlainValidator(choice((*FAMILIES, *FIR_FAMILIES)))] = None
-    kind: Annotated[str | None, PlainValidator(choice(KINDS))] = None
+    family: Annotated[str | None, PlainValidator(choice((*FAMILIES, *FIR_FAMILIES), FAMILY_HINTS))] = None
+    kind: Annotated[str | None, PlainValidator(choice(KINDS, KIND_HINTS))] = None
     method: Annotated[str | None, PlainValidator(choice(METHODS))] = None
     order: Annotated[int | None, PlainValidator(whole(1, MAX_ORDER))] = None
     cutoff: Edges = None
@@ -302,10 +304,10 @@ def _unfit(finding: ErrorDetails) -> UnfitError:
         return UnfitError(
             f"one of the keys {', '.join(keys)}", f"an unknown one{did_you_mean(path[-1], keys)}", where=where
         )
-    found = "missing" if finding["type"] == "missing" else literal(finding["input"])
+    given = "missing" if finding["type"] == "missing" else literal(finding["input"])
     # A table [input.NAME] is not a field of a model, so it has no description of its own.
     expected = keys[path[-1]].description if path[-1] in keys else "a table"
-    return UnfitError(str(expected), found, where=where)
+    return UnfitError(str(expected), given, where=where)
 
 
 def _table_at(path: tuple[str, ...]) -> type[Table]:

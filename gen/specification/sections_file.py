@@ -35,9 +35,9 @@ def sections_of(path: Path) -> tuple[tuple[tuple[Fraction, ...], ...], str]:
             "`sosmith import` makes a specification of it"
         )
     try:
-        found = settled(stated)
+        sections = settled(stated)
     except SpecificationError as error:
         raise SpecificationError(f"{path}: {error}") from None
-    if len(found.rows) > MAX_SECTIONS:
-        raise SpecificationError(f"{path}: sections must be at most {MAX_SECTIONS}, not {len(found.rows)}")
-    return found.rows, sentence(stated, found)
+    if len(sections.rows) > MAX_SECTIONS:
+        raise SpecificationError(f"{path}: sections must be at most {MAX_SECTIONS}, not {len(sections.rows)}")
+    return sections.rows, sentence(stated, sections)

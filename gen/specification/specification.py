@@ -68,7 +68,8 @@ class FilterSpec:
         Order of the prototype, 1 to 20; for bandpass and bandstop 1 to 10, as the filter has twice that order.
     cutoff, passband_edge, stopband_edge : tuple of Fraction or None
         In Hz, one for lowpass and highpass, two rising ones for bandpass and bandstop, all of them at least a
-        millionth of the sample rate away from 0 and from half the sample rate.
+        millionth of the sample rate away from 0 and from half the sample rate, behind a decimator of that of the
+        filter away from 0.
     passband_loss, stopband_loss : Fraction or None
         In dB, 1e-6 to 200, the first below the second. With `order` and `cutoff`, only those that the family
         needs.
@@ -213,7 +214,7 @@ def load(path: Path) -> Specification:
     ------
     SpecificationError
         For all errors, in a sentence each: the file, the path of the key or the line, what was expected and what
-        was found. Rules about several keys are checked once each key is right, and one of a subject is told.
+        was found. Rules about several keys are checked once each key is right, and one of a subject is reported.
     """
     return from_text(read_text(path, what="the specification", max_bytes=MAX_BYTES), path)
 

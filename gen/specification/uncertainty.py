@@ -83,9 +83,9 @@ def check_coefficients(table: CalibrationTable) -> None:
     count = sum(map(len, table.coefficients))
     rows = table.uncertainty.covariance
     if len(rows) != count or any(len(row) != count for row in rows):
-        found = f"{len(rows)} of {', '.join(sorted({str(len(row)) for row in rows}))}"
+        shape = f"{len(rows)} of {', '.join(sorted({str(len(row)) for row in rows}))}"
         raise UnfitError(
-            f"{count} rows of {count} numbers, one for each coefficient", found, where=f"{where}.covariance"
+            f"{count} rows of {count} numbers, one for each coefficient", shape, where=f"{where}.covariance"
         )
     for i in range(count):
         for j in range(i + 1):

@@ -7,12 +7,12 @@ numbers as `Fraction`. A value that does not fit raises `UnfitError`, from which
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from decimal import Decimal
 from fractions import Fraction
 from typing import TypeVar
 
-from sosmith.gen.specification.verilog_names import KEYWORDS, MAX_NAME, is_identifier
+from sosmith.gen.specification.verilog_names import KEYWORDS, MAX_NAME, OBEYED, is_identifier
 from sosmith.model.suggestion import did_you_mean
 
 Item = TypeVar("Item")
@@ -99,10 +99,10 @@ _WITH_UNIT = re.compile(rf"({_NUMBER})\s*([kKMGm]?)(?:[Hh]z|dB|V|mm|degC|sps|S/s
 
 def as_number(value: object) -> str:
     """Return how to write a text such as ``1 kHz`` as a number, for the end of a sentence; empty for other values."""
-    found = _WITH_UNIT.fullmatch(value.strip()) if isinstance(value, str) else None
-    if found is None:
+    match = _WITH_UNIT.fullmatch(value.strip()) if isinstance(value, str) else None
+    if match is None:
         return ""
-    exact = Fraction(found[1].replace(",", ".")) * _PREFIXES.get(found[2], 1)
+    exact = Fraction(match[1].replace(",", ".")) * _PREFIXES.get(match[2], 1)
     return f": write {repr(float(exact)).removesuffix('.0')}, without quotes and unit"
 
 
@@ -196,12 +196,15 @@ def file_name(value: object) -> str:
     return value
 
 
-def choice(names: Sequence[str]) -> Callable[[object], str]:
-    """Return the reader of one of `names`."""
+_NO_HINTS: Mapping[str, str] = {}
+
+
+def choice(names: Sequence[str], hints: Mapping[str, str] = _NO_HINTS) -> Callable[[object], str]:
+    """Return the reader of one of `names`; `hints` tells what to do instead of others, in small letters."""
 
     def read(value: object) -> str:
         if not isinstance(value, str) or value not in names:
-            hint = did_you_mean(value, names) if isinstance(value, str) else ""
+            hint = hints.get(value.lower()) or did_you_mean(value, names) if isinstance(value, str) else ""
             raise UnfitError(one_of(names), f"{literal(value)}{hint}")
         return value
 
@@ -224,11 +227,13 @@ def key_text(key: str) -> str:
 
 
 def identifier(value: object) -> str:
-    """Read a Verilog identifier that is not a keyword."""
+    """Read a Verilog identifier that is neither a keyword nor a word that tools obey."""
     if not isinstance(value, str) or not is_identifier(value):
         raise UnfitError(IDENTIFIER, literal(value))
     if value in KEYWORDS:
         raise UnfitError(f"{IDENTIFIER}, and no keyword of SystemVerilog", literal(value))
+    if OBEYED.fullmatch(value):
+        raise UnfitError(f"{IDENTIFIER}, and no word that tools obey in comments", literal(value))
     return value
 
 

@@ -33,6 +33,15 @@ _WORDS = """
 KEYWORDS = frozenset(_WORDS.split())
 """Reserved words of SystemVerilog (IEEE 1800-2017, Annex B), which include those of Verilog."""
 
+OBEYED = re.compile(
+    r"synopsys|synthesis|rtl_synthesis|ambit|cadence|exemplar|altera|xilinx|xlnx_\w*|quartus|vivado|pragma|protect"
+    r"|verilator|verilint|verilog_lint|lint_\w*|spyglass|leda|translate_\w*|synth_\w*|synthesis_\w*|full_case"
+    r"|parallel_case|one_hot|one_cold|infer_\w*|black_box|attribute|celldefine|surelint|svlint|slang|iverilog|yosys"
+    r"|coverage|formal|vcs|ncsim|metacomment|vhdl_\w*",
+    re.IGNORECASE,
+)
+"""Words that tools take for an order where a comment has them: the header has the name of the core."""
+
 _IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
@@ -46,8 +55,9 @@ def identifier_from(text: str) -> str:
 
     Examples
     --------
-    >>> identifier_from("8 kHz notch"), identifier_from("output")
-    ('filter_8_kHz_notch', 'filter_output')
+    >>> identifier_from("8 kHz notch"), identifier_from("output"), identifier_from("formal")
+    ('filter_8_kHz_notch', 'filter_output', 'filter_formal')
     """
     name = re.sub(r"[^A-Za-z0-9_]+", "_", text).strip("_")[: MAX_NAME - len("filter_")]
-    return name if is_identifier(name) and name not in KEYWORDS else f"filter_{name}".rstrip("_")
+    good = is_identifier(name) and name not in KEYWORDS and not OBEYED.fullmatch(name)
+    return name if good else f"filter_{name}".rstrip("_")

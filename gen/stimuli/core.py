@@ -36,12 +36,14 @@ def bench_before(spec: Specification, core: str | None = None) -> Bench:
         If the specification has no such core, or its filter cannot be designed.
     """
     kind = chosen_core(spec, core)
-    made, _ = response_of(spec, kind)
-    response = np.ones(1) if made.ideal is None else made.ideal.impulse_response
+    response, _ = response_of(spec, kind)
+    impulse_response = np.ones(1) if response.ideal is None else response.ideal.impulse_response
     return Bench(
         ports=inputs_of(spec, kind),
         output=spec.output,
         sample_rate=spec.sample_rate,
-        polynomial=made.polynomial,
-        impulse_response=response if made.pre_stage is None else made.pre_stage.decimator.before(response),
+        polynomial=response.polynomial,
+        impulse_response=impulse_response
+        if response.pre_stage is None
+        else response.pre_stage.decimator.before(impulse_response),
     )

@@ -201,7 +201,7 @@ def products_from_adders(
     """
     if blocks is None:
         return tuple(frozenset() for _ in graphs)
-    found: list[set[int]] = [set() for _ in graphs]
+    from_adders: list[set[int]] = [set() for _ in graphs]
     scaled: list[tuple[float, int, int, int]] = []
     needed = 0
     for k, graph in enumerate(graphs):
@@ -217,9 +217,9 @@ def products_from_adders(
     for _, k, index, taken in sorted(scaled):
         if needed <= blocks:
             break
-        found[k].add(index)
+        from_adders[k].add(index)
         needed -= taken
-    return tuple(map(frozenset, found))
+    return tuple(map(frozenset, from_adders))
 
 
 def _bits_of_products(graph: Graph, products: Iterable[int]) -> int:

@@ -9,7 +9,7 @@ from fractions import Fraction
 from sosmith.gen.filter.decimation import Decimation, choose, decimated
 from sosmith.gen.filter.design import Filter
 from sosmith.gen.specification.specification import FilterSpec
-from sosmith.gen.word_lengths.ahead import calibration_ahead
+from sosmith.gen.word_lengths.calibration import calibration_before_decimator
 from sosmith.gen.word_lengths.quantize import gain_of
 from sosmith.gen.word_lengths.quantized import CALIBRATION, DECIMATION, Quantized
 from sosmith.model.dataflow.datapath import Datapath
@@ -83,15 +83,17 @@ class PreStage:
         assert self.calibration is not None
         return self.calibration.datapath.output.lsb / self.output.lsb
 
-    def ahead(self, calibrated: tuple[tuple[int, int], ...]) -> Datapath | None:
+    def calibration_datapath(self, calibrated: tuple[tuple[int, int], ...]) -> Datapath | None:
         """Return the calibration before the decimator, with the codes that its measurements covered."""
         return None if self.calibration is None else replace(self.calibration.datapath, calibrated=calibrated)
 
     def before(self, datapath: Datapath, calibrated: tuple[tuple[int, int], ...]) -> Datapath:
         """Return the datapath of the filter with the decimator, and the calibration if there is one, before it."""
-        ahead = self.ahead(calibrated)
-        inputs, codes = ((self.decimator.input,), ()) if ahead is None else (ahead.inputs, ahead.calibrated)
-        return replace(datapath, inputs=inputs, calibrated=codes, decimator=self.decimator, ahead=ahead)
+        calibration = self.calibration_datapath(calibrated)
+        inputs, codes = (
+            ((self.decimator.input,), ()) if calibration is None else (calibration.inputs, calibration.calibrated)
+        )
+        return replace(datapath, inputs=inputs, calibrated=codes, decimator=self.decimator, calibration=calibration)
 
     def counted(self, quantized: Quantized) -> Quantized:
         """Return the proven filter with the parts of decimator and calibration in its budget."""
@@ -104,7 +106,7 @@ class PreStage:
             budget={CALIBRATION: self.input_error * self.gain, **budget},
             input_error=self.input_error,
             decimation=self.decimation,
-            ahead=self.calibration,
+            calibration=self.calibration,
         )
 
 
@@ -154,7 +156,7 @@ def pre_stage_of(
     def calibration(gain: Fraction) -> Quantized | None:
         if polynomial is None:
             return None
-        return calibration_ahead(name, inputs, polynomial, output, allowed * _CALIBRATION_SHARE / gain)
+        return calibration_before_decimator(name, inputs, polynomial, output, allowed * _CALIBRATION_SHARE / gain)
 
     guessed = calibration(Fraction(_GUESSED_GAIN))
     x = inputs[0] if guessed is None else guessed.datapath.output
@@ -162,14 +164,14 @@ def pre_stage_of(
     # may give a constant.
     low, high = (x.lowest, x.highest) if guessed is None else guessed.datapath.result_range
     amplitude = x.lsb * (high - low) / 2
-    found, reason = choose(spec, sample_rate, max_error / amplitude if amplitude else Fraction(1), x.bits)
-    if found is None:
+    decimation, reason = choose(spec, sample_rate, max_error / amplitude if amplitude else Fraction(1), x.bits)
+    if decimation is None:
         return None, reason
-    filter_ = decimated(spec, found)
+    filter_ = decimated(spec, decimation)
     gain = gain_of(filter_)
     before = calibration(gain)
     x = inputs[0] if before is None else before.datapath.output
-    decimator = _rounded(x, found, coarsest=gain * x.lsb / output.lsb / 2, allowed=allowed)
+    decimator = _rounded(x, decimation, coarsest=gain * x.lsb / output.lsb / 2, allowed=allowed)
     rounding = gain * decimator.rounding / output.lsb
     if rounding > allowed * _LARGEST_SHARE:
         raise ShortfallError(
@@ -177,7 +179,7 @@ def pre_stage_of(
             f"output LSB with {decimator.output.bits} bits: raise output.max_error or output.bits"
         )
     pre_stage = PreStage(
-        decimation=found,
+        decimation=decimation,
         decimator=decimator,
         filter=filter_,
         output=output,
@@ -189,7 +191,7 @@ def pre_stage_of(
     return pre_stage, reason
 
 
-def _rounded(x: Port, found: Decimation, *, coarsest: Fraction, allowed: Fraction) -> Decimator:
+def _rounded(x: Port, decimation: Decimation, *, coarsest: Fraction, allowed: Fraction) -> Decimator:
     """Return the decimator of `x` with a rounding that takes a small share of the error allowed, in output LSBs.
 
     A rounding to the steps of `x` would take `coarsest`; that is halved with each bit that it keeps.
@@ -199,12 +201,12 @@ def _rounded(x: Port, found: Decimation, *, coarsest: Fraction, allowed: Fractio
     ShortfallError
         If its registers would be too wide.
     """
-    width = x.bits + found.stages * (found.factor.bit_length() - 1)
+    width = x.bits + decimation.stages * (decimation.factor.bit_length() - 1)
     if width > MAX_WIDTH:
         raise ShortfallError(
             f"the registers of the decimator must have at most {MAX_WIDTH} bits, not {width}: lower filter.decimate"
         )
-    whole = Decimator(input=x, factor=found.factor, stages=found.stages, dropped=0)
+    whole = Decimator(input=x, factor=decimation.factor, stages=decimation.stages, dropped=0)
     kept = (math.ceil(coarsest / (allowed * _SHARE)) - 1).bit_length()
     kept = min(kept, whole.growth, _MAX_BITS - x.bits)
     return replace(whole, dropped=whole.growth - kept)

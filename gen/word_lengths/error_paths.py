@@ -38,11 +38,11 @@ def error_paths(quantized: Quantized) -> list[tuple[int, LinearModel, Source, Ar
     impulse = np.zeros(length)
     impulse[0] = 1.0
     after = [impulse]  # from each output of a section to the end
-    found: list[list[tuple[int, LinearModel, Source, Array]]] = []
+    by_section: list[list[tuple[int, LinearModel, Source, Array]]] = []
     stages = [linear_models(section.graph) for section in quantized.sections]
     for number, stage in reversed(list(enumerate(stages))):
         over = [_filtered((Fraction(1),), m.denominator, wire) for m, wire in zip(stage, after, strict=True)]
-        found.append(
+        by_section.append(
             [
                 (number, model, source, _filtered(source.numerators[model.output], (Fraction(1),), response))
                 for model, response in zip(stage, over, strict=True)
@@ -53,7 +53,7 @@ def error_paths(quantized: Quantized) -> list[tuple[int, LinearModel, Source, Ar
         for model, response in zip(stage, over, strict=True):
             for k, transfer in zip(model.entries, model.transfers, strict=True):
                 after[k] += _filtered(transfer, (Fraction(1),), response)
-    return [path for paths in reversed(found) for path in paths]
+    return [path for paths in reversed(by_section) for path in paths]
 
 
 def _filtered(numerator: Sequence[Fraction], denominator: Sequence[Fraction], values: Array) -> Array:

@@ -37,13 +37,13 @@ class Start:
 
     Attributes
     ----------
-    held : FirstSample or None
+    first_sample : FirstSample or None
         What is added behind the sections; None if that is 0.
     error : Fraction
         Bound on the error of what is added, in output LSBs; exact.
     """
 
-    held: FirstSample | None
+    first_sample: FirstSample | None
     error: Fraction
 
 
@@ -87,18 +87,23 @@ def starting(stage: InputStage, gain: Fraction, allowed: Fraction) -> InputStage
     return _with_start(stage, gain, *lowest_terms(round(gain * 2**frac), frac))
 
 
-def starting_like(stage: InputStage, gain: Fraction, held: FirstSample | None) -> InputStage:
-    """Return an input stage with which another filter starts in hardware that adds what is `held`.
+def starting_like(stage: InputStage, gain: Fraction, first_sample: FirstSample | None) -> InputStage:
+    """Return an input stage with which another filter starts in hardware that adds `first_sample`.
 
     Raises
     ------
     ShortfallError
         If the hardware has no multiplier for the gain that the filter needs.
     """
-    frac = 0 if held is None else held.gain_frac
+    frac = 0 if first_sample is None else first_sample.gain_frac
     integer = round(gain * 2**frac)
-    if (held is None) != (integer == 0) or (held is not None and held.is_plain and integer != held.gain):
-        have = 0 if held is None else held.gain * Fraction(2) ** -frac
+    # Hardware that adds no first sample has a gain of 0 for ever, and without a multiplier a gain of 1.
+    if first_sample is None:
+        fits = integer == 0
+    else:
+        fits = integer != 0 and (integer == first_sample.gain or not first_sample.is_plain)
+    if not fits:
+        have = 0 if first_sample is None else first_sample.gain * Fraction(2) ** -frac
         raise ShortfallError(
             f"the gain at zero frequency must be {have}, as the hardware has it, not {float(gain):.6g}"
         )
@@ -106,13 +111,13 @@ def starting_like(stage: InputStage, gain: Fraction, held: FirstSample | None) -
 
 
 def _with_start(stage: InputStage, gain: Fraction, integer: int, frac: int) -> InputStage:
-    held = FirstSample(range=stage.output, gain=integer, gain_frac=frac) if integer else None
-    start = StartStage(x=stage.output, passes=held is not None)
+    first_sample = FirstSample(range=stage.output, gain=integer, gain_frac=frac) if integer else None
+    start = StartStage(x=stage.output, passes=first_sample is not None)
     return replace(
         stage,
         stages=(*stage.stages, start),
         output=start.graph.output_ranges[0],
-        start=Start(held=held, error=abs(integer * Fraction(2) ** -frac - gain) * _size(stage.output)),
+        start=Start(first_sample=first_sample, error=abs(integer * Fraction(2) ** -frac - gain) * _size(stage.output)),
     )
 
 
@@ -182,15 +187,15 @@ def input_stages(
         return (InputStage(stages=(), output=output_range, error=Fraction(0)),)
     coefficients = normalised(polynomial or _IDENTITY, inputs, output)
     variables = tuple(Variable(name=p.name, bits=p.bits, signed=p.signed) for p in inputs)
-    made: list[InputStage] = []
+    finest_first: list[InputStage] = []
     for frac in range(MAX_BITS + 1):
         integers = tuple(tuple(round(c * 2**frac) for c in row) for row in coefficients)
         horner = HornerPolynomial(coefficients=integers, frac=frac, variables=variables)
         error = horner_error(coefficients, horner)
         stages = horner.stages
-        made.insert(0, InputStage(stages=stages, output=stages[-1].graph.output_ranges[0], error=error))
+        finest_first.insert(0, InputStage(stages=stages, output=stages[-1].graph.output_ranges[0], error=error))
         if error <= allowed:
-            return tuple(made[:_COARSER])
+            return tuple(finest_first[:_COARSER])
     raise ShortfallError(
         f"the calibration must keep its error below {float(allowed):.3g} output LSB with {MAX_BITS} fraction bits, "
         f"not {float(error):.3g}: raise output.max_error or output.bits"
@@ -201,7 +206,7 @@ def horner_error(exact: tuple[tuple[Fraction, ...], ...], horner: HornerPolynomi
     """Bound on the polynomial's error over all input codes, exact; |u| and |t| are at most one."""
     half = Fraction(1, 2 ** (horner.frac + 1))
     rows = []
-    for wanted, made in zip(exact, horner.coefficients, strict=True):
-        errors = [abs(w - m * Fraction(1, 2**horner.frac)) for w, m in zip(wanted, made, strict=True)]
+    for wanted, rounded in zip(exact, horner.coefficients, strict=True):
+        errors = [abs(w - m * Fraction(1, 2**horner.frac)) for w, m in zip(wanted, rounded, strict=True)]
         rows.append(sum(errors) + half * (len(errors) - 1))
     return Fraction(sum(rows) + half * (len(rows) - 1))

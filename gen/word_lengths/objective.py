@@ -69,7 +69,7 @@ class Objective(Protocol):
             If the stages cannot suit with any.
         """
 
-    def told(self, datapath: Datapath) -> str:
+    def size_text(self, datapath: Datapath) -> str:
         """Return the size of a design in words."""
 
 
@@ -100,7 +100,7 @@ class SmallArea:
         """
         return LUTS_OF_A_BLOCK * sum(node.op is Op.SCALE for graph in graphs for node in graph.nodes)
 
-    def told(self, datapath: Datapath) -> str:
+    def size_text(self, datapath: Datapath) -> str:
         """Return the area in words."""
         return f"{cost_of(datapath).area:,} LUT4 with a multiplier block counted as {LUTS_OF_A_BLOCK}"
 
@@ -132,7 +132,7 @@ class FewAdders:
         """Return 0: every constant may turn out to be a power of two."""
         return 0
 
-    def told(self, datapath: Datapath) -> str:
+    def size_text(self, datapath: Datapath) -> str:
         """Return the area in words."""
         return f"{self.of_datapath(datapath):,} LUT4 with products by constants made of adders"
 
@@ -188,11 +188,11 @@ class ShortProgram:
         Infinite if it cannot be folded.
         """
         try:
-            made = program(datapath, self.digit_bits)
+            folded = program(datapath, self.digit_bits)
         except FoldingError:
             return math.inf
-        clocks = made.serial_cycles if self.bit_serial else len(made.instructions)
-        return float(clocks + made.words * _WORDS + made.accumulator_bits * _ACCUMULATOR_BITS)
+        clocks = folded.serial_cycles if self.bit_serial else len(folded.instructions)
+        return float(clocks + folded.words * _WORDS + folded.accumulator_bits * _ACCUMULATOR_BITS)
 
     def least(self, graphs: Sequence[Graph]) -> float:
         """Count the products of values with one digit each.
@@ -208,11 +208,13 @@ class ShortProgram:
             raise ShortfallError(unsuitable(self.architecture, error)) from None
         return sum(len(column.products) for column in columns)
 
-    def told(self, datapath: Datapath) -> str:
+    def size_text(self, datapath: Datapath) -> str:
         """Return the length of the program, its memory and its accumulator in words."""
-        made = program(datapath, self.digit_bits)
-        length = f"at most {made.serial_cycles:,}" if self.bit_serial else f"{len(made.instructions):,} instructions"
-        return f"{length}, {made.words:,} words of memory, an accumulator of {made.accumulator_bits} bits"
+        folded = program(datapath, self.digit_bits)
+        length = (
+            f"at most {folded.serial_cycles:,}" if self.bit_serial else f"{len(folded.instructions):,} instructions"
+        )
+        return f"{length}, {folded.words:,} words of memory, an accumulator of {folded.accumulator_bits} bits"
 
     def _clocks(self, column: Column) -> int:
         """Clocks of a column's instructions; one without products still takes one, which ends it."""

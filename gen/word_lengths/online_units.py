@@ -40,6 +40,7 @@ class OnlineUnits:
     unsuited = "no direct form"
     hopeless = 2.5  # as for the parallel architecture
     few_digits = False
+    factor_bits = None
 
     def of_graph(self, graph: Graph) -> float:
         """Estimate the area of one stage, with as many units as the digits of its results take, times its interval."""
@@ -74,7 +75,7 @@ class OnlineUnits:
                 raise ShortfallError(unsuitable_online(error)) from None
         return 0
 
-    def told(self, datapath: Datapath) -> str:
+    def size_text(self, datapath: Datapath) -> str:
         """Return the product of area and clocks in words, and what it is made of."""
         schedule, luts = online_schedule(datapath, 0), online_cost(datapath).luts
         return (

@@ -170,12 +170,12 @@ _Placed = tuple[int, int]
 
 def _length(sections: Sequence[NoisySection]) -> int:
     """Length of the spectra: eight times that of the responses, which resolves resonance peaks to 0.1 %."""
-    found = 0
+    longest = 0
     for section in sections:
         step = power_of(section.denominator)
         poles = [*section.denominator[::step], 0.0, 0.0][:3]
-        found = max(found, step * estimated_length(np.array([[1.0, 0.0, 0.0, *poles]])))
-    return 1 << (8 * found - 1).bit_length()
+        longest = max(longest, step * estimated_length(np.array([[1.0, 0.0, 0.0, *poles]])))
+    return 1 << (8 * longest - 1).bit_length()
 
 
 def _feasible(sections: Sequence[NoisySection], *, pairing: bool) -> bool:

@@ -20,9 +20,9 @@ def with_realization(quantized: Quantized, realization: str) -> Quantized:
     formats = chosen_formats(quantized.sections)
     sections, proof = cascade(ideal, realization, formats, x, steady=quantized.steady)
     (y,) = sections[-1].graph.output_ranges
-    last, error = output_stage(y, quantized.datapath.output, quantized.held)
+    last, error = output_stage(y, quantized.datapath.output, quantized.first_sample)
     *stages, _ = quantized.datapath.stages
-    passing = beside(sections, quantized.held)
+    passing = beside(sections, quantized.first_sample)
     return replace(
         quantized,
         datapath=replace(quantized.datapath, stages=(*stages[: -len(sections)], *passing, last)),

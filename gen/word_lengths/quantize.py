@@ -63,7 +63,7 @@ class Plan:
         Formats that keep to `share`; None if the estimates found none.
     objective : Objective
         The size that formats are trimmed for.
-    made : Quantized or None
+    quantized : Quantized or None
         The proven design, for a realization without estimates.
     """
 
@@ -81,7 +81,7 @@ class Plan:
     search: Search | None
     start: Choice | None
     objective: Objective = SMALL_AREA
-    made: Quantized | None = None
+    quantized: Quantized | None = None
 
     @property
     def allowed(self) -> Fraction:
@@ -91,27 +91,27 @@ class Plan:
     @cached_property
     def size(self) -> float:
         """Estimated size, infinite where there is no estimate."""
-        if self.made is not None:
-            return self.objective.of_datapath(self.made.datapath)
+        if self.quantized is not None:
+            return self.objective.of_datapath(self.quantized.datapath)
         if self.search is None or self.start is None:
             return math.inf
         before = self.input_stages[self.start.input_stage].start
-        held = None if before is None else before.held
-        last, _ = output_stage(self.search.output(self.start), self.output, held)
+        first_sample = None if before is None else before.first_sample
+        last, _ = output_stage(self.search.output(self.start), self.output, first_sample)
         return self.search.size(self.start) + self.objective.of_graph(last.graph)
 
     @property
     def is_long(self) -> bool:
         """Whether sections look ahead with so long responses and so many coefficients that trimming takes minutes."""
-        ahead = self.realization not in REALIZATIONS
-        return ahead and self.search is not None and self.search.work > _MOST_WORK
+        looks_ahead = self.realization not in REALIZATIONS
+        return looks_ahead and self.search is not None and self.search.work > _MOST_WORK
 
     def under(self, objective: Objective) -> Plan:
         """Return the same plan, to be trimmed for another objective."""
         search = None if self.search is None else self.search.under(objective)
         other = replace(self, search=search, objective=objective)
         by_taps = self.ideal is not None and self.ideal.is_fir
-        return replace(other, made=_by_taps(other)) if by_taps and objective != self.objective else other
+        return replace(other, quantized=_by_taps(other)) if by_taps and objective != self.objective else other
 
     def trimmed(self) -> Plan:
         """Return a copy with formats trimmed until no step saves any more."""
@@ -186,7 +186,7 @@ def plan(
     )
     if ideal is None or search is not None:
         return planned
-    return replace(planned, made=_by_taps(planned) if ideal.is_fir else _equally_shared(planned, ideal))
+    return replace(planned, quantized=_by_taps(planned) if ideal.is_fir else _equally_shared(planned, ideal))
 
 
 def quantize(
@@ -226,8 +226,8 @@ def prove(planned: Plan) -> Quantized:
     ShortfallError
         If no formats within the limits keep to the error allowed.
     """
-    if planned.made is not None:
-        return planned.made
+    if planned.quantized is not None:
+        return planned.quantized
     ideal, search, start = planned.ideal, planned.search, planned.start
     if ideal is None:
         return _assembled(planned, planned.input_stages[0], (), None)
@@ -240,12 +240,12 @@ def prove(planned: Plan) -> Quantized:
             before = planned.input_stages[choice.input_stage]
             try:
                 stages = cascade(ideal, planned.realization, choice.formats, before.output, steady=planned.steady)
-                made = _assembled(planned, before, *stages)
+                quantized = _assembled(planned, before, *stages)
             except ShortfallError:
                 break
-            excess = made.bound * planned.output.lsb - planned.max_error
+            excess = quantized.bound * planned.output.lsb - planned.max_error
             if excess <= 0:
-                return made
+                return quantized
             if planned.is_long:
                 break
             tried = choice

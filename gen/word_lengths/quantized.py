@@ -63,7 +63,7 @@ class Quantized:
         The proof of the sections; None without a filter.
     decimation : Decimation or None
         How samples are decimated before the filter; None if all go in.
-    ahead : Quantized or None
+    calibration : Quantized or None
         The calibration before the decimator; None without one.
     """
 
@@ -75,7 +75,7 @@ class Quantized:
     input_error: Fraction
     proof: CascadeProof | None
     decimation: Decimation | None = None
-    ahead: Quantized | None = None
+    calibration: Quantized | None = None
 
     @property
     def bound(self) -> Fraction:
@@ -94,7 +94,7 @@ class Quantized:
         return any(isinstance(stage, StartStage) for stage in self.datapath.stages)
 
     @property
-    def held(self) -> FirstSample | None:
+    def first_sample(self) -> FirstSample | None:
         """The first sample as the last stage adds it; None if it does not."""
         return cast("OutputStage", self.datapath.stages[-1]).held
 
@@ -156,11 +156,13 @@ def assembled(
         budget[CALIBRATION if polynomial is not None else "input scaling"] = input_stage.error * gain
     if proof is not None:
         budget |= filter_budget(proof)
-    held = None
+    first_sample = None
     if input_stage.start is not None:
-        held, budget[START] = input_stage.start.held, input_stage.start.error
-    stages = (*input_stage.stages, *beside(sections, held))
-    last, error = output_stage(stages[-1].graph.output_ranges[0] if stages else input_stage.output, output, held)
+        first_sample, budget[START] = input_stage.start.first_sample, input_stage.start.error
+    stages = (*input_stage.stages, *beside(sections, first_sample))
+    last, error = output_stage(
+        stages[-1].graph.output_ranges[0] if stages else input_stage.output, output, first_sample
+    )
     budget["output rounding"] = error
     return Quantized(
         datapath=Datapath(name=name, inputs=inputs, output=output, stages=(*stages, last)),
@@ -173,9 +175,13 @@ def assembled(
     )
 
 
-def beside(sections: Sequence[Section], held: FirstSample | None) -> Sequence[Stage]:
-    """Return the sections, with what is `held` passing beside them."""
-    return sections if held is None else [PassingStage(section=section, held=held.range) for section in sections]
+def beside(sections: Sequence[Section], first_sample: FirstSample | None) -> Sequence[Stage]:
+    """Return the sections, with the first sample passing beside them, if there is one."""
+    return (
+        sections
+        if first_sample is None
+        else [PassingStage(section=section, held=first_sample.range) for section in sections]
+    )
 
 
 def filter_budget(proof: CascadeProof) -> dict[str, Fraction]:

@@ -135,9 +135,9 @@ class Selection:
             except ShortfallError as error:
                 failures[name] = str(error)
                 continue
-            found = self._objective.of_datapath(quantized.datapath)
-            if best is None or found < best[0]:
-                best = found, quantized
+            size = self._objective.of_datapath(quantized.datapath)
+            if best is None or size < best[0]:
+                best = size, quantized
         return best
 
     def _reason(self, quantized: Quantized, failures: set[str], unsuited: set[str], dropped: list[str]) -> str:
@@ -145,7 +145,7 @@ class Selection:
         left = sorted((n for n in self._plans if n not in {quantized.realization, *short}), key=self._size)
         count = 1 + len(left) + len(dropped)
         why = f"{self._objective.best} of {count}" if count > 1 else "the only one proven"
-        reason = f"{quantized.realization}: {why}, {self._objective.told(quantized.datapath)}"
+        reason = f"{quantized.realization}: {why}, {self._objective.size_text(quantized.datapath)}"
         others = [
             ", ".join(f"{name} {round(self._known_size(name)):,}" for name in left),
             f"{self._objective.beyond}: {', '.join(name for name in self._realizations if name in dropped)}"

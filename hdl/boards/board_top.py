@@ -40,6 +40,7 @@ from sosmith.hdl.bus.link import LEDS, Link
 from sosmith.hdl.converters.front_end import FrontEnd
 from sosmith.hdl.converters.pins import converter_pins
 from sosmith.model.converters.schedule import Schedule
+from sosmith.model.link.packing import Packing
 
 
 class BoardTop(wiring.Component):
@@ -57,14 +58,18 @@ class BoardTop(wiring.Component):
         Channels of the core, 1 to 256.
     schedule : Schedule or None
         When the front-end reads which converter; None for a core that is fed over the link.
+    packing : Packing or None
+        The form of packed results; None for a link without them.
+    waits : bool
+        Whether `rst` is high until the clock has its frequency, and nothing may come over the line before.
 
     Members
     -------
     clk : In(1)
         Clock, rising edge.
     rst : In(1)
-        Reset of the core, synchronous, active high. It may be tied to 0: registers have initial values, and the first
-        request resets the core, or the front-end does at the beginning.
+        Reset of the core, and with `waits` of the link, synchronous, active high. It may be tied to 0: registers have
+        initial values, and the first request resets the core, or the front-end does at the beginning.
     rx : In(1)
         Line from the host, 8N1; asynchronous.
     tx : Out(1)
@@ -84,14 +89,17 @@ class BoardTop(wiring.Component):
         ratio: Fraction,
         channels: int = 1,
         schedule: Schedule | None = None,
+        packing: Packing | None = None,
+        waits: bool = False,
     ) -> None:
-        self.core, self.memory, self.ratio, self.schedule = core, memory, ratio, schedule
+        self.core, self.memory, self.ratio, self.schedule, self.waits = core, memory, ratio, schedule, waits
         self.face = Face(
             sample_bytes=len(core.s_axis_tdata) // 8,
             result_bytes=len(core.m_axis_tdata) // 8,
             channels=channels,
             address_bits=len(core.s_axil_awaddr) if hasattr(core, "s_axil_awaddr") else 0,
             readings=0 if schedule is None else channels * len(schedule.readings),
+            packing=packing,
         )
         members: dict[str, In | Out] = {"clk": In(1), "rst": In(1), "rx": In(1), "tx": Out(1), "leds": Out(LEDS)}
         if schedule is not None:
@@ -102,7 +110,7 @@ class BoardTop(wiring.Component):
         """Connect the link and the core."""
         m = Module()
         m.submodules.core = core = self.core
-        m.submodules.link = link = Link(self.face, self.memory, ratio=self.ratio)
+        m.submodules.link = link = Link(self.face, self.memory, ratio=self.ratio, waits=self.waits)
         m.d.comb += [
             link.clk.eq(self.clk),
             link.rst.eq(self.rst),

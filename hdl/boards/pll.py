@@ -56,8 +56,8 @@ class Pll:
 
     def instance(self, pin: Value, clock: Signal, locked: Signal) -> Instance:
         """Return the cell, with the clock pin, the clock that it makes, and whether that has its frequency."""
-        made = {"ecp5": self._ecp5, "ice40": self._ice40, "gowin": self._gowin}
-        return made[self.family](pin, clock, locked)
+        cells = {"ecp5": self._ecp5, "ice40": self._ice40, "gowin": self._gowin}
+        return cells[self.family](pin, clock, locked)
 
     def _ecp5(self, pin: Value, clock: Signal, locked: Signal) -> Instance:
         # The first output has the divider of the feedback, the second one that of the output.
@@ -170,22 +170,22 @@ def pll_near(family: str, device: str, reference: int, wanted: Fraction) -> Pll:
         In Hz.
     """
     search = {"ecp5": _near_ecp5, "ice40": _near_ice40, "gowin": _near_gowin}
-    made = [
+    candidates = [
         Pll(family=family, device=device, reference=reference, divider=i, feedback=f, output=o, scale=s)
         for i, f, o, s in search[family](reference, wanted)
     ]
-    return min(made, key=lambda pll: (abs(pll.clock - wanted), pll.divider, pll.feedback))
+    return min(candidates, key=lambda pll: (abs(pll.clock - wanted), pll.divider, pll.feedback))
 
 
 def _near_ecp5(reference: int, wanted: Fraction) -> list[tuple[int, int, int, int]]:
-    found = []
+    settings = []
     for divider in range(1, int(reference / (10 * MHZ)) + 1):
         for feedback in range(1, 81):
             vco = Fraction(reference * feedback, divider)
             output = round(vco / wanted)
             if 400 * MHZ <= vco <= 800 * MHZ and 1 <= output <= 128:
-                found.append((divider, feedback, output, 1))
-    return found
+                settings.append((divider, feedback, output, 1))
+    return settings
 
 
 def _near_ice40(reference: int, wanted: Fraction) -> list[tuple[int, int, int, int]]:
@@ -198,12 +198,12 @@ def _near_ice40(reference: int, wanted: Fraction) -> list[tuple[int, int, int, i
 
 
 def _near_gowin(reference: int, wanted: Fraction) -> list[tuple[int, int, int, int]]:
-    found = []
+    settings = []
     for divider in range(1, int(reference / (3 * MHZ)) + 1):
         for feedback in range(1, 65):
             fast = Fraction(reference * feedback, divider)
             output = 2 * round(fast / wanted / 2)
             scales = [s for s in (2, 4, 8, 16) if 500 * MHZ <= fast * s <= 1200 * MHZ]
             if 2 <= output <= 128 and scales and fast <= 500 * MHZ:
-                found.append((divider, feedback, output, scales[0]))
-    return found
+                settings.append((divider, feedback, output, scales[0]))
+    return settings

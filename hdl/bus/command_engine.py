@@ -27,7 +27,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from amaranth.hdl import Cat, Module, Mux, Signal, Value
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.memory import Memory, ReadPort
 from amaranth.lib.wiring import In, Out
@@ -37,6 +37,7 @@ from sosmith.hdl.bus.checked_bytes import CheckedBytes
 from sosmith.hdl.bus.frame_receiver import BLOCK_RAM, LENGTH_ADDRESS
 from sosmith.model.converters.spi_converter import ReadingFault
 from sosmith.model.dataflow.status import STATUS_BITS
+from sosmith.model.link.packing import Packing
 from sosmith.model.link.protocol import (
     BLOCK_BYTES,
     CRC_BYTES,
@@ -80,6 +81,8 @@ class Face:
         Address lines of ``s_axil_*``; 0 without registers.
     readings : int
         Inputs of all channels that a front-end reads from converters; 0 for a core that is fed over the link.
+    packing : Packing or None
+        The form of packed results; None for a link without them.
     """
 
     sample_bytes: int
@@ -87,6 +90,7 @@ class Face:
     channels: int = 1
     address_bits: int = 0
     readings: int = 0
+    packing: Packing | None = None
 
     def __post_init__(self) -> None:
         if not 1 <= self.channels <= MAX_CHANNELS:
@@ -110,6 +114,13 @@ class Face:
     def polled(self) -> int:
         """How many results fit the answer to a ``POLL``, behind their channel."""
         return (MAX_BODY - 2) // self.response_bytes
+
+    @property
+    def types(self) -> int:
+        """The highest type of a request."""
+        if self.packing is not None:
+            return Type.POLL_PACKED if self.readings else Type.SAMPLES_PACKED
+        return Type.CONVERTERS if self.readings else Type.COUNTERS
 
     @property
     def word_bytes(self) -> int:
@@ -160,7 +171,7 @@ class CommandEngine(wiring.Component):
     """Carries out requests and writes responses, by the rules of docs/protocol.md.
 
     Throughput: 9 clocks for each byte of a request, for its CRC, and 9 for each of its response; for each sample,
-    besides, two for each of its bytes and the core's latency.
+    besides, two for each of its bytes and the core's latency. Of a packed result, each bit takes a clock besides.
 
     Parameters
     ----------
@@ -237,6 +248,8 @@ class CommandEngine(wiring.Component):
             if not self.face.readings:
                 machine.feed()
             machine.give()
+            if self.face.packing is not None:
+                machine.pack(self.face.packing)
             if self.face.address_bits:
                 machine.access()
             machine.end_of_response()
@@ -257,14 +270,16 @@ class _Machine:
         self.crc_start = Signal(8)  # where the CRC of the message begins
         self.count = Signal(range(max(BLOCK_BYTES, engine.face.readings)))
         self.word = Signal(8 * engine.face.word_bytes, reset_less=True)
-        known = Type.CONVERTERS if engine.face.readings else Type.COUNTERS
-        self.kind = Signal(range(known + 1))
+        self.kind = Signal(range(engine.face.types + 1))
         self.unknown = Signal()
         self.status = Signal(3)
         self.expected = Signal(8)
         self.retained = Signal(2)  # the next number; responses that can be sent again
         self.gap = Signal()  # a result was given up since the channel of the first one was told
         self.target = Signal(8)  # channel, address of a register, or block of the identity
+        # Of packed results, the bits of the byte that is being filled, and their number.
+        self.byte = Signal(8, reset_less=True)
+        self.bits = Signal(3)
         m.d.sync += self.address.eq(self.ahead)
         m.d.comb += [
             self.ahead.eq(self.address),
@@ -400,7 +415,7 @@ class _Machine:
                 for type_, (fits, state) in self._requests().items():
                     with m.Case(type_):
                         m.next = state
-                        if type_ is Type.SAMPLES and self.face.channels < MAX_CHANNELS:
+                        if type_ in {Type.SAMPLES, Type.SAMPLES_PACKED} and self.face.channels < MAX_CHANNELS:
                             with m.If(engine.i_data >= self.face.channels):
                                 self.answer(Status.CHANNEL)
                         with m.If(~fits):
@@ -409,20 +424,29 @@ class _Machine:
     def _requests(self) -> dict[Type, tuple[Value, str]]:
         """For each request that is known, whether its length is right, and its first state."""
         none, one = self.crc_start == HEAD_BYTES, self.crc_start == HEAD_BYTES + 1
-        few: Value = ~none
-        longest = HEAD_BYTES + 1 + self.face.samples * self.face.sample_bytes
-        if longest < HEAD_BYTES + MAX_BODY:
-            few = few & (self.crc_start <= longest)
-        fed = {Type.POLL: (none, "poll"), Type.CONVERTERS: (none, "reading")}
-        known = {
-            Type.OPEN: (none, "version"),
-            Type.IDENTITY: (one, "fetch"),
-            **(fed if self.face.readings else {Type.SAMPLES: (few, "load")}),
-            Type.COUNTERS: (none, "counters"),
-        }
+        known: dict[Type, tuple[Value, str]] = {Type.OPEN: (none, "version"), Type.IDENTITY: (one, "fetch")}
+        if self.face.readings:
+            known |= {Type.POLL: (none, "poll"), Type.CONVERTERS: (none, "reading")}
+        else:
+            known[Type.SAMPLES] = self._few(self.face.samples), "load"
+        known[Type.COUNTERS] = none, "counters"
+        if self.face.packing is not None and self.face.readings:
+            known[Type.POLL_PACKED] = none, "poll"
+        elif self.face.packing is not None:
+            known[Type.SAMPLES_PACKED] = self._few(self.face.packing.per_message(self.face.sample_bytes)), "load"
         if self.face.address_bits:
             known |= {Type.READ: (one, "read address"), Type.WRITE: (~none, "load")}
         return known
+
+    def _few(self, samples: int) -> Value:
+        """Whether the body has a channel, and no more samples than these."""
+        longest = HEAD_BYTES + 1 + samples * self.face.sample_bytes
+        there = self.crc_start != HEAD_BYTES
+        return there & (self.crc_start <= longest) if longest < HEAD_BYTES + MAX_BODY else there
+
+    def _packs(self) -> Value:
+        """Whether the request wants packed results."""
+        return (self.kind == Type.SAMPLES_PACKED) | (self.kind == Type.POLL_PACKED)
 
     def tell(self) -> None:
         """Answer what concerns the link itself."""
@@ -469,18 +493,21 @@ class _Machine:
     def poll(self) -> None:
         """Fetch the oldest results of a front-end, or the faults of its readings."""
         m, engine = self.m, self.engine
-        fetched = Signal(range(self.face.polled + 1))
+        packing, most = self.face.packing, self.face.polled
+        packed = most if packing is None else packing.per_message()
+        limit: Value | int = most if packing is None else Mux(self._packs(), packed, most)
+        fetched = Signal(range(max(packed, most) + 1))
         with m.State("poll"):
             self.put(engine.o_channel)
             m.d.sync += [fetched.eq(0), self.gap.eq(0)]
             m.next = "more"
         with m.State("more"), m.If(engine.o_settled):
-            with m.If(~engine.o_there | self.gap | (fetched == self.face.polled)):
+            with m.If(~engine.o_there | self.gap | (fetched == limit)):
                 self.answer(Status.OK)
             with m.Else():
                 m.d.comb += engine.i_take.eq(1)
-                m.d.sync += [self.word.eq(engine.o_result), fetched.eq(fetched + 1)]
-                m.next = "give"
+                m.d.sync += fetched.eq(fetched + 1)
+                self.took(engine.o_result)
         with m.State("reading"):  # its faults are there at the next clock
             m.next = "faults"
         with m.State("faults"):
@@ -499,10 +526,36 @@ class _Machine:
         with m.State("result"):
             m.d.comb += engine.m_axis_tready.eq(1)
             with m.If(engine.m_axis_tvalid):
-                m.d.sync += self.word.eq(Cat(engine.m_axis_tdata, engine.m_axis_tuser))
+                self.took(Cat(engine.m_axis_tdata, engine.m_axis_tuser))
                 if self.face.channels > 1:
                     m.d.sync += self.target.eq(Mux(self.target == self.face.channels - 1, 0, self.target + 1))
-                m.next = "give"
+
+    def took(self, result: Value) -> None:
+        """Take a result with its status, to append it to the response."""
+        m, packing = self.m, self.face.packing
+        m.d.sync += self.word.eq(result)
+        m.next = "give"
+        if packing is not None:
+            status = result[8 * self.face.result_bytes :]
+            with m.If(self._packs()):
+                m.d.sync += self.word.eq(Cat(result[: packing.port.bits], *(status[flag] for flag in packing.flags)))
+                m.next = "pack"
+
+    def pack(self, packing: Packing) -> None:
+        """Append the bits of a result to the byte that is being filled, one a clock."""
+        m = self.m
+        with m.State("pack"):
+            self.fill(self.word[0])
+            m.d.sync += self.word.eq(self.word[1:])
+            with m.If(self.counted(packing.bits - 1)):
+                m.next = "more" if self.face.readings else "load"
+
+    def fill(self, bit: Value | int) -> None:
+        """Append a bit."""
+        byte = Cat(self.byte[1:], bit)
+        self.m.d.sync += [self.byte.eq(byte), self.bits.eq(self.bits + 1)]
+        with self.m.If(self.bits.all()):
+            self.put(byte)
 
     def give(self) -> None:
         """Append a result, or the word of a register."""
@@ -552,10 +605,13 @@ class _Machine:
         """Append the status and the CRC, and end the response."""
         m, engine = self.m, self.engine
         with m.State("status"):
-            self.put(self.status)
-            with m.If(self.status != Status.OK):
-                self.happens(Counter.REFUSED)
-            m.next = "crc"
+            with m.If(self.bits != 0):
+                self.fill(Const(0, 1))
+            with m.Else():
+                self.put(self.status)
+                with m.If(self.status != Status.OK):
+                    self.happens(Counter.REFUSED)
+                m.next = "crc"
         with m.State("crc"):
             self.put(0)
             m.d.comb += self.unit.i_turn.eq(1)

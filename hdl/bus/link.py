@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from amaranth.hdl import Cat, ClockDomain, ClockSignal, Module, Signal
+from amaranth.hdl import Cat, ClockDomain, ClockSignal, Module, ResetSignal, Signal
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
@@ -51,6 +51,9 @@ class Link(wiring.Component):
     ratio : Fraction
         Clocks per bit of the line, at least `sosmith.hdl.bus.uart.MIN_CLOCKS`.
 
+    waits : bool
+        Whether the link, too, is in reset while `rst` is high, as its clock has another frequency until then.
+
     Members
     -------
     clk, rst, rx, tx, leds
@@ -61,16 +64,18 @@ class Link(wiring.Component):
         The core's faces, or those of a front-end, as those of a `CommandEngine`.
     """
 
-    def __init__(self, face: Face, memory: bytes, *, ratio: Fraction) -> None:
-        self.face, self.memory, self.ratio = face, memory, ratio
+    def __init__(self, face: Face, memory: bytes, *, ratio: Fraction, waits: bool = False) -> None:
+        self.face, self.memory, self.ratio, self.waits = face, memory, ratio, waits
         outside = {"clk": In(1), "rst": In(1), "rx": In(1), "tx": Out(1), "leds": Out(LEDS), "aresetn": Out(1)}
         super().__init__(outside | core_side(face))
 
     def elaborate(self, platform: object) -> Module:
         """Connect everything."""
         m = Module()
-        m.domains.sync = ClockDomain(local=True, reset_less=True)
+        m.domains.sync = ClockDomain(local=True, reset_less=not self.waits)
         m.d.comb += ClockSignal("sync").eq(self.clk)
+        if self.waits:
+            m.d.comb += ResetSignal("sync").eq(self.rst)
         m.submodules.uart_receiver = line_in = UartReceiver(self.ratio)
         m.submodules.uart_transmitter = line_out = UartTransmitter(self.ratio)
         m.submodules.frame_receiver = receiver = FrameReceiver()

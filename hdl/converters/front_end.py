@@ -254,17 +254,17 @@ class _Scan:
             m.d.sync += code.eq(exact)
             m.next = f"judge {number}"
         with m.State(f"judge {number}"):
-            found = self.faults(reading, frame, code)
+            faults = self.faults(reading, frame, code)
             good = Signal(name=f"good{number}")
-            held = self.fetches[number].data[: reading.port.bits]
+            last_good = self.fetches[number].data[: reading.port.bits]
             inputs = len(self.plan.readings)
             m.d.comb += [
-                good.eq(~found.any()),
+                good.eq(~faults.any()),
                 self.stores[number].en.eq(1),
-                self.stores[number].data.eq(Cat(Mux(good, code[: reading.port.bits], held), ~good)),
+                self.stores[number].data.eq(Cat(Mux(good, code[: reading.port.bits], last_good), ~good)),
                 self.store_faults.en.eq(1),
                 self.store_faults.addr.eq(self.channel * inputs + number),
-                self.store_faults.data.eq(found),
+                self.store_faults.data.eq(faults),
             ]
             m.next = f"read {number}"
             self.next_channel(after)
@@ -310,10 +310,10 @@ class _Scan:
         bits: list[Value] = [Const(0, 1)] * len(ReadingFault)
         wrong = Cat(frame[bit] for bit in converter.zeros).any()
         if converter.summary is not None:
-            told = Cat(frame[bit] for bit in range(len(THERMOCOUPLE_FAULTS)))
+            reasons = Cat(frame[bit] for bit in range(len(THERMOCOUPLE_FAULTS)))
             for bit, fault in enumerate(THERMOCOUPLE_FAULTS):
                 bits[fault] = frame[bit]
-            wrong = wrong | (frame[converter.summary] & ~told.any())
+            wrong = wrong | (frame[converter.summary] & ~reasons.any())
         bits[ReadingFault.FRAME] = wrong
         bits[ReadingFault.RANGE] = (code < reading.port.lowest) | (code > reading.port.highest)
         return Cat(bits)
@@ -323,7 +323,7 @@ class _Scan:
         m, front = self.m, self.front
         codes = [fetch.data[:-1] for fetch in self.fetches]
         ports = [reading.port for reading in self.plan.readings]
-        held = Cat(fetch.data[-1] for fetch in self.fetches).any()
+        repeated = Cat(fetch.data[-1] for fetch in self.fetches).any()
         fields = []
         for code, port in zip(codes, ports, strict=True):
             field = Signal(8 * port.bytes, name=f"field_{port.name}")
@@ -332,7 +332,7 @@ class _Scan:
         m.d.comb += [
             front.s_axis_tdata.eq(Cat(fields)),
             front.s_axis_tdest.eq(self.channel),
-            front.o_status.eq(front.m_axis_tuser | (held << Flag.FAULT)),
+            front.o_status.eq(front.m_axis_tuser | (repeated << Flag.FAULT)),
             front.o_new.eq(self.queue.i_push),
             self.queue.i_result.eq(Cat(front.m_axis_tdata, front.o_status)),
         ]
@@ -360,9 +360,9 @@ class _Scan:
         word = Mux(exact > converter.highest, converter.highest, Mux(exact < converter.lowest, converter.lowest, exact))
         width = converter.width
         words = [Signal(width, name=f"result{channel}") for channel in range(self.plan.channels)]
-        for channel, held in enumerate(words):
+        for channel, register in enumerate(words):
             with m.If(new & (place == channel)):
-                m.d.sync += held.eq(word)
+                m.d.sync += register.eq(word)
         if isinstance(converter, SpiDac):
             self.send(converter, words, new & (place == self.plan.channels - 1))
         elif self.audio is not None:

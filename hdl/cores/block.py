@@ -89,7 +89,7 @@ class BlockCore(Shell):
         for k in range(self.lanes):
             code, *settling = _share(codes, k, self.lanes)
             inputs = _share(status, k, self.lanes)
-            found = status_of_result(
+            result_status = status_of_result(
                 m,
                 self.datapath,
                 code,
@@ -97,12 +97,12 @@ class BlockCore(Shell):
                 saturated=stages[-1].o_saturated[k] if Flag.OUTPUT_SATURATED in self.live_flags else Const(0, 1),
                 settling=settling[0][-1] if settling else Const(0, 0),
             )
-            results.append((code, found.flags))
+            results.append((code, result_status.flags))
         self.hand_out(m, buffer, beat.valid, results)
 
     @property
     def live_flags(self) -> Sequence[int]:
-        """Bits of the status that a sample may set, told from the datapath: the others have no registers."""
+        """Bits of the status that a sample may set, by the datapath: the others have no registers."""
         inputs = zip(self.datapath.inputs, self.datapath.calibrated, strict=True)
         never = set()
         if all(ends == (port.lowest, port.highest) for port, ends in inputs):
@@ -120,19 +120,19 @@ class BlockCore(Shell):
 
     def _components(self, m: Module, advance: Value) -> list[LookAheadStage | PipelinedStage]:
         """Make the hardware of the stages."""
-        made: list[LookAheadStage | PipelinedStage]
+        components: list[LookAheadStage | PipelinedStage]
         if self.look_ahead:
-            made = [
+            components = [
                 LookAheadStage(stage.name, plan) for stage, plan in zip(self.stages, plans(self.stages), strict=True)
             ]
         else:
-            made = [
+            components = [
                 PipelinedStage(stage, adders=adders) for stage, adders in zip(self.stages, self.adders, strict=True)
             ]
-        for stage, component in zip(self.stages, made, strict=True):
+        for stage, component in zip(self.stages, components, strict=True):
             m.submodules[stage.name] = component
             m.d.comb += component.advance.eq(advance)
-        return made
+        return components
 
 
 def _share(whole: _Whole, lane: int, lanes: int) -> _Whole:

@@ -73,7 +73,7 @@ from sosmith.hdl.check_bits import CheckBits
 from sosmith.hdl.instruction import PipelinedInstruction
 from sosmith.hdl.memory_ports import read_port, write_port
 from sosmith.hdl.pipelined_logic import limits
-from sosmith.hdl.plan.folded_clocks import FOLDED_DEPTH, SERIAL_DEPTH, memory_depth, overlaps
+from sosmith.hdl.plan.folded_clocks import FOLDED_DEPTH, SERIAL_DEPTH, memory_depth, overlaps, word_slices
 from sosmith.hdl.plan.instructions import address_bits, encoded, instruction_bits
 from sosmith.hdl.plan.streams import channel_bits
 from sosmith.hdl.reload import ReloadPort
@@ -105,10 +105,6 @@ _NO_COLLISIONS = {"no_rw_check": 1}
 a clock a simulator reads the old word and a block RAM anything; without the attribute, Yosys adds registers and a
 comparator to make both equal.
 """
-
-
-_SLICES = {256: 16, 512: 8, 1024: 4, 2048: 2}
-"""Width of an iCE40's block RAM, by its number of words."""
 
 
 class _Control:
@@ -149,11 +145,11 @@ class _Position(NamedTuple):
     fetches: Signal
 
 
-def _told(m: Module, memory: str, corrected: Value, failed: Value) -> tuple[Value, Value]:
+def _fault_nets(m: Module, memory: str, corrected: Value, failed: Value) -> tuple[Value, Value]:
     """Return whether a wrong bit was corrected, and whether one could not be, as nets that say in which memory."""
-    found = Signal(name=f"{memory}_corrected"), Signal(name=f"{memory}_failed")
-    m.d.comb += [net.eq(value) for net, value in zip(found, (corrected, failed), strict=True)]
-    return found
+    nets = Signal(name=f"{memory}_corrected"), Signal(name=f"{memory}_failed")
+    m.d.comb += [net.eq(value) for net, value in zip(nets, (corrected, failed), strict=True)]
+    return nets
 
 
 class _Reload(NamedTuple):
@@ -246,7 +242,7 @@ class FoldedCore(Shell):
         limits = self._give(functions["result"], control, (begins, ends), added, pipeline, guard)
         if guard is not None:
             memories = (fetched, remembered, limits)
-            corrected, failed = (Cat(found).any() for found in zip(*memories, strict=True))
+            corrected, failed = (Cat(nets).any() for nets in zip(*memories, strict=True))
             self.report(m, guard, None if reload is None else reload.port, corrected, failed)
 
     def _sequence(self, m: Module, control: _Control, guard: FaultGuard | None, reload: _Reload | None) -> _Position:
@@ -320,10 +316,10 @@ class FoldedCore(Shell):
         if self.channels == 1:
             m.d.comb += control.start.eq(self.s_axis_tvalid & ~waits)
             return
-        found, exists = Signal(name="found"), Signal(name="channel_exists")
-        m.d.comb += [found.eq(self.s_axis_tvalid & ~waits), exists.eq(self.s_axis_tdest < self.channels)]
-        m.d.comb += [control.start.eq(found & exists), self.m_axis_tdest.eq(control.channel)]
-        m.d.sync += control.dropped.eq(found & ~exists & ~control.dropped)
+        offered, exists = Signal(name="found"), Signal(name="channel_exists")
+        m.d.comb += [offered.eq(self.s_axis_tvalid & ~waits), exists.eq(self.s_axis_tdest < self.channels)]
+        m.d.comb += [control.start.eq(offered & exists), self.m_axis_tdest.eq(control.channel)]
+        m.d.sync += control.dropped.eq(offered & ~exists & ~control.dropped)
         with m.If(control.start):
             m.d.sync += control.channel.eq(self.s_axis_tdest)
 
@@ -347,9 +343,9 @@ class FoldedCore(Shell):
         m.d.comb += is_last_instruction.eq(counter == count - 1)
         leaves: Value = control.leaves
         if self._overlaps:
-            held = Signal(name="waits_for_sink")
-            m.d.comb += held.eq((counter == self.program.result_start) & self.m_axis_tvalid & ~self.m_axis_tready)
-            m.d.comb += fetches.eq(control.start | (fetching & ~held))
+            waits = Signal(name="waits_for_sink")
+            m.d.comb += waits.eq((counter == self.program.result_start) & self.m_axis_tvalid & ~self.m_axis_tready)
+            m.d.comb += fetches.eq(control.start | (fetching & ~waits))
             leaves = fetches & is_last_instruction
         is_last = control.channel == self.channels - 1
         with m.If(control.clearing):
@@ -411,7 +407,7 @@ class FoldedCore(Shell):
         fetch = read_port(program, "instructions")
         index, bank = self._program_address(m, position.counter, count, reload, guard)
         m.d.comb += [fetch.addr.eq(Cat(index, bank)), fetch.en.eq(advance)]
-        found = check.read(m, fetch.data, "instruction1")
+        word = check.read(m, fetch.data, "instruction1")
         valid = Signal(name="valid1")
         looks = valid & advance if guard is None else (valid & advance) | guard.read
         fetched = Signal(len(fetch.addr), reset_less=True)
@@ -420,19 +416,19 @@ class FoldedCore(Shell):
             with m.If(advance):
                 m.d.sync += fetched.eq(fetch.addr)
             # A word that is read while it is written would be undefined.
-            rewrites = looks & found.corrected & (fetched != fetch.addr)
-        self._write_program(m, program, check, reload, (rewrites, fetched, found.data))
-        pipeline = [PipelinedInstruction(m, "instruction1", found.data, valid, self.program)]
+            rewrites = looks & word.corrected & (fetched != fetch.addr)
+        self._write_program(m, program, check, reload, (rewrites, fetched, word.data))
+        pipeline = [PipelinedInstruction(m, "instruction1", word.data, valid, self.program)]
         with m.If(advance):
             m.d.sync += valid.eq(position.fetches)
             for k in range(2, SERIAL_DEPTH + 1 if self.serial else FOLDED_DEPTH + 1):
-                code = Signal(len(found.data), name=f"instruction{k}", reset_less=True)
+                code = Signal(len(word.data), name=f"instruction{k}", reset_less=True)
                 valid = Signal(name=f"valid{k}")
                 m.d.sync += [code.eq(pipeline[-1].code), valid.eq(pipeline[-1].valid)]
                 pipeline.append(PipelinedInstruction(m, f"instruction{k}", code, valid, self.program))
             with m.If(control.clearing):  # in place of a target, the address of the word to clear
                 m.d.sync += pipeline[-1].fields.target.eq(position.counter[: address_bits(self.program)])
-        return pipeline, _told(m, "program", looks & found.corrected, looks & found.failed)
+        return pipeline, _fault_nets(m, "program", looks & word.corrected, looks & word.failed)
 
     def _program_address(
         self,
@@ -507,11 +503,11 @@ class FoldedCore(Shell):
     def _moved(self, m: Module, instruction: PipelinedInstruction, read: Value) -> Value:
         """Return the word that MOVE and TAKE write, and 0 for all others."""
         word = Mux(instruction.has(Opcode.TAKE), self._input_digit(instruction), read)
-        found = Mux(instruction.valid & instruction.has(*EARLY_WRITES), word, 0)
+        word_to_move = Mux(instruction.valid & instruction.has(*EARLY_WRITES), word, 0)
         if self.serial:
-            return found
+            return word_to_move
         moved = Signal(self._word)  # 0 from a reset on, when words are cleared
-        m.d.sync += moved.eq(found)
+        m.d.sync += moved.eq(word_to_move)
         return moved
 
     def _total(self, m: Module, added: Signal, advance: Signal, last: PipelinedInstruction) -> Value:
@@ -569,18 +565,18 @@ class FoldedCore(Shell):
             address = Mux(guard.scrubs & self._is_word(guard.address), guard.address[: len(address)], address)
             looks = looks | guard.read
         word = read if guard is None else Signal(check.width)
-        found = check.read(m, word, "read")
+        word_read = check.read(m, word, "read")
         if guard is not None and self.protect == "correct":
             scrubbed = Signal(len(address), reset_less=True)
-            rewrites = guard.read & found.corrected & ~clearing & (scrubbed != address)
+            rewrites = guard.read & word_read.corrected & ~clearing & (scrubbed != address)
             m.d.sync += scrubbed.eq(address)
             where = Mux(rewrites, scrubbed, where)
-            what = Mux(rewrites, found.data, what)
+            what = Mux(rewrites, word_read.data, what)
             enable = enable | rewrites
         m.d.comb += word.eq(self._memory(m, check, read=(address, advance), write=(where, check.written(what), enable)))
         if guard is not None:
-            m.d.comb += read.eq(found.data)
-        return _told(m, "words", looks & found.corrected, looks & found.failed)
+            m.d.comb += read.eq(word_read.data)
+        return _fault_nets(m, "words", looks & word_read.corrected, looks & word_read.failed)
 
     def _is_word(self, address: Value) -> Value:
         """Whether there is a word at an address to scrub."""
@@ -593,16 +589,10 @@ class FoldedCore(Shell):
     def _memory(
         self, m: Module, check: CheckBits, read: tuple[Value, Value], write: tuple[Value, Value, Value]
     ) -> Value:
-        """Make the memory of all channels; return the word read.
-
-        It is cut into slices as wide as a block RAM of so many words. Block RAMs side by side need no logic; behind
-        each other they would.
-        """
+        """Make the memory of all channels, cut into `word_slices`; return the word read."""
         words, depth = self.program.words, memory_depth(self.program, self.channels)
-        width = next((bits for most, bits in _SLICES.items() if depth <= most), _SLICES[max(_SLICES)])
         slices: list[Value] = []
-        for low in range(0, check.width, width):
-            high = min(low + width, check.width)
+        for low, high in word_slices(depth, check.width):
             one = check.word(1) >> low & ((1 << (high - low)) - 1)
             init = [one if address % words == self.program.one else 0 for address in range(depth)]
             m.submodules[f"words{low}"] = ram = Memory(shape=high - low, depth=depth, init=init, attrs=_NO_COLLISIONS)
@@ -665,7 +655,7 @@ class FoldedCore(Shell):
         code, saturated = self._limited(m, given)
         # Without protection the limits are read again and again; with it just once, so that an upset changes no flag
         # of a result that waits for the sink.
-        found = status_of_result(
+        status = status_of_result(
             m,
             self.datapath,
             code,
@@ -676,12 +666,12 @@ class FoldedCore(Shell):
             enable=Const(1) if guard is None else ends,
             protect=self.protect,
         )
-        flags = found.flags
+        flags = status.flags
         m.d.comb += [
             self.m_axis_tdata.eq(extended(code, len(self.m_axis_tdata))),
-            self.m_axis_tuser.eq(flags if guard is None else with_fault(flags, guard.fault | found.failed)),
+            self.m_axis_tuser.eq(flags if guard is None else with_fault(flags, guard.fault | status.failed)),
         ]
-        return _told(m, "limits", control.leaves & found.corrected, control.leaves & found.failed)
+        return _fault_nets(m, "limits", control.leaves & status.corrected, control.leaves & status.failed)
 
     def _settling(self, m: Module, advance: Signal, last: PipelinedInstruction, added: Signal) -> Value:
         """Return whether the program has judged that the sample comes before the filter has settled."""
@@ -732,10 +722,10 @@ class FoldedCore(Shell):
         for code, node, location in zip(codes, graph.inputs, self.program.inputs, strict=True):
             padded = Cat(Const(0, location.frac - graph.nodes[node].frac), code)
             digits += self._split(padded, location, sign=padded[-1] if code.shape().signed else Const(0, 1))
-        found = digits[-1]
+        selected = digits[-1]
         for k, digit in enumerate(digits[:-1]):
-            found = Mux(instruction.is_for(k), digit, found)
-        return found
+            selected = Mux(instruction.is_for(k), digit, selected)
+        return selected
 
     def _split(self, value: Value, location: Location, sign: Value) -> list[Value]:
         """Return the digits of a value, the lowest first, each as wide as a word."""

@@ -231,7 +231,7 @@ class Core(Shell):
         fault = self._fault_of(m, parts, last)
         if self._reads_limits:
             result = result.later(m, buffer.advance)
-        found = status_of_result(
+        status = status_of_result(
             m,
             self.datapath,
             result.code,
@@ -242,13 +242,13 @@ class Core(Shell):
             enable=buffer.advance,
             protect=self.protect,
         )
-        flags = found.flags
+        flags = status.flags
         if parts.guard is not None:
-            fault = fault | (result.valid & found.failed)
+            fault = fault | (result.valid & status.failed)
             flags = with_fault(flags, parts.guard.fault | fault)
             m.submodules.guard = parts.guard
             corrected = Cat(
-                *(stage.corrected for stage in parts.interleaved), result.valid & found.corrected & buffer.advance
+                *(stage.corrected for stage in parts.interleaved), result.valid & status.corrected & buffer.advance
             )
             self.report(m, parts.guard, port, corrected.any(), fault & buffer.advance)
         self._restart(m, parts, first)
@@ -370,9 +370,9 @@ class Core(Shell):
         }
         layout = data.StructLayout({name: len(value) for name, value in word.items()})
         buffer = m.submodules.input_buffer = StreamBuffer(layout.size)
-        held, next_ = data.View(layout, buffer.o_data), data.View(layout, buffer.o_next)
+        head, next_ = data.View(layout, buffer.o_data), data.View(layout, buffer.o_next)
         exists = self.s_axis_tdest < self.channels
-        channel: Value = held.channel
+        channel: Value = head.channel
         scrubs = NEVER
         if guard is not None:
             channel = Mux(buffer.o_valid, channel, guard.address)
@@ -387,7 +387,7 @@ class Core(Shell):
             self.s_axis_tready.eq(buffer.advance & ~shut),
             buffer.i_valid.eq(self.s_axis_tvalid & exists & ~shut),
             buffer.i_data.eq(Cat(*word.values())),
-            parts.waiting.eq(banks_in_use([buffer.o_valid, ~buffer.advance], [held.bank, next_.bank])),
+            parts.waiting.eq(banks_in_use([buffer.o_valid, ~buffer.advance], [head.bank, next_.bank])),
             valid.eq(buffer.o_valid & moves),
             buffer.o_ready.eq(advance & moves),
         ]
@@ -400,8 +400,8 @@ class Core(Shell):
             m.d.comb += swap.may.eq(parts.empty & ~buffer.o_valid & ~clearing)
         for stage in parts.interleaved:
             m.d.comb += [stage.clear.eq(clearing), stage.clear_channel.eq(cleared)]
-        sample = Sample(valid, held.bank, channel=channel, scrub=scrubs)
-        return sample, held.tdata, held.given if self.flags_given else None
+        sample = Sample(valid, head.bank, channel=channel, scrub=scrubs)
+        return sample, head.tdata, head.given if self.flags_given else None
 
     def _clear_channels(self, m: Module, parts: _Parts) -> tuple[Signal, Signal]:
         """Clear the states of all channels after a reset or restart; return whether it goes on, and the channel."""

@@ -85,22 +85,22 @@ class ChannelDecimator(wiring.Component):
     def elaborate(self, platform: object) -> Module:
         """Build the sequence, the two memories and the adder."""
         m = Module()
-        made, bits = self.decimator, channel_bits(self.channels)
+        cic, bits = self.decimator, channel_bits(self.channels)
         channel = Signal(bits)
-        sample = Signal(made.input.bits, reset_less=True)
+        sample = Signal(cic.input.bits, reset_less=True)
         gathered = Signal(len(self.o_flags), reset_less=True)
-        acc = Signal(made.width, reset_less=True)
-        step = Signal(range(2 * made.stages))
+        acc = Signal(cic.width, reset_less=True)
+        step = Signal(range(2 * cic.stages))
         clearing = Signal(init=1)
         idle = Signal()
         takes = Signal()
         gives = Signal()
         m.d.comb += self.i_ready.eq(idle)
-        (code,) = codes_of([made.input], self.i_data)
+        (code,) = codes_of([cic.input], self.i_data)
         kept = self._control(m, channel, sample, gathered)
         adds = Signal()
         total = self._states(m, channel, (step, adds), kept.started, acc)
-        rounded = acc + (extended(self._code(kept.first), made.width) << made.growth)[: made.width]
+        rounded = acc + (extended(self._code(kept.first), cic.width) << cic.growth)[: cic.width]
         with m.If(self.o_ready):
             m.d.sync += self.o_valid.eq(0)
         # One of these is 1 at each clock.
@@ -113,7 +113,7 @@ class ChannelDecimator(wiring.Component):
             m.d.sync += [
                 channel.eq(self.i_dest[:bits]),
                 sample.eq(code),
-                gathered.eq(self.i_flags if self.flags else at_rail([made.input], self.i_data)),
+                gathered.eq(self.i_flags if self.flags else at_rail([cic.input], self.i_data)),
             ]
             with m.If(self.i_valid & (self.i_dest < self.channels)):
                 m.d.sync += [idle.eq(0), takes.eq(1)]
@@ -121,15 +121,15 @@ class ChannelDecimator(wiring.Component):
             m.d.sync += [acc.eq(self._code(sample) - self._code(kept.first)), step.eq(0), takes.eq(0), adds.eq(1)]
         with m.If(adds):
             m.d.sync += [acc.eq(total), step.eq(step + 1)]
-            with m.If((step == made.stages - 1) & ~kept.completes):
+            with m.If((step == cic.stages - 1) & ~kept.completes):
                 m.d.comb += kept.writes.eq(1)
                 m.d.sync += [adds.eq(0), idle.eq(1)]
-            with m.If(step == 2 * made.stages - 1):
+            with m.If(step == 2 * cic.stages - 1):
                 m.d.sync += [adds.eq(0), gives.eq(1)]
         with m.If(gives & (~self.o_valid | self.o_ready)):
             m.d.comb += kept.writes.eq(1)
             m.d.sync += [
-                self.o_data.eq((rounded[: made.width] + (1 << made.dropped >> 1)) >> made.dropped),
+                self.o_data.eq((rounded[: cic.width] + (1 << cic.dropped >> 1)) >> cic.dropped),
                 self.o_flags.eq(kept.flags | gathered),
                 self.o_dest.eq(channel),
                 self.o_valid.eq(1),
@@ -144,8 +144,8 @@ class ChannelDecimator(wiring.Component):
 
     def _control(self, m: Module, channel: Signal, sample: Signal, gathered: Signal) -> _Kept:
         """Keep of each channel whether it has started, the phase, the flags, and the first sample."""
-        made, count = self.decimator, len(self.o_flags)
-        phases = made.factor.bit_length() - 1
+        cic, count = self.decimator, len(self.o_flags)
+        phases = cic.factor.bit_length() - 1
         m.submodules.control = memory = Memory(shape=1 + phases + count + len(sample), depth=self.channels, init=[])
         read, write = read_port(memory, "control"), write_port(memory, "control")
         kept = _Kept(
@@ -161,7 +161,7 @@ class ChannelDecimator(wiring.Component):
         m.d.comb += kept.first.eq(sample)
         with m.If(read.data[0]):
             m.d.comb += Cat(kept.started, phase, kept.flags, kept.first).eq(read.data)
-        told = Mux(kept.completes, 0, kept.flags | gathered)
+        flags = Mux(kept.completes, 0, kept.flags | gathered)
         m.d.comb += [
             kept.completes.eq(~phase.any()),
             read.en.eq(kept.reads),
@@ -170,22 +170,22 @@ class ChannelDecimator(wiring.Component):
             write.addr.eq(channel),
         ]
         with m.If(kept.writes):
-            m.d.comb += write.data.eq(Cat(Const(1, 1), (phase + 1)[:phases], told[:count], kept.first))
+            m.d.comb += write.data.eq(Cat(Const(1, 1), (phase + 1)[:phases], flags[:count], kept.first))
         return kept
 
     def _states(
         self, m: Module, channel: Signal, control: tuple[Signal, Signal], started: Signal, acc: Signal
     ) -> Value:
         """Keep of each channel its sums and combs; return what a step makes of the accumulator."""
-        made, (step, adds) = self.decimator, control
+        cic, (step, adds) = self.decimator, control
         steps = len(step)
-        m.submodules.states = memory = Memory(shape=made.width, depth=self.channels << steps, init=[])
+        m.submodules.states = memory = Memory(shape=cic.width, depth=self.channels << steps, init=[])
         read, write = read_port(memory, "states"), write_port(memory, "states")
         combing = Signal()
-        state = Signal(made.width)
-        total = Signal(made.width)
+        state = Signal(cic.width)
+        total = Signal(cic.width)
         m.d.comb += [
-            combing.eq(step >= made.stages),
+            combing.eq(step >= cic.stages),
             read.addr.eq(Cat(Mux(adds, step + 1, 0)[:steps], channel)),
             read.en.eq(1),
             state.eq(Mux(started, read.data, 0)),

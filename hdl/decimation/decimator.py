@@ -19,7 +19,7 @@ that the filter is as if it had been there for ever. Nothing that the sums or co
 A sample that completes a result is not accepted before the core has taken the result before; all others are, one a
 clock. `s_axis_tready` comes from registers only.
 
-A calibration is a core of its own, ahead of all this, which works on every sample::
+A calibration is a core of its own before all this, which works on every sample::
 
     s_axis --> ahead (calibration) --> CIC filter --> core --> m_axis
                       flags of the inputs: any since the last result
@@ -77,14 +77,14 @@ class CicDecimator(wiring.Component):
     def __init__(self, decimator: Decimator, flags: int = 0) -> None:
         self.decimator = decimator
         self.flags = flags
-        told = {"i_flags": In(flags), "o_flags": Out(flags)} if flags else {"o_rail": Out(1)}
+        flag_ports = {"i_flags": In(flags), "o_flags": Out(flags)} if flags else {"o_rail": Out(1)}
         super().__init__(
             {
                 "i_data": In(decimator.input.bits if flags else width([decimator.input])),
                 "i_valid": In(1),
                 "i_ready": Out(1),
                 "o_data": Out(decimator.output.bits),
-                **told,
+                **flag_ports,
                 "o_valid": Out(1),
                 "o_ready": In(1),
             }
@@ -93,10 +93,10 @@ class CicDecimator(wiring.Component):
     def elaborate(self, platform: object) -> Module:
         """Build control, integrators and combs."""
         m = Module()
-        made = self.decimator
-        phase = Signal(range(made.factor))
+        cic = self.decimator
+        phase = Signal(range(cic.factor))
         filling = Signal(init=1)
-        filled = Signal(range(made.stages + 1))
+        filled = Signal(range(cic.stages + 1))
         waiting = Signal()
         completes = Signal()
         enters = Signal()
@@ -109,7 +109,7 @@ class CicDecimator(wiring.Component):
             m.d.sync += phase.eq(phase + 1)  # the factor is a power of two
             with m.If(phase.all()):
                 m.d.sync += filled.eq(filled + 1)
-                with m.If(filled == made.stages - 1):
+                with m.If(filled == cic.stages - 1):
                     m.d.sync += filling.eq(0)
         with m.If(enters & completes & ~filling):
             m.d.sync += waiting.eq(1)
@@ -121,19 +121,19 @@ class CicDecimator(wiring.Component):
             self._flag_rails(m, enters & ~filling, completes)
         value, moves, counts = self._filter(m, enters, completes, ~filling)
         with m.If(moves & counts):
-            m.d.sync += [self.o_data.eq((value + (1 << made.dropped >> 1)) >> made.dropped), self.o_valid.eq(1)]
+            m.d.sync += [self.o_data.eq((value + (1 << cic.dropped >> 1)) >> cic.dropped), self.o_valid.eq(1)]
         with m.Elif(self.o_ready):
             m.d.sync += self.o_valid.eq(0)
         return m
 
     def _flag_rails(self, m: Module, accepted: Value, completes: Value) -> None:
         """Hold whether any sample of a result is at the end of the range, from the last of them on."""
-        found = at_rail([self.decimator.input], self.i_data)
+        at_end = at_rail([self.decimator.input], self.i_data)
         rail = Signal()
         with m.If(accepted):
-            m.d.sync += rail.eq((rail | found) & ~completes)
+            m.d.sync += rail.eq((rail | at_end) & ~completes)
             with m.If(completes):
-                m.d.sync += self.o_rail.eq(rail | found)
+                m.d.sync += self.o_rail.eq(rail | at_end)
 
     def _gather(self, m: Module, accepted: Value, completes: Value) -> None:
         """Hold the flags of all samples of a result, from the last of them on."""
@@ -145,21 +145,21 @@ class CicDecimator(wiring.Component):
 
     def _filter(self, m: Module, enters: Value, completes: Value, counts: Value) -> tuple[Value, Value, Value]:
         """Integrate and comb; return the difference behind the last comb, whether it is new, and whether it counts."""
-        made = self.decimator
-        (code,) = codes_of([made.input], self.i_data)
-        value: Value = Signal(made.width, name="code")
-        m.d.comb += value.eq(extended(code, made.width))
+        cic = self.decimator
+        (code,) = codes_of([cic.input], self.i_data)
+        value: Value = Signal(cic.width, name="code")
+        m.d.comb += value.eq(extended(code, cic.width))
         valid, last, real = enters, completes, counts
-        for k in range(1, made.stages + 1):
-            total = Signal(made.width, name=f"sum{k}", reset_less=True)
+        for k in range(1, cic.stages + 1):
+            total = Signal(cic.width, name=f"sum{k}", reset_less=True)
             with m.If(valid):
                 m.d.sync += total.eq(total + value)
             value = total
             valid, last, real = self._later(m, f"integrator{k}", valid, last, real)
         moves = valid & last
-        for k in range(1, made.stages + 1):
-            before = Signal(made.width, name=f"comb{k}", reset_less=True)
-            difference = Signal(made.width, name=f"difference{k}", reset_less=True)
+        for k in range(1, cic.stages + 1):
+            before = Signal(cic.width, name=f"comb{k}", reset_less=True)
+            difference = Signal(cic.width, name=f"difference{k}", reset_less=True)
             with m.If(moves):
                 m.d.sync += [difference.eq(value - before), before.eq(value)]
             value = difference
@@ -168,9 +168,9 @@ class CicDecimator(wiring.Component):
 
     def _later(self, m: Module, name: str, valid: Value, *others: Value) -> tuple[Value, ...]:
         """Return bits of the control a clock later; the first, the valid bit, is 0 from a reset on."""
-        held = [Signal(1, name=f"{name}_control{k}", reset_less=k > 0) for k in range(1 + len(others))]
-        m.d.sync += [register.eq(bit) for register, bit in zip(held, (valid, *others), strict=True)]
-        return tuple(held)
+        registers = [Signal(1, name=f"{name}_control{k}", reset_less=k > 0) for k in range(1 + len(others))]
+        m.d.sync += [register.eq(bit) for register, bit in zip(registers, (valid, *others), strict=True)]
+        return tuple(registers)
 
 
 class Holder(wiring.Component):
@@ -223,7 +223,7 @@ class Holder(wiring.Component):
 
 
 class DecimatedCore(wiring.Component):
-    """A core with a decimator before it, ahead of that a calibration, and behind it a `Holder` if results are held.
+    """A core with a decimator before it, before that a calibration, and behind it a `Holder` if results are held.
 
     Latency: that of each of them, and a clock of the holder. Throughput: one sample a clock, or what the calibration
     takes, as long as the core keeps up with one result for each R of them.
@@ -234,8 +234,8 @@ class DecimatedCore(wiring.Component):
         With a decimator; its name is that of the top module.
     core : Core or FoldedCore
         The core for `datapath.behind_decimator`, which takes flags of the inputs from `s_axis_tuser`.
-    ahead : Core or FoldedCore or None
-        The core for `datapath.ahead`, whose results go to the decimator; None without one.
+    calibration : Core or FoldedCore or None
+        The core for `datapath.calibration`, whose results go to the decimator; None without one.
     hold : bool
         Whether each result is handed out once for each of its samples.
     opens : int
@@ -251,13 +251,13 @@ class DecimatedCore(wiring.Component):
         self,
         datapath: Datapath,
         core: Core | FoldedCore,
-        ahead: Core | FoldedCore | None = None,
+        calibration: Core | FoldedCore | None = None,
         *,
         hold: bool = False,
         opens: int = 0,
     ) -> None:
         self.datapath = datapath
-        self.ahead = ahead
+        self.calibration = calibration
         self.opens = opens
         self.hold = hold
         self.core = core
@@ -270,15 +270,15 @@ class DecimatedCore(wiring.Component):
         assert self.datapath.decimator is not None
         m.domains.front = ClockDomain(local=True)  # the core has its own domain `sync`
         m.d.comb += [ClockSignal("front").eq(self.aclk), ResetSignal("front").eq(~self.aresetn)]
-        flags = 0 if self.ahead is None else OF_INPUT
-        several, core, made = self.channels > 1, self.core, self.datapath.decimator
-        decimator = ChannelDecimator(made, self.channels, flags) if several else CicDecimator(made, flags)
-        if self.ahead is not None:
-            m.submodules.ahead = self.ahead
+        flags = 0 if self.calibration is None else OF_INPUT
+        several, core, cic = self.channels > 1, self.core, self.datapath.decimator
+        decimator = ChannelDecimator(cic, self.channels, flags) if several else CicDecimator(cic, flags)
+        if self.calibration is not None:
+            m.submodules.ahead = self.calibration
         m.submodules.decimator = DomainRenamer("front")(decimator)
         m.submodules.behind = core
-        if self.ahead is not None:
-            self._connect_ahead(m, self.ahead, decimator)
+        if self.calibration is not None:
+            self._connect_calibration(m, self.calibration, decimator)
         else:
             m.d.comb += decimator.i_data.eq(self.s_axis_tdata)
             if several:
@@ -286,7 +286,7 @@ class DecimatedCore(wiring.Component):
             else:
                 m.d.comb += [decimator.i_valid.eq(self.s_axis_tvalid), self.s_axis_tready.eq(decimator.i_ready)]
         if isinstance(decimator, ChannelDecimator):
-            source = self.s_axis_tdest if self.ahead is None else self.ahead.m_axis_tdest
+            source = self.s_axis_tdest if self.calibration is None else self.calibration.m_axis_tdest
             m.d.comb += [decimator.i_dest.eq(source), core.s_axis_tdest.eq(decimator.o_dest)]
         m.d.comb += [
             core.aclk.eq(self.aclk),
@@ -317,22 +317,24 @@ class DecimatedCore(wiring.Component):
         ]
         return m
 
-    def _connect_ahead(self, m: Module, ahead: Core | FoldedCore, decimator: CicDecimator | ChannelDecimator) -> None:
+    def _connect_calibration(
+        self, m: Module, calibration: Core | FoldedCore, decimator: CicDecimator | ChannelDecimator
+    ) -> None:
         """Let samples go through the calibration to the decimator."""
         m.d.comb += [
-            ahead.aclk.eq(self.aclk),
-            ahead.aresetn.eq(self.aresetn),
-            ahead.s_axis_tdata.eq(self.s_axis_tdata),
-            decimator.i_data.eq(ahead.m_axis_tdata),
-            decimator.i_flags.eq(ahead.m_axis_tuser),
-            decimator.i_valid.eq(ahead.m_axis_tvalid),
-            ahead.m_axis_tready.eq(decimator.i_ready),
+            calibration.aclk.eq(self.aclk),
+            calibration.aresetn.eq(self.aresetn),
+            calibration.s_axis_tdata.eq(self.s_axis_tdata),
+            decimator.i_data.eq(calibration.m_axis_tdata),
+            decimator.i_flags.eq(calibration.m_axis_tuser),
+            decimator.i_valid.eq(calibration.m_axis_tvalid),
+            calibration.m_axis_tready.eq(decimator.i_ready),
         ]
         if isinstance(decimator, CicDecimator):
-            self._fill(m, ahead, decimator)
+            self._fill(m, calibration, decimator)
         else:
-            m.d.comb += ahead.s_axis_tdest.eq(self.s_axis_tdest)
-            self._open(m, ahead.s_axis_tvalid, ahead.s_axis_tready)
+            m.d.comb += calibration.s_axis_tdest.eq(self.s_axis_tdest)
+            self._open(m, calibration.s_axis_tvalid, calibration.s_axis_tready)
 
     def _open(self, m: Module, valid: Value, ready: Value) -> None:
         """Let samples in to what takes them, but not before all memories behind it are cleared."""
@@ -343,18 +345,18 @@ class DecimatedCore(wiring.Component):
             self.s_axis_tready.eq(ready & ~closed.any()),
         ]
 
-    def _fill(self, m: Module, ahead: Core | FoldedCore, decimator: CicDecimator) -> None:
+    def _fill(self, m: Module, calibration: Core | FoldedCore, decimator: CicDecimator) -> None:
         """Let the first sample go through the calibration, and fill the decimator, before it is accepted."""
         first = Signal(init=1)
         fills = Signal()
         filled = Signal()
         flows = ~first & ~fills & ~filled
         m.d.comb += [
-            ahead.s_axis_tvalid.eq(self.s_axis_tvalid & (first | flows)),
-            self.s_axis_tready.eq(filled | (flows & ahead.s_axis_tready)),
+            calibration.s_axis_tvalid.eq(self.s_axis_tvalid & (first | flows)),
+            self.s_axis_tready.eq(filled | (flows & calibration.s_axis_tready)),
         ]
         m.d.front += filled.eq(0)
-        with m.If(first & self.s_axis_tvalid & ahead.s_axis_tready):
+        with m.If(first & self.s_axis_tvalid & calibration.s_axis_tready):
             m.d.front += [first.eq(0), fills.eq(1)]
-        with m.If(fills & ahead.m_axis_tvalid & decimator.i_ready):
+        with m.If(fills & calibration.m_axis_tvalid & decimator.i_ready):
             m.d.front += [fills.eq(0), filled.eq(1)]

@@ -169,7 +169,7 @@ class OnlineCascade(wiring.Component):
         tags = [self._tag(m, start - 1, q, column[q].tag, f"{name}_tag_unit{q}") for q in range(units)]
         ends = [self._then(m, start + section.digits - 3, q, f"{name}_unit{q}_ends") for q in range(units)]
         rounded = _Rounded(m, section, pairs, ends, final, [tag[0] for tag in tags], name)
-        made = []
+        built = []
         for q in range(units):
             own = f"{name}_unit{q}"
             before = past[q - 1]
@@ -203,8 +203,8 @@ class OnlineCascade(wiring.Component):
                 register = digit(f"{own}_past{k}")
                 m.d.sync += register.eq(source)
                 shown.append(register)
-            made.append(_Unit(tuple(shown), tags[q]))
-        return made
+            built.append(_Unit(tuple(shown), tags[q]))
+        return built
 
     def _window(self, m: Module, first: int, last: int, unit: int, name: str) -> Signal:
         """Return a register that is high from the clock `first` of a unit's sample to the one before `last`."""

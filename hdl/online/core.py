@@ -68,14 +68,14 @@ class OnlineCore(Shell):
         m.d.comb += [cascade.i.eq(codes[0]), cascade.i_valid.eq(sample.valid), cascade.i_tag.eq(status)]
         passed = []
         for k, code in enumerate(codes[1:]):
-            held = Signal(code.shape(), name=f"held{k}")
+            register = Signal(code.shape(), name=f"held{k}")
             with m.If(advance & sample.valid):
-                m.d.sync += held.eq(code)
-            passed.append(held)
+                m.d.sync += register.eq(code)
+            passed.append(register)
         (sample, codes), status, saturated = self._stage(
             m, datapath.stages[-1], advance, Sample(cascade.o_valid), [cascade.o, *passed], cascade.o_tag
         )
-        found = status_of_result(
+        result_status = status_of_result(
             m,
             datapath,
             codes[0],
@@ -83,7 +83,7 @@ class OnlineCore(Shell):
             saturated=saturated,
             settling=codes[1][-1] if datapath.settles else Const(0, 0),
         )
-        self.hand_out(m, buffer, sample.valid, [(codes[0], found.flags)])
+        self.hand_out(m, buffer, sample.valid, [(codes[0], result_status.flags)])
 
     @staticmethod
     def _stage(

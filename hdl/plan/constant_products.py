@@ -50,14 +50,14 @@ def with_sums(graph: Graph) -> Graph:
 def _multiples(g: GraphBuilder, operand: Wire, constants: Sequence[int]) -> dict[int, Wire]:
     """Add the sums that give the odd parts of all constants; return them, and the operand, by their multiples."""
     values = [operand]
-    found = {1: operand}
+    by_multiple = {1: operand}
     node = g[operand]
     name = node.name or node.op.value
     for adder in adder_graph(tuple(constants)):
         left, right = (g.shift(values[k], shift) for k, shift in (adder.left, adder.right))
-        made = g.subtract(left, right) if adder.subtract else g.add(left, right)
+        total = g.subtract(left, right) if adder.subtract else g.add(left, right)
         sign = "minus_" if adder.multiple < 0 else ""
         limits = multiple_range(adder.multiple, node.low, node.high)
-        values.append(g.bound(made, *limits, f"{name}_times_{sign}{abs(adder.multiple)}"))
-        found[adder.multiple] = values[-1]
-    return found
+        values.append(g.bound(total, *limits, f"{name}_times_{sign}{abs(adder.multiple)}"))
+        by_multiple[adder.multiple] = values[-1]
+    return by_multiple

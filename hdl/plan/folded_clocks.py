@@ -7,6 +7,9 @@ from sosmith.model.dataflow.program import Opcode, Program
 FOLDED_DEPTH, SERIAL_DEPTH = 5, 3
 """Pipeline stages from the program memory to the accumulator."""
 
+_SLICES = {256: 16, 512: 8, 1024: 4, 2048: 2}
+"""Width of an iCE40's block RAM, by its number of words."""
+
 
 def latency_cycles(program: Program, *, serial: bool, protect: str = "none") -> int:
     """Clocks from the edge that finds a sample to the edge that can hand its result on; in serial, an upper bound."""
@@ -57,3 +60,18 @@ def reset_cycles(program: Program, channels: int) -> int:
 def memory_depth(program: Program, channels: int) -> int:
     """Return the number of words of the memory; the upper bits of an address are the channel."""
     return program.words * channels
+
+
+def word_slices(depth: int, width: int) -> list[tuple[int, int]]:
+    """Return the lowest bit of each slice of the memory, and the bit behind its highest.
+
+    A slice is as wide as a block RAM of `depth` words. Block RAMs side by side need no logic; behind each other they
+    would.
+
+    Examples
+    --------
+    >>> word_slices(256, 18), word_slices(512, 18)
+    ([(0, 16), (16, 18)], [(0, 8), (8, 16), (16, 18)])
+    """
+    wide = next((bits for most, bits in _SLICES.items() if depth <= most), _SLICES[max(_SLICES)])
+    return [(low, min(low + wide, width)) for low in range(0, width, wide)]

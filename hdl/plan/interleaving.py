@@ -60,7 +60,7 @@ def schedule(graph: Graph, channels: int, *, rewrites: bool = False) -> Schedule
     least = max((operation_time(graph, node) for node in graph.nodes), default=0)
     reading = 1 if channels <= _MAX_LUT_RAM_CHANNELS else 2
     tried = (_spread(graph, period, reading, rewrites) for period in itertools.count(max(least, 1)))
-    return next(found for found in tried if found.distance <= channels)
+    return next(plan for plan in tried if plan.distance <= channels)
 
 
 def _spread(graph: Graph, period: int, reading: int, rewrites: bool) -> Schedule:

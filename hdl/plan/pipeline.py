@@ -63,13 +63,13 @@ def _one_after_another(graph: Graph) -> list[int]:
 
 def _needed(graph: Graph, nodes: set[int]) -> set[int]:
     """Return `nodes` and all that they depend on."""
-    found, left = set[int](), [*nodes]
+    needed, left = set[int](), [*nodes]
     while left:
         index = left.pop()
-        if index not in found:
-            found.add(index)
+        if index not in needed:
+            needed.add(index)
             left += graph.nodes[index].operands
-    return found
+    return needed
 
 
 def known_early(graph: Graph, stages: Sequence[int]) -> set[int]:
@@ -107,12 +107,12 @@ def _users(graph: Graph, nodes: Iterable[int]) -> set[int]:
     for index, node in enumerate(graph.nodes):
         for i in node.operands:
             direct.setdefault(i, []).append(index)
-    found, left = set[int](), [*nodes]
+    users, left = set[int](), [*nodes]
     while left:
-        new = set(direct.get(left.pop(), ())) - found
-        found |= new
+        new = set(direct.get(left.pop(), ())) - users
+        users |= new
         left += new
-    return found
+    return users
 
 
 def _late(graph: Graph, loop: set[int]) -> set[int]:

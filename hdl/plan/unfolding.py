@@ -51,7 +51,7 @@ def unfolded(graph: Graph, lanes: int) -> Graph:
         return graph
     g = GraphBuilder()
     before: list[Wire] = []
-    held: dict[int, Wire] = {}
+    states: dict[int, Wire] = {}
     outputs: list[Wire] = []
     for lane in range(lanes):
         wires: list[Wire] = []
@@ -62,10 +62,10 @@ def unfolded(graph: Graph, lanes: int) -> Graph:
             elif lane:
                 wires.append(before[node.operands[0]])
             else:
-                held[index] = g.copied(named, [])
-                wires.append(held[index])
+                states[index] = g.copied(named, [])
+                wires.append(states[index])
         outputs += [wires[i] for i in graph.outputs]
         before = wires
-    for index, wire in held.items():
+    for index, wire in states.items():
         g.connect(wire, before[graph.nodes[index].operands[0]])
     return g.build(outputs)

@@ -8,7 +8,7 @@
                        v         v               v
     status --------> [status1] [status2]  ..  [statusN] --> status     one register for each clock
 
-Latency: that of the stages; `delayed` takes as many clocks as it is told.
+Latency: that of the stages; `delayed` takes as many clocks as it is asked for.
 """
 
 from __future__ import annotations

@@ -160,9 +160,28 @@ class InterleavedStage(wiring.Component):
             adders=self.adders,
         )
         logic.connect([getattr(self, f"i{k}") for k in range(len(graph.inputs))])
-        at, wires, names = logic.at, logic.wires, logic.names
         scrub = self._scrub(m)
-        found: dict[int, Read] = {}
+        reads = self._connect_memories(m, logic, valid, channel, scrub)
+        if self.protect != "none":
+            self._judge(m, reads, [there | scrubs for there, scrubs in zip(valid, scrub, strict=True)])
+        last = plan.depth - 1
+        for k, i in enumerate(graph.outputs):
+            register = Signal(shape_of(graph.nodes[i]), name=f"{logic.names[i]}_register", reset_less=True)
+            m.d.comb += getattr(self, f"o{k}").eq(register)
+            with m.If(self.advance):
+                m.d.sync += register.eq(logic.at(i, last))
+                if graph.nodes[i].op is Op.CLAMP:
+                    below, above = limits(graph.nodes[i], logic.at(graph.nodes[i].operands[0], last))
+                    m.d.sync += self.o_saturated.eq(below | above)
+        return m
+
+    def _connect_memories(
+        self, m: Module, logic: PipelinedLogic, valid: list[Value], channel: list[Value], scrub: list[Value]
+    ) -> dict[int, Read]:
+        """Give each state a memory with one word for each channel; return what is read, by the node of the state."""
+        graph, plan = self.stage.graph, self.schedule
+        at, wires, names = logic.at, logic.wires, logic.names
+        reads: dict[int, Read] = {}
         for index in graph.delays:
             node, written = graph.nodes[index], plan.writes[index]
             check = CheckBits(node.width, self.protect)
@@ -179,7 +198,7 @@ class InterleavedStage(wiring.Component):
                 word = Signal(read.data.shape(), name=f"{names[index]}_read", reset_less=True)
                 with m.If(self.advance):
                     m.d.sync += word.eq(read.data)
-            found[index] = check.read(m, word, names[index])
+            reads[index] = check.read(m, word, names[index])
             following, writes = at(node.operands[0], written), valid[written]
             if self.protect != "none":
                 state = Signal(shape_of(node), name=f"{names[index]}_next")
@@ -188,23 +207,12 @@ class InterleavedStage(wiring.Component):
             m.d.comb += [
                 read.addr.eq(channel[plan.pipeline_stages[index] - plan.reading]),
                 read.en.eq(self.advance),
-                wires[index].eq(found[index].data),
+                wires[index].eq(reads[index].data),
                 write.addr.eq(Mux(self.clear, self.clear_channel, channel[written])),
                 write.data.eq(Mux(self.clear, 0, check.written(following))),
                 write.en.eq(self.clear | (self.advance & writes)),
             ]
-        if self.protect != "none":
-            self._judge(m, found, [there | scrubs for there, scrubs in zip(valid, scrub, strict=True)])
-        last = plan.depth - 1
-        for k, i in enumerate(graph.outputs):
-            register = Signal(shape_of(graph.nodes[i]), name=f"{names[i]}_register", reset_less=True)
-            m.d.comb += getattr(self, f"o{k}").eq(register)
-            with m.If(self.advance):
-                m.d.sync += register.eq(at(i, last))
-                if graph.nodes[i].op is Op.CLAMP:
-                    below, above = limits(graph.nodes[i], at(graph.nodes[i].operands[0], last))
-                    m.d.sync += self.o_saturated.eq(below | above)
-        return m
+        return reads
 
     def _scrub(self, m: Module) -> list[Value]:
         """Return for each pipeline stage, and for the outputs, whether it holds a scrub."""
@@ -218,12 +226,12 @@ class InterleavedStage(wiring.Component):
         m.d.comb += self.o_scrub.eq(scrub[-1])
         return scrub
 
-    def _judge(self, m: Module, found: Mapping[int, Read], there: list[Value]) -> None:
+    def _judge(self, m: Module, reads: Mapping[int, Read], there: list[Value]) -> None:
         """Let each sample and each scrub take along what was found wrong in the states that it has read."""
         fault: Value = self.i_fault
         corrected: Value = Const(0, 1)
         for k in range(self.schedule.depth):
-            own = [read for index, read in found.items() if self.schedule.pipeline_stages[index] == k]
+            own = [read for index, read in reads.items() if self.schedule.pipeline_stages[index] == k]
             for read in own:
                 fault = fault | read.failed
                 corrected = corrected | (read.corrected & there[k])

@@ -16,7 +16,7 @@ registers::
     i_valid --[valid1]--[valid2]--[valid3]--> o_valid       [turn] counts samples: 0, 1, 2, 3, 0, ..
     [warm] is set when it has come around: the samples before have no past, and find 0 whatever the memory holds
 
-A sample that finds no past is told by `warm`, which a reset clears. No memory has to be cleared, so that the stage is
+Whether a sample has a past is said by `warm`, which a reset clears. No memory has to be cleared, so that the stage is
 ready at once. A loop that goes back a single sample has a register instead of a memory, and one pipeline stage.
 """
 
@@ -117,12 +117,12 @@ class LookAheadStage(wiring.Component):
 
     def _passed(self, m: Module, value: Value, name: str, clocks: int, *, resets: bool = False) -> list[Value]:
         """Return a value, and what it was up to so many clocks of the pipeline ago."""
-        found = [value]
+        delayed_by = [value]
         for k in range(1, clocks + 1):
-            found.append(Signal(value.shape(), name=f"{name}{k}", reset_less=not resets))
+            delayed_by.append(Signal(value.shape(), name=f"{name}{k}", reset_less=not resets))
             with m.If(self.advance):
-                m.d.sync += found[k].eq(found[k - 1])
-        return found
+                m.d.sync += delayed_by[k].eq(delayed_by[k - 1])
+        return delayed_by
 
     def _connect_memories(self, m: Module, logic: PipelinedLogic, valid: list[Value]) -> None:
         """Give each state of a loop a memory with one word for each turn."""

@@ -170,9 +170,9 @@ class PipelinedStage(wiring.Component):
         saturated = iter(self.o_saturated)
         for k, i in enumerate(graph.outputs):
             output = getattr(self, f"o{k}")
-            held = _held(graph, i, wires) if stages[i] == last else None
-            if held is not None:
-                m.d.comb += output.eq(held)
+            state = _held(graph, i, wires) if stages[i] == last else None
+            if state is not None:
+                m.d.comb += output.eq(state)
             else:
                 register = Signal(shape_of(graph.nodes[i]), name=f"{names[i]}_register", reset_less=True)
                 m.d.comb += output.eq(register)

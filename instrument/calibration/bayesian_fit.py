@@ -1,15 +1,14 @@
 """Calibration by the mixed-effects model: for one day, with what is known of the sensor's type.
 
 Unlike the paper's rule, it knows that a sensor is one of a type, that it drifts, that a day has an error of its own,
-and how large these are compared with the scatter of a measurement. It ends in a polynomial of the type curve's orders,
-like the paper's.
+and how large these are compared with the scatter of a measurement. It ends in a polynomial, like the paper's: of the
+type curve's orders, or of as high an order in the voltage as the type allows and the day's own curve needs.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from fractions import Fraction
 from functools import cached_property
 
 import numpy as np
@@ -27,9 +26,9 @@ from sosmith.gen.calibration.fit import (
     root_mean_square,
     untold,
 )
-from sosmith.gen.calibration.least_squares import Sums
 from sosmith.instrument.calibration.acceptance import Range
 from sosmith.instrument.calibration.covered_region import CoveredRegion
+from sosmith.instrument.calibration.mixed_effects.day_polynomial import polynomial_of, terms_up_to
 from sosmith.instrument.calibration.mixed_effects.doubts import doubts_of
 from sosmith.instrument.calibration.mixed_effects.model import (
     NONE,
@@ -44,29 +43,16 @@ from sosmith.instrument.calibration.mixed_effects.model import (
 )
 from sosmith.instrument.calibration.mixed_effects.systematic_error import SystematicCurves
 from sosmith.instrument.calibration.rails import Rails, rails_of
-from sosmith.instrument.calibration.sensor_type import DEVIATIONS, SYSTEMATIC_FACTOR, TERMS, SensorType
+from sosmith.instrument.calibration.sensor_type import DEVIATIONS, SYSTEMATIC_FACTOR, SensorType
 from sosmith.model.arrays import Values
 from sosmith.model.errors import SpecificationError
 from sosmith.model.polynomial import Polynomial
-
-ORDERS = (2, 1)
-"""Orders of the polynomial: those of the type curve."""
 
 REJECTED = 3.5
 """Residual, in standard deviations estimated from the median magnitude, above which a measurement is left out."""
 
 MAX_ROUNDS = 10
 """Limit on rounds of rejection. Two or three are usual."""
-
-PROJECTED = (33, 9)
-"""Voltages and temperatures at which the day's curve is fitted by a polynomial."""
-
-BESIDE = 10.0
-"""Where all measurements are of one temperature, the polynomial holds so many kelvins about it as well: there the type
-says how the curve goes on."""
-
-SMALLEST = 1.0
-"""Clearance in mm below which the projection weights errors equally; above it, relative to the clearance."""
 
 SURPRISING, SYSTEMATIC_SURPRISING = 4.0, 2.0
 """Deviations beyond this many tolerances, and systematic errors beyond this many standard deviations, are told."""
@@ -115,7 +101,7 @@ class BayesianFit:
     @cached_property
     def doubts(self) -> tuple[str, ...]:
         """Sentences about what explains the measurements far better than the type's errors of a day do."""
-        return doubts_of(self.model, self.posterior.curves, self.clearance, self.given)
+        return doubts_of(self.model, self.posterior.curves, self.clearance, self.given, of_day=not self.plain)
 
     @property
     def given(self) -> Values:
@@ -215,7 +201,7 @@ def bayesian_fit(
     posterior = model.posterior(model.scatters(), curves, max(date, rows.days[-1]))
     usable = _without_rails(measurements, rails, ranges[1])
     region = CoveredRegion.of(usable.voltage, usable.temperature)
-    polynomial, plain = _polynomial(posterior, usable, region, ranges)
+    polynomial, plain = polynomial_of(posterior, usable, region, ranges)
     given = np.empty(len(d))
     given[order] = weights
     fit = _as_fit(measurements, polynomial, usable.covered, given)
@@ -251,71 +237,13 @@ def _rejecting(
     return model, model.weighed(SCATTERS, ratios), weights
 
 
-def _polynomial(
-    posterior: Posterior, measurements: Measurements, region: CoveredRegion, ranges: tuple[Range, Range, Range]
-) -> tuple[Polynomial, bool]:
-    """Return the polynomial, and whether the day's own curve is left out of it."""
-    if posterior.same_day:
-        own = _projected(posterior, measurements, ranges)
-        if stays_within(own, ranges) and lowest_slope(own, region) > 0:
-            return own, False
-    plain = posterior.sensor_type.polynomial(posterior.deviations)
-    slope = lowest_slope(plain, region)
-    if not slope > 0:
-        raise SpecificationError(
-            f"{measurements.source}: the clearance must rise with voltage_V over all measurements, "
-            f"not with a slope of {float(slope):.3g} mm/V somewhere"
-        )
-    return plain, True
-
-
-def _projected(posterior: Posterior, measurements: Measurements, ranges: tuple[Range, Range, Range]) -> Polynomial:
-    """Return the polynomial nearest to the day's curve over the voltages of the port and the measured temperatures."""
-    voltages, temperatures = (
-        np.linspace(low, high, count)
-        for (low, high), count in zip((ranges[1], temperatures_about(measurements)), PROJECTED, strict=True)
-    )
-    V, T = (grid.ravel() for grid in np.meshgrid(voltages, temperatures))
-    curve = posterior.curve(V, T)
-    weights = 1.0 / np.maximum(curve, SMALLEST) ** 2
-    solution = Sums(curve, V, T, weights).solve(TERMS)
-    assert solution is not None, "a grid determines the terms"
-    return solution.polynomial
-
-
-def temperatures_about(measurements: Measurements) -> Range:
-    """Return the measured temperatures, or those `BESIDE` the only one."""
-    low, high = measurements.covered[1]
-    return (low, high) if low < high else (low - BESIDE, high + BESIDE)
-
-
-def stays_within(polynomial: Polynomial, ranges: tuple[Range, Range, Range]) -> bool:
-    """Whether a polynomial of `ORDERS` stays in the range of clearance at all voltages and temperatures; exact."""
-    clearance, (v_low, v_high), temperatures = ((Fraction(low), Fraction(high)) for low, high in ranges)
-    for T in temperatures:
-        c, b, a = (sum(value * T**j for j, value in enumerate(row)) for row in polynomial.coefficients)
-        turns = [-b / (2 * a)] if a else []
-        at = [v_low, v_high, *(v for v in turns if v_low < v < v_high)]
-        if not all(clearance[0] <= (a * v + b) * v + c <= clearance[1] for v in at):
-            return False
-    return True
-
-
-def lowest_slope(polynomial: Polynomial, region: CoveredRegion) -> Fraction:
-    """Return the lowest slope in mm/V of a polynomial of `ORDERS` over a region; exact.
-
-    The slope is linear in voltage and temperature, so that it is lowest at a corner.
-    """
-    _, (b, b_t), (a,) = polynomial.coefficients
-    return min(b + b_t * Fraction(T) + 2 * a * Fraction(v) for v, T in region.corners)
-
-
 def _as_fit(measurements: Measurements, polynomial: Polynomial, covered: tuple[Range, Range], weights: Values) -> Fit:
     residual = residuals(measurements, polynomial)
     count, d = math.fsum(weights), measurements.clearance
     off = d - math.fsum(weights * d) / count
-    unexplained = math.fsum(weights * residual**2) / max(count - len(TERMS), 1.0)
+    terms = len(terms_up_to(polynomial.orders[0]))
+    unexplained = math.fsum(weights * residual**2) / max(count - terms, 1.0)
     adjusted = 1.0 - unexplained / (math.fsum(weights * off**2) / (count - 1.0))
-    trial = Trial(ORDERS, len(TERMS), adjusted)
+    trial = Trial(polynomial.orders, terms, adjusted)
     given = tuple(weights.tolist())
     return Fit(polynomial, trial, root_mean_square(residual), (), covered, given)

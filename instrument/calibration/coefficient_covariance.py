@@ -10,8 +10,9 @@ import numpy as np
 
 from sosmith.gen.calibration.fit import Fit, Measurements, residuals, terms_of
 from sosmith.gen.calibration.least_squares import Sums
-from sosmith.instrument.calibration.bayesian_fit import BESIDE, BayesianFit
+from sosmith.instrument.calibration.bayesian_fit import BayesianFit
 from sosmith.instrument.calibration.lack_of_fit import lack_of_fit
+from sosmith.instrument.calibration.mixed_effects.day_polynomial import BESIDE
 from sosmith.model.arrays import Values
 
 EVERY = 16

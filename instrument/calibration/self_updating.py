@@ -28,7 +28,6 @@ from sosmith.instrument.calibration.fit_quality import FitQuality, assess, asses
 from sosmith.instrument.calibration.health.monitoring import Health, health_of
 from sosmith.instrument.calibration.measurement_store import (
     MeasurementStore,
-    Source,
     StoredMeasurement,
     Version,
     as_measurements,
@@ -248,8 +247,8 @@ def add(
         shift = shift_from(versions[-1], known, added) if versions and len(known) else None
         health = health_for(store, sensor)
         try:
-            settings = _Settings(method, required_r, robust, accept, kind)
-            return Addition(file, True, _fit(store, sensor, date, settings, progress), "", shift, health)
+            settings = Settings(method, required_r, robust, accept, kind)
+            return Addition(file, True, fit_version(store, sensor, date, settings, progress), "", shift, health)
         except SpecificationError as error:
             return Addition(file, True, None, str(error), shift, health)
 
@@ -304,99 +303,10 @@ def refit(
         if sensor_type is not None:
             store.set_sensor_type(sensor, sensor_type)
         try:
-            settings = _Settings(method, required_r, robust, accept, store.sensor_type(sensor))
-            return _fit(store, sensor, date, settings, progress)
+            settings = Settings(method, required_r, robust, accept, store.sensor_type(sensor))
+            return fit_version(store, sensor, date, settings, progress)
         except SpecificationError as error:
             raise ShortfallError(str(error)) from None
-
-
-@dataclass(frozen=True)
-class Withdrawn:
-    """Result of withdrawing a file.
-
-    Attributes
-    ----------
-    source : Source
-        The file, with its withdrawal.
-    calibration : Calibration or None
-        The version without it, fitted as the newest one was; None if there was none, or no polynomial is good enough.
-    shortfall : str
-        Reason why there is no version now; empty otherwise.
-    """
-
-    source: Source
-    calibration: Calibration | None
-    shortfall: str
-
-
-def withdraw(
-    store: MeasurementStore,
-    sensor: str,
-    name: str,
-    date: str,
-    author: str,
-    reason: str,
-    progress: Progress = untold,
-) -> Withdrawn:
-    """Withdraw a file: its measurements stay in the store and count no more. Fit again, in one transaction.
-
-    Parameters
-    ----------
-    name : str
-        Number or name of the file, as `MeasurementStore.sources` has them.
-    date, author, reason : str
-        Of the withdrawal; the date is that of the new version, too.
-
-    Raises
-    ------
-    SpecificationError
-        If the sensor is unknown; if no file of it that counts has that number or name, or several do; if author or
-        reason is no printable text.
-    """
-    for what, text in (("author", author), ("reason", reason)):
-        if not text.strip() or not text.isprintable():
-            raise SpecificationError(f"the {what} must be printable text, not {text!r}")
-    with store.transaction():
-        known_sensor(store, sensor)
-        source = _counted_source(store, sensor, name)
-        store.withdraw(source.number, date, author, reason)
-        source = next(one for one in store.sources(sensor) if one.number == source.number)
-        versions = store.versions(sensor)
-        try:
-            settings = _settings_of(versions[-1]) if versions else _Settings("bayes", 0.0, False, None, None)
-            settings = replace(settings, sensor_type=store.sensor_type(sensor))
-            return Withdrawn(source, _fit(store, sensor, date, settings, progress), "")
-        except SpecificationError as error:
-            return Withdrawn(source, None, str(error))
-
-
-def sources_of(store: MeasurementStore, sensor: str) -> list[Source]:
-    """Return the files of a sensor; raises SpecificationError if there is no such sensor."""
-    known_sensor(store, sensor)
-    return store.sources(sensor)
-
-
-def _counted_source(store: MeasurementStore, sensor: str, name: str) -> Source:
-    """Return the file of that number or name that was not withdrawn."""
-    sources = store.sources(sensor)
-    found = [one for one in sources if name in (str(one.number), one.name)]
-    if not found:
-        raise SpecificationError(
-            f"{store.path}: the file must be one of {', '.join(one.name for one in sources)}, or its number, not {name}"
-        )
-    counted = [one for one in found if one.withdrawal is None]
-    if not counted:
-        gone = found[-1].withdrawal
-        assert gone is not None, "it does not count"
-        raise SpecificationError(
-            f"{name} must be a file that counts, not one that {gone.author} withdrew on {gone.date}"
-        )
-    if len(counted) > 1:
-        numbers = ", ".join(str(one.number) for one in counted)
-        raise SpecificationError(
-            f"{name} must be given by its number, one of {numbers}, not by a name that is there twice"
-        )
-    return counted[0]
 
 
 def find_version(store: MeasurementStore, sensor: str, number: int | None = None) -> Version:
@@ -431,7 +341,7 @@ def calibration_of(store: MeasurementStore, sensor: str, number: int | None = No
     version = find_version(store, sensor, number)
     stored = store.measurements(sensor, version.last_measurement, version.last_withdrawal)
     try:
-        settings = _settings_of(version)
+        settings = settings_of(version)
         again = _calibration(store, sensor, stored, version.date, settings, version)
     except SpecificationError as error:
         raise ShortfallError(
@@ -452,6 +362,7 @@ def advice_for(
     temperatures: tuple[float, ...],
     within: float,
     most: int,
+    uncertainty: float = 0.0,
 ) -> Advice:
     """Return what to measure on `date`, a day after the last measurement; see `advise`.
 
@@ -475,7 +386,16 @@ def advice_for(
     made = bayesian_fit(measurements, store.sensor_type(sensor), day, ranges)
     low, high = measurements.covered[1]
     usual = (low, (low + high) / 2, high)
-    return advise(made, ranges, clearances, temperatures or usual, within=within, days=day - last, most=most)
+    return advise(
+        made,
+        ranges,
+        clearances,
+        temperatures or usual,
+        within=within,
+        days=day - last,
+        most=most,
+        uncertainty=uncertainty,
+    )
 
 
 def health_for(store: MeasurementStore, sensor: str, since: str | None = None) -> Health:
@@ -544,7 +464,7 @@ def _sift(store: MeasurementStore, sensor: str, file: MeasurementFile) -> Measur
 
 
 @dataclass(frozen=True)
-class _Settings:
+class Settings:
     """How to fit: the parameters of `add`."""
 
     method: Method
@@ -554,11 +474,19 @@ class _Settings:
     sensor_type: SensorType | None
 
 
-def _settings_of(version: Version) -> _Settings:
-    return _Settings(version.method, version.required_r, version.robust, version.accept, version.sensor_type)
+def settings_of(version: Version) -> Settings:
+    """Return how a version was fitted."""
+    return Settings(version.method, version.required_r, version.robust, version.accept, version.sensor_type)
 
 
-def _fit(store: MeasurementStore, sensor: str, date: str, settings: _Settings, progress: Progress) -> Calibration:
+def fit_version(store: MeasurementStore, sensor: str, date: str, settings: Settings, progress: Progress) -> Calibration:
+    """Fit to all measurements of a sensor; a new version is stored if something has changed.
+
+    Raises
+    ------
+    SpecificationError
+        If none counts, or no polynomial is good enough.
+    """
     versions = store.versions(sensor)
     stored = store.measurements(sensor)
     if not stored:
@@ -581,7 +509,7 @@ def _calibration(
     sensor: str,
     stored: Sequence[StoredMeasurement],
     date: str,
-    settings: _Settings,
+    settings: Settings,
     again: Version | None,
     progress: Progress = untold,
 ) -> Calibration:

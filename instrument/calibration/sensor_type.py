@@ -19,6 +19,9 @@ TERMS = ((0, 0), (1, 0), (0, 1), (1, 1), (2, 0))
 DEVIATIONS = ("offset", "gain", "offset over temperature", "gain over temperature", "curvature")
 """Names of the deviations from a type curve, in their order."""
 
+LEAST_ORDER, MOST_ORDER = 2, 8
+"""Orders in the voltage of a type curve, and of the polynomial of a day at most."""
+
 REFERENCE_VOLTAGE, REFERENCE_TEMPERATURE = 5.0, 20.0
 """Middle of the voltage's range in V, where the slope is taken, and reference temperature in degC."""
 
@@ -52,6 +55,9 @@ class SensorType:
         uncertain by `SYSTEMATIC_FACTOR`; the measurements of several days decide.
     correlation : float
         Correlation length in mm of that error.
+    order : int
+        Highest order in the voltage of the polynomial of a day with measurements of its own, `LEAST_ORDER` to
+        `MOST_ORDER`. The hardware must have room for it.
     """
 
     name: str
@@ -65,13 +71,16 @@ class SensorType:
     gain_drift: float = 0.001
     systematic: float = 0.1
     correlation: float = 2.0
+    order: int = LEAST_ORDER
 
     def __post_init__(self) -> None:
-        for field in fields(self)[2:]:
+        for field in fields(self)[2:-1]:
             value = getattr(self, field.name)
             least = 0.0 if field.name.endswith("_drift") else 1e-6
             if not least <= value <= 1e3:
                 raise SpecificationError(f"{field.name} must be {least:g} to 1000, not {value:g}")
+        if not LEAST_ORDER <= self.order <= MOST_ORDER:
+            raise SpecificationError(f"order must be {LEAST_ORDER} to {MOST_ORDER}, not {self.order}")
         if len(self.curve) != len(TERMS) or not all(map(math.isfinite, self.curve)):
             raise SpecificationError(f"curve must be {len(TERMS)} finite numbers, not {list(self.curve)}")
         if not self.slope > 0:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from pydantic import Field
 
-from sosmith.instrument.calibration.sensor_type import SENSOR_TYPES, SensorType
+from sosmith.instrument.calibration.sensor_type import LEAST_ORDER, MOST_ORDER, SENSOR_TYPES, SensorType
 from sosmith.model.errors import SpecificationError
 from sosmith.model.tables.csv_table import shortened
 from sosmith.model.tables.toml_tables import Table, read_tables
@@ -30,6 +30,13 @@ class _Tolerances(Table):
     gain_drift: float = Field(SensorType.gain_drift, ge=0, le=1000, description="a number from 0 to 1000")
     systematic: float = Field(SensorType.systematic, ge=1e-6, le=1000, description="a number of mm from 1e-6 to 1000")
     correlation: float = Field(SensorType.correlation, ge=0.1, le=1000, description="a number of mm from 0.1 to 1000")
+    order: int = Field(
+        SensorType.order,
+        ge=LEAST_ORDER,
+        le=MOST_ORDER,
+        strict=True,
+        description=f"a whole number from {LEAST_ORDER} to {MOST_ORDER}",
+    )
 
 
 def sensor_type_named(name: str) -> SensorType:

@@ -8,6 +8,7 @@ import numpy as np
 
 from sosmith.gen.facts.table import Table
 from sosmith.instrument.paper.comparison import Comparison
+from sosmith.instrument.vehicle.limits import QUOTIENT
 from sosmith.instrument.vehicle.linear_motion import Mode
 from sosmith.instrument.vehicle.vehicle_report import VehicleRun, acceleration, largest
 
@@ -28,6 +29,11 @@ def limits_table(made: VehicleRun) -> Table:
         ("flange force, kN", *(f"{1e-3 * force:.1f}" for force in limits.flange_force)),
         ("creep force / friction", *(f"{used:.3f}" for used in limits.friction_used)),
         (f"Y/Q, climbs at {limits.nadal:.2f}", *(f"{ratio:.3f}" for ratio in limits.derailment_quotient)),
+        (f"Y/Q over 2 m, limit {QUOTIENT:g}", *(f"{ratio:.3f}" for ratio in limits.sliding_quotient)),
+        (
+            f"sum of Y over 2 m, kN, limit {1e-3 * limits.prudhomme:.0f}",
+            *(f"{1e-3 * force:.1f}" for force in limits.guiding_sum),
+        ),
         ("least load / static", *(f"{share:.3f}" for share in limits.load_share)),
         ("change of clearance, mm", *(f"{most[f'clearance{k}_mm']:.2f}" for k in _WHEELSETS)),
     ]

@@ -118,7 +118,7 @@ class ChosenTraces:
     def _is_file(self) -> bool:
         return self.source is not None and self.source not in SCENARIOS
 
-    def told(self) -> list[str]:
+    def identity(self) -> list[str]:
         """Return what tells these traces from others: nothing by default, a name, or the digest of a file.
 
         Raises

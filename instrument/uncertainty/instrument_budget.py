@@ -165,6 +165,11 @@ class Instrument:
             standard=float(found.combined[worst]), freedom=float(found.freedom[worst]), rise=rise
         )
 
+    def shared(self, clearance: float) -> float:
+        """Return the standard uncertainty that all readings share at a clearance: that of the coefficients."""
+        x = self.known.columns(*self.at_clearance(clearance))
+        return float(np.sqrt(np.max(np.sum(x * (self.known.covariance @ x), axis=0))))
+
 
 def _of_motion(instrument: Instrument, ideal: Filter, stated: UncertaintySpec, one: Values) -> list[Contribution]:
     found, pre_stage, unit = [], instrument.pre_stage, instrument.spec.output.unit

@@ -12,6 +12,15 @@ from sosmith.instrument.vehicle.motion import Motion
 from sosmith.instrument.vehicle.parameters import Parameters
 from sosmith.instrument.vehicle.track import Track
 
+SLIDING = 2.0
+"""Length in m over which EN 14363 averages guiding forces and Y/Q: a shorter peak moves no track and climbs no rail."""
+
+QUOTIENT = 0.8
+"""Limit of EN 14363 (from memory) for the average of Y/Q over `SLIDING`."""
+
+TRACK_RESISTANCE, OF_LOAD = 10e3, 1 / 3
+"""Force in N and share of the load of a wheelset that the track resists sideways (Prud'homme; from memory)."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Limits:
@@ -35,6 +44,12 @@ class Limits:
         Largest Y/Q of both wheels.
     nadal : float
         Y/Q at which the flange would begin to climb.
+    sliding_quotient : ndarray, shape (6,)
+        Largest average of Y/Q over `SLIDING` of both wheels, to be held against `QUOTIENT`.
+    guiding_sum : ndarray, shape (6,)
+        Largest average over `SLIDING` of the force in N with which both wheels push the track to one side.
+    prudhomme : float
+        Such a force in N that shifts the track.
     load_share : ndarray, shape (6,)
         Smallest load of both wheels over their static load.
     """
@@ -47,6 +62,9 @@ class Limits:
     sliding_share: Array
     derailment_quotient: Array
     nadal: float
+    sliding_quotient: Array
+    guiding_sum: Array
+    prudhomme: float
     load_share: Array
 
     @property
@@ -75,13 +93,41 @@ def nadal_limit(tangent: float, friction: float) -> float:
     return (tangent - friction) / (1 + friction * tangent)
 
 
+def prudhomme_limit(load: float) -> float:
+    """Return the force in N on the track by one wheelset that shifts it: 10 kN + 2 Q0 / 3 (EN 14363, k1 = 1).
+
+    Parameters
+    ----------
+    load : float
+        Static load 2 Q0 of the wheelset in N.
+
+    Examples
+    --------
+    >>> round(prudhomme_limit(225e3))
+    85000
+    """
+    return TRACK_RESISTANCE + OF_LOAD * load
+
+
+def sliding_mean(values: Array, distance: Array) -> Array:
+    """Return the means of `values`, shape (n, ...), over `SLIDING` of the `distance` in m, shape (n,), which is even.
+
+    A shorter record has one mean.
+    """
+    step = float(distance[-1] - distance[0]) / max(len(distance) - 1, 1)
+    count = min(max(round(SLIDING / step), 1) if step > 0 else 1, len(values))
+    total = np.cumsum(np.concatenate((np.zeros_like(values[:1]), values)), axis=0)
+    return np.asarray((total[count:] - total[:-count]) / count)
+
+
 def limits(parameters: Parameters, track: Track, motion: Motion) -> Limits:
     """Hold a run against flange clearance, friction, Nadal's limit and the static load of the wheels."""
     ahead = wheelset_positions(parameters.layout)
     place = motion.distance[:, np.newaxis] + ahead - ahead[0]
     room = parameters.sensor.flange_clearance + track.widening_at(place) / 2
     beyond = np.abs(motion.lateral_to_rails) - room
-    used = motion.friction_used
+    used, load = motion.friction_used, wheelset_load(parameters)
+    pushed = sliding_mean(motion.guiding_force[:, :, 1] - motion.guiding_force[:, :, 0], motion.distance)
     return Limits(
         beyond_flange=beyond.max(axis=0),
         beyond_flange_share=(beyond > 0).mean(axis=0),
@@ -91,5 +137,8 @@ def limits(parameters: Parameters, track: Track, motion: Motion) -> Limits:
         sliding_share=(used >= 1).mean(axis=0),
         derailment_quotient=motion.derailment_quotient.max(axis=0),
         nadal=nadal_limit(1 / parameters.sensor.flank_slope, parameters.contact.friction),
-        load_share=motion.wheel_load.min(axis=(0, 2)) / (wheelset_load(parameters) / 2),
+        sliding_quotient=sliding_mean(motion.guiding_force / motion.wheel_load, motion.distance).max(axis=(0, 2)),
+        guiding_sum=np.abs(pushed).max(axis=0),
+        prudhomme=prudhomme_limit(load),
+        load_share=motion.wheel_load.min(axis=(0, 2)) / (load / 2),
     )

@@ -10,7 +10,7 @@ import numpy as np
 
 from sosmith.instrument.vehicle.choices import TRACK_NAMES
 from sosmith.instrument.vehicle.lateral import lateral_dynamics
-from sosmith.instrument.vehicle.limits import Limits, limits
+from sosmith.instrument.vehicle.limits import QUOTIENT, Limits, limits
 from sosmith.instrument.vehicle.linear_motion import Mode
 from sosmith.instrument.vehicle.motion import Motion
 from sosmith.instrument.vehicle.parameters import Parameters
@@ -121,11 +121,15 @@ def vehicle_json(made: VehicleRun) -> dict[str, Any]:
                 "friction_exceeded_share": float(found.friction_exceeded_share[k]),
                 "sliding_share": float(found.sliding_share[k]),
                 "derailment_quotient": float(found.derailment_quotient[k]),
+                "derailment_quotient_over_2_m": float(found.sliding_quotient[k]),
+                "guiding_sum_over_2_m_kN": 1e-3 * float(found.guiding_sum[k]),
                 "load_share": float(found.load_share[k]),
             }
             for k in range(6)
         ],
         "nadal_limit": found.nadal,
+        "quotient_limit_over_2_m": QUOTIENT,
+        "prudhomme_limit_kN": 1e-3 * found.prudhomme,
         "within_limits": found.kept,
     }
 

@@ -103,9 +103,9 @@ def _taken_through(sections: Array, values: Array, states: Array | None) -> Arra
 
 @cache
 def _recursion() -> Callable[[Array, Array, Array], Array]:
-    found: Callable[[Array, Array, Array], Array] | None = _compiled("_sigtools", "_linear_filter")
-    if found is not None:
-        return found
+    compiled: Callable[[Array, Array, Array], Array] | None = _compiled("_sigtools", "_linear_filter")
+    if compiled is not None:
+        return compiled
     from scipy import signal  # noqa: PLC0415
 
     return lambda b, a, x: np.asarray(signal.lfilter(b, a, x))
@@ -114,9 +114,9 @@ def _recursion() -> Callable[[Array, Array, Array], Array]:
 @cache
 def _cascade() -> Callable[[Array, Array, Array], None]:
     """Return what filters the rows of its second argument in their place."""
-    found: Callable[[Array, Array, Array], None] | None = _compiled("_sosfilt", "_sosfilt")
-    if found is not None:
-        return found
+    compiled: Callable[[Array, Array, Array], None] | None = _compiled("_sosfilt", "_sosfilt")
+    if compiled is not None:
+        return compiled
     from scipy import signal  # noqa: PLC0415
 
     def through(sos: Array, rows: Array, states: Array) -> None:
@@ -134,9 +134,9 @@ def _compiled(module: str, function: str) -> Any:
         spec = PathFinder.find_spec(name, [f"{place}/signal" for place in places])
         if spec is None or spec.loader is None:
             return None
-        sys.modules[name] = made = module_from_spec(spec)  # an import of scipy.signal finds it there
+        sys.modules[name] = loaded = module_from_spec(spec)  # an import of scipy.signal finds it there
         try:
-            spec.loader.exec_module(made)
+            spec.loader.exec_module(loaded)
         except ImportError:
             del sys.modules[name]
     return getattr(sys.modules.get(name), function, None)

@@ -68,13 +68,13 @@ class I2sFrame:
         SpecificationError
             If no sample rate within `TOLERANCE` can be made that all converters allow.
         """
-        made = [
+        frames = [
             cls(clocks=2 * ratio * multiple, ratio=ratio)
             for ratio in _RATIOS
             for multiple in _MULTIPLES
             if all(device.allows(ratio, clock / (2 * ratio * multiple)) for device in devices)
         ]
-        best = min(made, key=lambda frame: (abs(frame.deviation(clock, sample_rate)), frame.ratio), default=None)
+        best = min(frames, key=lambda frame: (abs(frame.deviation(clock, sample_rate)), frame.ratio), default=None)
         if best is None or abs(best.deviation(clock, sample_rate)) > TOLERANCE:
             names = " and ".join(sorted({device.title for device in devices}))
             nearest = "none" if best is None else f"{float(clock / best.clocks):,.7g} Hz is the nearest"

@@ -100,15 +100,15 @@ class Reading:
         if device.signed and reading >> (device.width - 1):
             reading -= 1 << device.width
         code = self.offset + self.gain * reading
-        found = []
+        faults = []
         if device.summary is not None:
-            found = [fault for bit, fault in enumerate(THERMOCOUPLE_FAULTS) if frame >> bit & 1]
-        unexplained = device.summary is not None and frame >> device.summary & 1 and not found
+            faults = [fault for bit, fault in enumerate(THERMOCOUPLE_FAULTS) if frame >> bit & 1]
+        unexplained = device.summary is not None and frame >> device.summary & 1 and not faults
         if unexplained or any(frame >> bit & 1 for bit in device.zeros):
-            found.append(ReadingFault.FRAME)
+            faults.append(ReadingFault.FRAME)
         if not self.port.lowest <= code <= self.port.highest:
-            found.append(ReadingFault.RANGE)
-        return (None if found else code), tuple(found)
+            faults.append(ReadingFault.RANGE)
+        return (None if faults else code), tuple(faults)
 
     def frames(self, codes: Codes) -> Codes:
         """Return the frames of a converter whose input has the values of codes of the port.

@@ -107,7 +107,7 @@ class Schedule:
         frame = I2sFrame.of(audio, clock=clock, sample_rate=sample_rate) if audio else None
         dac = None if writing is None else writing.converter
         spi = [timing for timing in timings if timing is not None]
-        made = cls(
+        schedule = cls(
             readings=readings,
             channels=channels,
             period=Fraction(frame.clocks) if frame is not None else clock / sample_rate,
@@ -121,24 +121,24 @@ class Schedule:
             dac_half=_half(clock, dac.timing) if isinstance(dac, SpiDac) else 1,
             dac_deselect=max(1, ceil(clock * dac.timing.deselect)) if isinstance(dac, SpiDac) else 1,
         )
-        busy = made.clocks / clock  # no converter has its CS low for longer
+        busy = schedule.clocks / clock  # no converter has its CS low for longer
         intervals = tuple(
             1 + floor(sample_rate * (timing.conversion + busy)) if timing is not None and timing.conversion else 1
             for timing in timings
         )
-        sent = channels * made.dac_clocks
-        if sent > floor(made.period):
+        sent = channels * schedule.dac_clocks
+        if sent > floor(schedule.period):
             raise SpecificationError(
                 f"the sample rate must be at most {float(clock / sent):,.0f} Hz with these DACs at a clock of "
                 f"{float(clock):,.0f} Hz, not {float(sample_rate):,.0f} Hz"
             )
-        taken = made.clocks + channels * (latency + SAMPLE_OVERHEAD)
-        if taken > floor(made.period):
+        taken = schedule.clocks + channels * (latency + SAMPLE_OVERHEAD)
+        if taken > floor(schedule.period):
             raise SpecificationError(
                 f"the sample rate must be at most {float(clock / taken):,.0f} Hz with these converters at a clock of "
                 f"{float(clock):,.0f} Hz, not {float(sample_rate):,.0f} Hz"
             )
-        return replace(made, intervals=intervals)
+        return replace(schedule, intervals=intervals)
 
     @property
     def selects(self) -> tuple[int, ...]:

@@ -65,7 +65,7 @@ class _Split(NamedTuple):
     subtract: bool
 
 
-class _Made(NamedTuple):
+class _Solution(NamedTuple):
     """Adder bits that a number takes, and the split of every sum among them, simpler ones first."""
 
     bits: int
@@ -108,8 +108,8 @@ def adder_graph(constants: tuple[int, ...]) -> tuple[Adder, ...]:
     while wanted:
         search = _Search(levels)
         simplest = sorted(wanted, key=lambda number: (len(signed_digits(number)), _by_size(number)))[:_COMPARED]
-        found = [search.cheapest(number, _most_levels(number)) for number in sorted(simplest, key=_by_size)]
-        for number, split in min(found, key=lambda made: made.bits).splits.items():
+        candidates = [search.cheapest(number, _most_levels(number)) for number in sorted(simplest, key=_by_size)]
+        for number, split in min(candidates, key=lambda candidate: candidate.bits).splits.items():
             levels[number] = 1 + max(levels[part] for part in split.parts)
             splits[number] = split
         wanted -= levels.keys()
@@ -160,24 +160,24 @@ class _Search:
 
     def __init__(self, there: Mapping[int, int]) -> None:
         self._there = dict(there)
-        self._known: dict[tuple[int, int], _Made | None] = {}
+        self._known: dict[tuple[int, int], _Solution | None] = {}
 
-    def cheapest(self, number: int, levels: int) -> _Made:
+    def cheapest(self, number: int, levels: int) -> _Solution:
         """Return what a number takes with so many levels of sums, which are enough."""
-        made = self._made(number, levels)
-        assert made is not None
-        return made
+        solution = self._solution(number, levels)
+        assert solution is not None
+        return solution
 
-    def _made(self, number: int, levels: int) -> _Made | None:
+    def _solution(self, number: int, levels: int) -> _Solution | None:
         if self._there.get(number, levels + 1) <= levels:
-            return _Made(0, {})
+            return _Solution(0, {})
         key = number, levels
         if key not in self._known:
             self._known[key] = self._taken_apart(number, levels) if levels else None
         return self._known[key]
 
-    def _taken_apart(self, number: int, levels: int) -> _Made | None:
-        best: _Made | None = None
+    def _taken_apart(self, number: int, levels: int) -> _Solution | None:
+        best: _Solution | None = None
         end = 1 << (_OPERAND_BITS - 1)
         for split in self._splits(number):
             bits = _bits(number, split.shifts, split.subtract, -end, end - 1)
@@ -185,13 +185,13 @@ class _Search:
                 continue
             splits: dict[int, _Split] = {}
             for part in dict.fromkeys(split.parts):
-                made = self._made(part, levels - 1)
-                if made is None or (best is not None and bits + made.bits >= best.bits):
+                solution = self._solution(part, levels - 1)
+                if solution is None or (best is not None and bits + solution.bits >= best.bits):
                     break
-                bits += made.bits
-                splits |= {made_of: of for made_of, of in made.splits.items() if made_of not in splits}
+                bits += solution.bits
+                splits |= {made_of: of for made_of, of in solution.splits.items() if made_of not in splits}
             else:
-                best = _Made(bits, {**splits, number: split})
+                best = _Solution(bits, {**splits, number: split})
         return best
 
     def _least(self, number: int) -> int:

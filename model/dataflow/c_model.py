@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from sosmith.model.dataflow.graph import Graph, Node, Op
 from sosmith.model.dataflow.status import Flag
-from sosmith.model.templates import render
+from sosmith.model.templates import in_comment, render
 
 if TYPE_CHECKING:
     from sosmith.model.dataflow.datapath import Datapath
@@ -46,8 +46,8 @@ def c_header(datapath: Datapath) -> str:
         __package__,
         "c_model.h.jinja",
         name=datapath.name,
-        ports=[_told(port) for port in (*datapath.inputs, datapath.output)],
-        ahead_ports=[] if whole.ahead is None else list(map(_told, whole.ahead.inputs)),
+        ports=[_description(port) for port in (*datapath.inputs, datapath.output)],
+        calibrated_ports=[] if whole.calibration is None else list(map(_description, whole.calibration.inputs)),
         taken=_parameters(whole),
         flags=[(f"{1 << flag:#04x}", flag.meaning) for flag in Flag],
         states=_states(datapath),
@@ -58,11 +58,11 @@ def c_header(datapath: Datapath) -> str:
     )
 
 
-def _told(port: Port) -> str:
+def _description(port: Port) -> str:
     """Say what the code of a port means."""
     return (
         f"{port.name}_code: {port.lowest} .. {port.highest}, value = {float(port.zero)!r} + "
-        f"{float(port.lsb)!r} * code {port.unit.replace('*/', '* /')}".rstrip()
+        f"{float(port.lsb)!r} * code {in_comment(port.unit)}".rstrip()
     )
 
 
@@ -104,12 +104,12 @@ def c_source(datapath: Datapath) -> str:
         rail=f"{1 << Flag.INPUT_AT_RAIL:#04x}",
         channel="channel, " if _takes_channel(datapath) else "",
         of_input=f"{1 << Flag.INPUT_AT_RAIL | 1 << Flag.OUTSIDE_CALIBRATION:#04x}",
-        ahead=None if whole.ahead is None else _ahead(whole.ahead),
+        calibration=None if whole.calibration is None else _calibration(whole.calibration),
         taken=_parameters(whole),
     )
 
 
-def _ahead(datapath: Datapath) -> dict[str, object]:
+def _calibration(datapath: Datapath) -> dict[str, object]:
     """Return what the text of a step of a datapath without memory takes, which stands before a decimator."""
     return {
         "wires": _wires(datapath),
@@ -157,10 +157,10 @@ def state_bytes(datapath: Datapath) -> int:
 def _bits(*ranges: Range) -> int:
     """Return the bits of the narrowest type that holds all values of all `ranges`."""
     width = max((signed_width(each.low, each.high) for each in ranges), default=1)
-    found = next((bits for bits in _TYPES if width <= bits), None)
-    if found is None:
+    narrowest = next((bits for bits in _TYPES if width <= bits), None)
+    if narrowest is None:
         raise ValueError(f"values of the C model must be at most {max(_TYPES)} bits wide, not {width}")
-    return found
+    return narrowest
 
 
 def _type(*ranges: Range) -> str:
@@ -266,7 +266,9 @@ def _status(datapath: Datapath) -> str:
     if node.op is Op.CLAMP:
         before = f"w.{_wire(len(datapath.stages) - 1, node.operands[0])}"
         conditions[Flag.OUTPUT_SATURATED] += [f"{before} < {_literal(node.low)}", f"{before} > {_literal(node.high)}"]
-    terms = [f"({' || '.join(found)}) << {flag.value}" for flag, found in conditions.items() if found]
+    terms = [
+        f"({' || '.join(alternatives)}) << {flag.value}" for flag, alternatives in conditions.items() if alternatives
+    ]
     settling = ""
     if datapath.settles:
         settling = f"w.{_wire(len(datapath.stages) - 1, last.outputs[1])} < 0"
@@ -299,18 +301,18 @@ def _expression(graph: Graph, node: Node, prefix: str) -> str:
     if node.op is Op.MULTIPLY:
         kind = _bits(*operands, *(_times(operands[0], end) for end in (operands[1].low, operands[1].high)))
         return _narrowed(node, kind, f"{_cast(kind, names[0], operands[0])} * {names[1]}")
-    held = _bits(*operands)
+    bits = _bits(*operands)
     if node.op is Op.FLOOR:
         # By one bit less than the word has at most, as C leaves more undefined; that is the sign already.
-        return _narrowed(node, held, f"{names[0]} >> {min(operands[0].frac - node.frac, held - 1)}")
+        return _narrowed(node, bits, f"{names[0]} >> {min(operands[0].frac - node.frac, bits - 1)}")
     if node.op is Op.TRUNCATE:  # as C99 divides
-        return _narrowed(node, held, f"{names[0]} / {_power(operands[0].frac - node.frac)}")
+        return _narrowed(node, bits, f"{names[0]} / {_power(operands[0].frac - node.frac)}")
     if node.op is Op.FRACTION:
-        return _narrowed(node, held, f"{names[0]} & {_literal((1 << operands[0].frac - node.parameter) - 1)}")
+        return _narrowed(node, bits, f"{names[0]} & {_literal((1 << operands[0].frac - node.parameter) - 1)}")
     if node.op is Op.CLAMP:
         low, high = _literal(node.low), _literal(node.high)
-        return _narrowed(node, held, f"{names[0]} < {low} ? {low} : {names[0]} > {high} ? {high} : {names[0]}")
-    return _narrowed(node, held, names[0])  # SHIFT and BOUND keep the code
+        return _narrowed(node, bits, f"{names[0]} < {low} ? {low} : {names[0]} > {high} ? {high} : {names[0]}")
+    return _narrowed(node, bits, names[0])  # SHIFT and BOUND keep the code
 
 
 def _times(values: Range, factor: int) -> _Span:

@@ -120,8 +120,8 @@ class Pushed:
     def __call__(self, codes: npt.NDArray[np.int64]) -> tuple[int, int] | None:
         """Take the codes of one sample, shape (inputs,); return output code and status if it brings a result."""
         result, status = ctypes.c_int64(), ctypes.c_uint8()
-        found = self._push(self._state.ctypes.data, *codes.tolist(), ctypes.byref(result), ctypes.byref(status))
-        return (result.value, status.value) if found else None
+        has_result = self._push(self._state.ctypes.data, *codes.tolist(), ctypes.byref(result), ctypes.byref(status))
+        return (result.value, status.value) if has_result else None
 
 
 class _Compiled:

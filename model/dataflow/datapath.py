@@ -23,7 +23,7 @@ from sosmith.model.port import Port
 _Kind = TypeVar("_Kind", bound=np.generic)
 
 _OF_INPUT = 1 << Flag.INPUT_AT_RAIL | 1 << Flag.OUTSIDE_CALIBRATION
-"""Flags that are told of the inputs."""
+"""Flags of the inputs."""
 
 
 class Stage(Protocol):
@@ -52,7 +52,7 @@ class Datapath:
         Name of the core.
     inputs : tuple of Port
         Input quantities, in the order of the first stage's inputs; with a decimator the one that it takes, or those of
-        what is ahead of it.
+        the calibration before it.
     output : Port
         Output quantity.
     stages : tuple of Stage
@@ -64,9 +64,9 @@ class Datapath:
         one for each; empty if wear is not judged.
     decimator : Decimator or None
         What stands before the first stage and hands on one sample out of several; None if all go in.
-    ahead : Datapath or None
-        What stands before the decimator, at the rate of the input: a calibration, whose output that takes. None if it
-        takes the input itself.
+    calibration : Datapath or None
+        What stands before the decimator, at the rate of the input, and whose output that takes. None if it takes the
+        input itself.
     """
 
     name: str
@@ -76,14 +76,14 @@ class Datapath:
     calibrated: tuple[tuple[int, int], ...] = ()
     wear: tuple[tuple[int, int], ...] = ()
     decimator: Decimator | None = None
-    ahead: Datapath | None = None
+    calibration: Datapath | None = None
 
     def __post_init__(self) -> None:
         if not self.calibrated:
             object.__setattr__(self, "calibrated", tuple((port.lowest, port.highest) for port in self.inputs))
         first, last = self.stages[0].graph, self.stages[-1].graph
-        if self.ahead is not None:
-            self._check_ahead(self.ahead)
+        if self.calibration is not None:
+            self._check_calibration(self.calibration)
         elif self.decimator is not None and self.inputs != (self.decimator.input,):
             raise ValueError(f"inputs must be what the decimator takes, {self.decimator.input}, not {self.inputs}")
         ports = [(port.lowest, port.highest) for port in self.entry]
@@ -104,16 +104,22 @@ class Datapath:
                     f"not {warning}, {critical}"
                 )
 
-    def _check_ahead(self, ahead: Datapath) -> None:
+    def _check_calibration(self, calibration: Datapath) -> None:
         if self.decimator is None:
-            raise ValueError("ahead must be left out where there is no decimator")
-        if ahead.output != self.decimator.input:
-            raise ValueError(f"ahead must give what the decimator takes, {self.decimator.input}, not {ahead.output}")
+            raise ValueError("calibration must be left out where there is no decimator")
+        if calibration.output != self.decimator.input:
+            raise ValueError(
+                f"calibration must give what the decimator takes, {self.decimator.input}, not {calibration.output}"
+            )
         taken = self.inputs, self.calibrated
-        if (ahead.inputs, ahead.calibrated) != taken:
-            raise ValueError(f"ahead must take the inputs, {taken}, not {(ahead.inputs, ahead.calibrated)}")
-        if ahead.decimator is not None or any(stage.graph.delays for stage in ahead.stages):
-            raise ValueError("ahead must be without memory, which one sample alone fills, and without a decimator")
+        if (calibration.inputs, calibration.calibrated) != taken:
+            raise ValueError(
+                f"calibration must take the inputs, {taken}, not {(calibration.inputs, calibration.calibrated)}"
+            )
+        if calibration.decimator is not None or any(stage.graph.delays for stage in calibration.stages):
+            raise ValueError(
+                "calibration must be without memory, which one sample alone fills, and without a decimator"
+            )
 
     @property
     def entry(self) -> tuple[Port, ...]:
@@ -125,7 +131,7 @@ class Datapath:
         """The datapath at the lower rate, without the decimator; itself if it has none."""
         if self.decimator is None:
             return self
-        return replace(self, inputs=self.entry, calibrated=(), decimator=None, ahead=None)
+        return replace(self, inputs=self.entry, calibrated=(), decimator=None, calibration=None)
 
     @property
     def result_range(self) -> tuple[int, int]:
@@ -137,8 +143,8 @@ class Datapath:
     @property
     def decimated_range(self) -> tuple[int, int]:
         """Lowest and highest code that the decimator can take, or the first input where there is none."""
-        if self.ahead is not None:
-            return self.ahead.result_range
+        if self.calibration is not None:
+            return self.calibration.result_range
         return self.inputs[0].lowest, self.inputs[0].highest
 
     def results(self, samples: int) -> int:
@@ -224,7 +230,11 @@ class Datapath:
         results = []
         taken = self._checked(codes)
         if self.decimator is not None:
-            column = taken[:, 0] if self.ahead is None else np.array(self.ahead.compute_exact(taken), dtype=np.int64)
+            column = (
+                taken[:, 0]
+                if self.calibration is None
+                else np.array(self.calibration.compute_exact(taken), dtype=np.int64)
+            )
             taken = self.decimator.compute(column)[:, np.newaxis]
         for sample in taken.tolist():
             wires = sample
@@ -235,8 +245,8 @@ class Datapath:
 
     def _flagged(self, block: Codes) -> tuple[Codes, npt.NDArray[np.uint8]]:
         """Codes that the decimator takes, and the flags of the inputs behind them; both (samples, channels)."""
-        if self.ahead is not None:
-            taken, flags = self.ahead.compute_with_status(block)
+        if self.calibration is not None:
+            taken, flags = self.calibration.compute_with_status(block)
             return taken, flags & np.uint8(_OF_INPUT)
         taken, port = block[:, :, 0], self.inputs[0]
         at_rail = (taken == port.lowest) | (taken == port.highest)
@@ -246,7 +256,7 @@ class Datapath:
         """Codes that the first stage takes, for input codes of shape (samples, channels, inputs)."""
         if self.decimator is None:
             return block
-        taken = block[:, :, 0] if self.ahead is None else self.ahead.compute(block)
+        taken = block[:, :, 0] if self.calibration is None else self.calibration.compute(block)
         return _in_columns(self.decimator.compute, taken)[:, :, np.newaxis]
 
     def _checked(self, codes: Codes) -> Codes:

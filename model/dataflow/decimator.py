@@ -204,7 +204,7 @@ class Decimator:
         if not len(flags):
             return flags
         last = np.arange(self.count(len(flags))) * self.factor
-        found: npt.NDArray[_Flags] = np.bitwise_or.reduceat(
+        flags_of_results: npt.NDArray[_Flags] = np.bitwise_or.reduceat(
             flags[: last[-1] + 1], np.maximum(last - self.factor + 1, 0)
         )
-        return found
+        return flags_of_results

@@ -34,15 +34,15 @@ As an example, ``y(n) = floor(3 / 4 y(n-1) + 4 x(n))`` with digits of 4 bits. x 
 >>> section = SimpleNamespace(name="section", graph=g.build([y]))
 >>> ports = [Port.from_range(name, bits, Fraction(-1), Fraction(1), signed=True) for name, bits in (("x", 4), ("y", 8))]
 >>> datapath = Datapath(name="example", inputs=(ports[0],), output=ports[1], stages=(section,))
->>> made = program(datapath, digit_bits=4)
->>> [(at.name, at.addresses) for at in made.locations]
+>>> folded = program(datapath, digit_bits=4)
+>>> [(at.name, at.addresses) for at in folded.locations]
 [('section.y1', (0, 1)), ('section.x', (2,)), ('section.y', (0, 1))]
 
 3 / 4 is 12 / 16: the products of y1 begin one column below y, which is dropped. 4 is 64 / 16, whose digits are 0 and 4:
 the product of x begins in the column of y's low digit. Nothing needs a digit of y1 any more when one of y is stored,
 which takes its word and becomes the next y1:
 
->>> for number, (opcode, address, constant, target) in enumerate(made.instructions):
+>>> for number, (opcode, address, constant, target) in enumerate(folded.instructions):
 ...     print(f"{number}  {opcode.mnemonic:8} {address}  {constant:2}  {target}")
 0  take     3   0  2
 1  drop     0  12  0
@@ -58,8 +58,8 @@ The instructions 5 and 6 add nothing: they keep 7 far enough from 3, which store
 
 Three samples, by the program and by the graph:
 
->>> words = made.reset()
->>> [made.step([code], words, [0]).code for code in (7, 7, -8)]
+>>> words = folded.reset()
+>>> [folded.step([code], words, [0]).code for code in (7, 7, -8)]
 [28, 49, 4]
 >>> datapath.compute_exact([[7], [7], [-8]])
 [28, 49, 4]
@@ -115,13 +115,13 @@ def program(datapath: Datapath, digit_bits: int, *, spare_words: int = 0, like: 
     least = 0 if like is None else like.words
     flat = _flattened(datapath)
     _share_delays(flat.nodes)
-    made = _Folding(flat, digit_bits, kept, datapath.calibrated).program(least, spare_words)
-    while not made.follows_itself:
-        made = made.with_wait()
+    folded = _Folding(flat, digit_bits, kept, datapath.calibrated).program(least, spare_words)
+    while not folded.follows_itself:
+        folded = folded.with_wait()
     if like is None:
-        return made
-    _check_can_take_over(made, like)
-    return replace(made, accumulator_bits=like.accumulator_bits)
+        return folded
+    _check_can_take_over(folded, like)
+    return replace(folded, accumulator_bits=like.accumulator_bits)
 
 
 def columns_of(graph: Graph, digit_bits: int) -> list[Column]:
@@ -143,7 +143,7 @@ def columns_of(graph: Graph, digit_bits: int) -> list[Column]:
     return _Folding(_Flat(nodes, list(graph.inputs), output), digit_bits, {}, ()).columns()
 
 
-def _check_can_take_over(made: Program, like: Program) -> None:
+def _check_can_take_over(new_program: Program, like: Program) -> None:
     """Check that states and ports are stored alike, and that the rest fits the hardware.
 
     Raises
@@ -152,23 +152,23 @@ def _check_can_take_over(made: Program, like: Program) -> None:
         If one of them does not.
     """
     for what, new, old in (
-        ("digit_bits", made.digit_bits, like.digit_bits),
-        ("its states", _states(made), _states(like)),
-        ("digits and fraction bits of its inputs", _forms(made.inputs), _forms(like.inputs)),
-        ("fraction bits and parts of its output", made.output[1:], like.output[1:]),
+        ("digit_bits", new_program.digit_bits, like.digit_bits),
+        ("its states", _states(new_program), _states(like)),
+        ("digits and fraction bits of its inputs", _forms(new_program.inputs), _forms(like.inputs)),
+        ("fraction bits and parts of its output", new_program.output[1:], like.output[1:]),
     ):
         if new != old:
             raise FoldingError(f"to take over, {what} must be {old}, not {new}")
     for what, new, old in (
-        ("words of memory", made.words, like.words),
-        ("bits of the accumulator", made.accumulator_bits, like.accumulator_bits),
+        ("words of memory", new_program.words, like.words),
+        ("bits of the accumulator", new_program.accumulator_bits, like.accumulator_bits),
     ):
         if new > old:
             raise FoldingError(f"to take over, {what} must be at most {old}, not {new}")
 
 
-def _states(made: Program) -> list[tuple[str, tuple[int, ...], int]]:
-    return [(at.name, at.addresses, at.frac) for at in made.locations if at.is_state]
+def _states(of: Program) -> list[tuple[str, tuple[int, ...], int]]:
+    return [(at.name, at.addresses, at.frac) for at in of.locations if at.is_state]
 
 
 def _forms(locations: Sequence[Location]) -> list[tuple[int, int]]:
@@ -314,18 +314,18 @@ class _Folding:
         judged = [*self._judged()]
         settling = [] if self._settling is None else [self._flagged(self._settling)]
         result = self._result(computed, copies)
-        made = Scheduler(states, copies, [*judged, *computed.values(), *settling, result])
-        made.take(Digit(index, k) for index in self._inputs for k in range(self._forms[index].digits))
+        scheduler = Scheduler(states, copies, [*judged, *computed.values(), *settling, result])
+        scheduler.take(Digit(index, k) for index in self._inputs for k in range(self._forms[index].digits))
         for one in judged:
-            made.compute(one)
-        made.note("range")
-        self._schedule(made, computed)
+            scheduler.compute(one)
+        scheduler.note("range")
+        self._schedule(scheduler, computed)
         for one in settling:
-            made.compute(one)
-        made.note("settling")
-        made.finish(result)
-        words = max(1 << (made.words + spare_words).bit_length(), least_words)
-        where = {digit: address % words for digit, address in made.where.items()}  # that of ONE was -1
+            scheduler.compute(one)
+        scheduler.note("settling")
+        scheduler.finish(result)
+        words = max(1 << (scheduler.words + spare_words).bit_length(), least_words)
+        where = {digit: address % words for digit, address in scheduler.where.items()}  # that of ONE was -1
         locations = {
             index: Location(
                 self._name(index),
@@ -338,7 +338,7 @@ class _Folding:
         }
         return Program(
             digit_bits=self._bits,
-            instructions=tuple(i._replace(address=i.address % words) for i in made.instructions),
+            instructions=tuple(i._replace(address=i.address % words) for i in scheduler.instructions),
             locations=tuple(locations.values()),
             inputs=tuple(locations[i] for i in self._inputs),
             output=Result(
@@ -346,8 +346,8 @@ class _Folding:
             ),
             states=len(states),
             words=words,
-            schedule=tuple(made.schedule),
-            accumulator_bits=self._accumulator_bits(made),
+            schedule=tuple(scheduler.schedule),
+            accumulator_bits=self._accumulator_bits(scheduler),
         )
 
     def columns(self) -> list[Column]:
@@ -546,7 +546,7 @@ class _Folding:
             columns = [*self._columns(self._sum(self._output), form, -1)]
         return Sum(self._name(self._output), -1, tuple(columns))
 
-    def _schedule(self, made: Scheduler, computed: Mapping[int, Sum]) -> None:
+    def _schedule(self, scheduler: Scheduler, computed: Mapping[int, Sum]) -> None:
         """Compute values in the order of the datapath; while the next one would have to wait, another one if it can.
 
         Raises
@@ -560,15 +560,15 @@ class _Folding:
             free = [
                 i
                 for i, one in left.items()
-                if not one.sources & (needed - {i}) and (i in needed or made.is_unused(one))
+                if not one.sources & (needed - {i}) and (i in needed or scheduler.is_unused(one))
             ]
             if not free:
                 raise FoldingError(f"{next(iter(left.values())).name!r} must not be needed after it is written")
-            if made.stalls(left[free[0]]):
-                free.sort(key=lambda i: made.stalls(left[i]))
+            if scheduler.stalls(left[free[0]]):
+                free.sort(key=lambda i: scheduler.stalls(left[i]))
             one = left.pop(free[0])
-            made.compute(one)
-            made.note(one.name)
+            scheduler.compute(one)
+            scheduler.note(one.name)
 
     def _columns(self, total: _Total, form: _Form, value: int) -> tuple[Column, ...]:
         """Return the columns of a sum, the lowest first: those below its lowest digit are dropped, others are stored.
@@ -599,16 +599,18 @@ class _Folding:
         columns: list[list[Product]] = [[] for _ in range(below + count)]
         for product, column in products:
             self._add_to_column(product, column, columns)
-        made = []
-        for number, found in enumerate(columns):
+        finished = []
+        for number, in_column in enumerate(columns):
             k = number - below
             if k < 0:
-                made.append(Column(tuple(found), Opcode.DROP))
+                finished.append(Column(tuple(in_column), Opcode.DROP))
             elif value < 0:
-                made.append(Column(tuple(found), Opcode.GIVE, part=k))
+                finished.append(Column(tuple(in_column), Opcode.GIVE, part=k))
             else:
-                made.append(Column(tuple(found), Opcode.STORE if k < count - 1 else Opcode.FINISH, Digit(value, k)))
-        return tuple(made)
+                finished.append(
+                    Column(tuple(in_column), Opcode.STORE if k < count - 1 else Opcode.FINISH, Digit(value, k))
+                )
+        return tuple(finished)
 
     def _frac_of(self, term: _Term) -> int:
         """Return the fraction bits of a term: those of the lowest digit, or of its product with the other value."""
@@ -657,11 +659,11 @@ class _Folding:
             value = (value - digit) >> self._bits
         return digits
 
-    def _accumulator_bits(self, made: Scheduler) -> int:
+    def _accumulator_bits(self, scheduler: Scheduler) -> int:
         """Return the width, by interval arithmetic with any values of the digits; at least that of a word."""
         low = high = least = most = 0
         operand = (0, 0)
-        for (opcode, _, constant, _), digit in zip(made.instructions, made.reads, strict=True):
+        for (opcode, _, constant, _), digit in zip(scheduler.instructions, scheduler.reads, strict=True):
             word = self._range(digit)
             factors = operand if opcode in PRODUCTS else (constant, constant)
             ends = [a * b for a in word for b in factors]

@@ -199,7 +199,7 @@ class Scheduler:
         open_end = one._replace(columns=(*columns, last._replace(end=Opcode.MULTIPLY)))
         tried = [self._trial(one, before) for before in range(len(one.columns))]
         tried.append(self._trial(open_end, len(one.columns), Opcode.GIVE, last.part))
-        self._now, self.words = min((made for made in tried if made), key=lambda made: len(made[0].instructions))
+        self._now, self.words = min((trial for trial in tried if trial), key=lambda trial: len(trial[0].instructions))
         self.note("output")
 
     def _trial(self, one: Sum, before: int, *end: int) -> tuple[_State, int] | None:
@@ -217,9 +217,9 @@ class Scheduler:
         if end:
             opcode, part = end
             self._emit(Opcode(opcode), ONE, 0, part)
-        made = self._now, self.words
+        trial = self._now, self.words
         self._now, self.words = kept, words
-        return made if possible and not any(made[0].pending.values()) else None
+        return trial if possible and not any(trial[0].pending.values()) else None
 
     # Columns and products.
 

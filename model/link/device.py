@@ -71,20 +71,20 @@ class Device:
 
     def feed(self, data: bytes) -> bytes:
         """Take bytes of the line, whatever they are; return those that the board sends back."""
-        return b"".join(self._answer(found) for found in self._receiver.feed(data))
+        return b"".join(self._answer(received) for received in self._receiver.feed(data))
 
-    def _answer(self, found: Message | Counter) -> bytes:
-        if isinstance(found, Counter):
-            self._count(found)
+    def _answer(self, received: Message | Counter) -> bytes:
+        if isinstance(received, Counter):
+            self._count(received)
             return b""
-        if found.type == Type.OPEN:
-            self._next = found.sequence
+        if received.type == Type.OPEN:
+            self._next = received.sequence
             self._retained.clear()
             self._core.reset()
         if self._next is None:
             self._count(Counter.SEQUENCE)
             return b""
-        age = (self._next - found.sequence) % SEQUENCES
+        age = (self._next - received.sequence) % SEQUENCES
         if 0 < age <= len(self._retained):
             self._count(Counter.REPEATED)
             return b"".join(message.frame for message in list(self._retained)[-age:])
@@ -92,10 +92,10 @@ class Device:
             self._count(Counter.SEQUENCE)
             return b""
         self._next = (self._next + 1) % SEQUENCES
-        content, status = self._carried_out(found)
+        content, status = self._carried_out(received)
         if status is not Status.OK:
             self._count(Counter.REFUSED)
-        response = Message(found.type | RESPONSE, found.sequence, content + bytes([status]))
+        response = Message(received.type | RESPONSE, received.sequence, content + bytes([status]))
         self._retained.append(response)
         return response.frame
 
@@ -105,8 +105,12 @@ class Device:
     def _carried_out(self, request: Message) -> tuple[bytes, Status]:
         """Carry out a request; return the body of its response and the status."""
         body = request.body
+        packing = self._identity.packing
         if request.type == Type.SAMPLES:
-            return self._samples(body)
+            return self._samples(body, self._identity.samples)
+        if request.type == Type.SAMPLES_PACKED and packing is not None:
+            results, status = self._samples(body, packing.per_message(self._identity.sample_bytes))
+            return packing.packed(results), status
         if request.type == Type.WRITE and self._identity.reload is not None:
             return b"", self._written(body)
         length = {Type.OPEN: 0, Type.IDENTITY: 1, Type.COUNTERS: 0}
@@ -127,9 +131,9 @@ class Device:
         word = self._core.read(body[0] & ~3)
         return (word or 0).to_bytes(WORD_BYTES, "little"), Status.REFUSED if word is None else Status.OK
 
-    def _samples(self, body: bytes) -> tuple[bytes, Status]:
+    def _samples(self, body: bytes, most: int) -> tuple[bytes, Status]:
         size = self._identity.sample_bytes
-        if not 0 < len(body) <= 1 + size * self._identity.samples:
+        if not 0 < len(body) <= 1 + size * most:
             return b"", Status.LENGTH
         if body[0] >= self._identity.channels:
             return b"", Status.CHANNEL

@@ -59,15 +59,15 @@ class Receiver:
 
     def feed(self, data: bytes) -> list[Message | Counter]:
         """Take the next bytes of the stream; return what `decoded` returns for each frame that they complete."""
-        found = []
+        received = []
         *complete, rest = data.split(DELIMITER)
         for part in complete:
             self._keep(part)
             if self._pending:
-                found.append(decoded(bytes(self._pending)))
+                received.append(decoded(bytes(self._pending)))
                 self._pending.clear()
         self._keep(rest)
-        return found
+        return received
 
     def _keep(self, part: bytes) -> None:
         # One byte more than the longest frame tells that this one is too long.

@@ -16,6 +16,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 
 from sosmith.model.dataflow.status import Flag
 from sosmith.model.errors import LinkError, SpecificationError
+from sosmith.model.link.packing import Packing
 from sosmith.model.link.protocol import BLOCK_BYTES, MAX_IDENTITY, VERSION, samples_per_message
 from sosmith.model.port import Port
 
@@ -44,6 +45,7 @@ Release = Annotated[str, Field(pattern=f"^[A-Za-z0-9.+_-]{{1,{MAX_NAME}}}$")]
 Count = Annotated[int, Field(ge=1, lt=1 << 32)]
 Word = Annotated[int, Field(ge=0, lt=1 << 32)]
 Bits = Annotated[int, Field(ge=2, le=32)]
+Bit = Annotated[int, Field(ge=0, le=7)]
 Rate = Annotated[float, Field(ge=MIN_RATE, le=MAX_RATE)]
 Step = Annotated[float, Field(ge=MIN_LSB, le=MAX_VALUE)]
 Offset = Annotated[float, Field(ge=-MAX_VALUE, le=MAX_VALUE)]
@@ -99,6 +101,8 @@ class Identity(BaseModel):
         Bit of each flag of a result's status.
     reload : Reload or None
         The registers of a core that can load coefficients.
+    packed : tuple of int or None
+        Bits of the status that packed results have, in increasing order; None if the board packs none.
     """
 
     model_config = ConfigDict(frozen=True, strict=True, extra="ignore")
@@ -117,8 +121,9 @@ class Identity(BaseModel):
     samples: Annotated[int, Field(ge=1, le=255)]
     inputs: Annotated[tuple[Quantity, ...], Field(min_length=1, max_length=16)]
     output: Quantity
-    flags: dict[Name, Annotated[int, Field(ge=0, le=7)]]
+    flags: dict[Name, Bit]
     reload: Reload | None
+    packed: tuple[Bit, ...] | None = None
 
     @model_validator(mode="after")
     def _each_once(self) -> Identity:
@@ -128,6 +133,8 @@ class Identity(BaseModel):
             raise ValueError("Bits of flags should differ")
         if self.source == "converter" and not CONVERTER_FLAGS.keys() <= self.flags.keys():
             raise ValueError("Flags of a device with converters should have fault")
+        if self.packed is not None and self.packed != tuple(sorted({*self.packed} & {*self.flags.values()})):
+            raise ValueError("Packed flags should be bits of flags, in increasing order")
         return self
 
     @property
@@ -156,6 +163,11 @@ class Identity(BaseModel):
         return self.output_port.bytes + 1
 
     @property
+    def packing(self) -> Packing | None:
+        """The form of packed results; None if the board packs none."""
+        return None if self.packed is None else Packing(self.output_port, self.packed)
+
+    @property
     def memory(self) -> bytes:
         """Content of the board's memory: the text and zero bytes, as many as make the length a power of two.
 
@@ -164,7 +176,8 @@ class Identity(BaseModel):
         SpecificationError
             If the text is too long, as it is for very long names.
         """
-        text = json.dumps(self.model_dump(mode="json"), ensure_ascii=False, separators=(",", ":")).encode()
+        about = self.model_dump(mode="json", exclude={"packed"} if self.packed is None else None)
+        text = json.dumps(about, ensure_ascii=False, separators=(",", ":")).encode()
         if len(text) >= MAX_IDENTITY:
             raise SpecificationError(
                 f"the identity of the board must have fewer than {MAX_IDENTITY} bytes, not {len(text)}; "
@@ -183,18 +196,18 @@ class Identity(BaseModel):
         """
         text = memory.split(b"\0", 1)[0]
         try:
-            found = Identity.model_validate_json(text)
+            identity = Identity.model_validate_json(text)
         except ValidationError as error:
             raise LinkError(
                 f"the board's identity must be the JSON of docs/protocol.md, not: {first_fault(error)}"
             ) from None
         json.loads(text, object_pairs_hook=_each_key_once)
-        fitting = samples_per_message(found.sample_bytes, found.result_bytes)
-        if found.samples > fitting:
+        fitting = samples_per_message(identity.sample_bytes, identity.result_bytes)
+        if identity.samples > fitting:
             raise LinkError(
-                f"the board's identity must have at most {fitting} samples in a message, not {found.samples}"
+                f"the board's identity must have at most {fitting} samples in a message, not {identity.samples}"
             )
-        return found
+        return identity
 
 
 def first_fault(error: ValidationError) -> str:
@@ -205,12 +218,12 @@ def first_fault(error: ValidationError) -> str:
 
 
 def _each_key_once(pairs: Sequence[tuple[str, Any]]) -> dict[str, Any]:
-    found: dict[str, Any] = {}
+    table: dict[str, Any] = {}
     for key, value in pairs:
-        if key in found:
+        if key in table:
             raise LinkError(f"the board's identity must have each key once, not {_plain(key)} twice")
-        found[key] = value
-    return found
+        table[key] = value
+    return table
 
 
 def _plain(text: str) -> str:

@@ -21,6 +21,12 @@ HEAD_BYTES, CRC_BYTES = 2, 4
 MIN_MESSAGE, MAX_MESSAGE = HEAD_BYTES + CRC_BYTES, HEAD_BYTES + MAX_BODY + CRC_BYTES
 """Fewest and most bytes of a message."""
 
+MAX_FRAME = MAX_MESSAGE + 3
+"""Most bytes of a frame: COBS adds one, and two zero bytes are around it."""
+
+LINE_BITS = 10
+"""Bits of the line for a byte, with start and stop bit."""
+
 RESPONSE = 0x80
 """The bit that is set in the type of a response."""
 
@@ -54,6 +60,8 @@ class Type(IntEnum):
     WRITE = 6
     COUNTERS = 7
     CONVERTERS = 8
+    SAMPLES_PACKED = 9
+    POLL_PACKED = 10
 
 
 class Status(IntEnum):
@@ -171,6 +179,16 @@ LAYOUTS = {
         "Gives what was wrong with the last reading of each converter, those of channel 0 first. Unknown to a device "
         "without converters.",
     ),
+    Type.SAMPLES_PACKED: Layout(
+        "`channel`, samples",
+        "packed results",
+        "As `SAMPLES`, with packed results. Unknown to a device whose identity has no `packed`.",
+    ),
+    Type.POLL_PACKED: Layout(
+        "nothing",
+        "`channel`, packed results",
+        "As `POLL`, with packed results. Unknown to a device whose identity has no `packed`.",
+    ),
 }
 """The requests, in the order of their numbers."""
 
@@ -178,3 +196,8 @@ LAYOUTS = {
 def samples_per_message(sample_bytes: int, result_bytes: int) -> int:
     """Return how many samples fit a ``SAMPLES`` request of `sample_bytes` each, and its response."""
     return (MAX_BODY - 1) // max(sample_bytes, result_bytes)
+
+
+def results_per_second(baud: int, results: int) -> float:
+    """Return how many results a second a line carries in frames of `results` each that are as long as any."""
+    return baud / LINE_BITS * results / MAX_FRAME

@@ -91,7 +91,7 @@ def entering_filter(codes: Codes, datapath: Datapath, polynomial: Polynomial | N
     decimator = datapath.decimator
     if decimator is None:
         return calibrated(codes, datapath.inputs, polynomial)
-    if datapath.ahead is not None:
+    if datapath.calibration is not None:
         values = calibrated(codes, datapath.inputs, polynomial)
         for _ in range(decimator.factor.bit_length() - 1):
             for _ in range(decimator.stages):  # the first sample as if it had been there for ever

@@ -56,7 +56,7 @@ def sine_fit(values: npt.NDArray[np.number], frequency: float, sample_rate: floa
     signal = values.astype(np.float64)
     phase = 2 * np.pi * (np.arange(len(signal)) * (frequency / sample_rate) % 1.0)
     basis = np.stack([np.cos(phase), np.sin(phase), np.ones(len(signal))], axis=1)
-    found: Values = np.linalg.lstsq(basis, signal, rcond=None)[0]
-    signal -= basis @ found
-    amplitude, left = math.hypot(float(found[0]), float(found[1])), float(np.sqrt(np.mean(signal**2)))
+    weights: Values = np.linalg.lstsq(basis, signal, rcond=None)[0]
+    signal -= basis @ weights
+    amplitude, left = math.hypot(float(weights[0]), float(weights[1])), float(np.sqrt(np.mean(signal**2)))
     return SineFit(amplitude, 20 * math.log10(left * math.sqrt(2) / amplitude) if left and amplitude else None)

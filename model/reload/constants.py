@@ -48,9 +48,7 @@ class Constant:
 def constants(datapath: Datapath) -> tuple[Constant, ...]:
     """Return the constants that can be loaded, in the order in which a bank holds them."""
     return tuple(
-        Constant(
-            number, index, f"{stage.name}.{node.name or f'node{index}'}", _signed_bits(node.parameter) + SPARE_BITS
-        )
+        Constant(number, index, f"{stage.name}.{node.name or f'node{index}'}", bits_of(node.parameter))
         for number, stage in enumerate(datapath.stages)
         for index, node in enumerate(stage.graph.nodes)
         if _is_loadable(stage, node)
@@ -59,6 +57,17 @@ def constants(datapath: Datapath) -> tuple[Constant, ...]:
 
 def _is_loadable(stage: Stage, node: Node) -> bool:
     return node.op is Op.SCALE or (node.op is Op.CONSTANT and isinstance(stage, HornerStep) and bool(node.name))
+
+
+def bits_of(value: int) -> int:
+    """Return the width in bits, in two's complement, of a constant that can be loaded in place of `value`.
+
+    Examples
+    --------
+    >>> bits_of(3), bits_of(-4)
+    (4, 4)
+    """
+    return _signed_bits(value) + SPARE_BITS
 
 
 def _signed_bits(value: int) -> int:

@@ -158,8 +158,8 @@ class DirectForm1:
         for product in self.products:
             taps = [*zip(product.x, taps_x, strict=False), *zip(product.y, taps_y, strict=False)]
             operand = _operand(g, product, g.shift(g.combine(taps), -product.shift))
-            made = g.scale(operand, product.coefficient, product.frac, f"product_{product.name}")
-            products.append((product.y[0] != 0, (1, made)))
+            scaled = g.scale(operand, product.coefficient, product.frac, f"product_{product.name}")
+            products.append((product.y[0] != 0, (1, scaled)))
         terms = [term for is_newest, term in products if not is_newest]
         centre = 1 + sum(self.feedback)
         if self.drops and centre:

@@ -200,8 +200,8 @@ def _section(g: GraphBuilder, x: Wire, section: Allpass, lane: str) -> Wire:
     else:
         outer, inner = section.adaptors
         through, reflected = _adaptor(g, states[0], states[1], inner, names[1])
-        held = g.truncate(g.named(through, f"{lane}_inner_sum"), section.inner.frac)
-        back = g.bound(held, section.inner.low, section.inner.high, f"{lane}_inner")
+        truncated = g.truncate(g.named(through, f"{lane}_inner_sum"), section.inner.frac)
+        back = g.bound(truncated, section.inner.low, section.inner.high, f"{lane}_inner")
         y, first = _adaptor(g, x, back, outer, names[0])
         waves = [first, reflected]
     for k, (state, wave, form) in enumerate(zip(states, waves, section.states, strict=True), start=1):

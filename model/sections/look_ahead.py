@@ -95,8 +95,8 @@ class LookAhead:
     def _feedback(self) -> tuple[Fraction, Fraction]:
         """A1 and A2."""
         least = self.distance
-        found = {tap.delay // least: tap.value for tap in self.recursion}
-        return found.get(1, Fraction(0)), found.get(2, Fraction(0))
+        values = {tap.delay // least: tap.value for tap in self.recursion}
+        return values.get(1, Fraction(0)), values.get(2, Fraction(0))
 
     @property
     def distance(self) -> int:
@@ -107,8 +107,8 @@ class LookAhead:
     def coefficients(self) -> dict[str, tuple[int, int]]:
         """Integer and fraction bits of every coefficient, by name."""
         taps = [tap for factor in (*self.factors, self.recursion) for tap in factor]
-        found = {p.name: (p.coefficient, p.frac) for p in self.numerator}
-        return found | {tap.name: (tap.coefficient, tap.frac) for tap in taps}
+        numerator = {p.name: (p.coefficient, p.frac) for p in self.numerator}
+        return numerator | {tap.name: (tap.coefficient, tap.frac) for tap in taps}
 
     @property
     def optional_quantizers(self) -> tuple[str, ...]:
@@ -119,13 +119,13 @@ class LookAhead:
     def stated_fracs(self) -> dict[str, int]:
         """Fraction bits of the nodes with a stated range, by name, which follow without the graph."""
         frac = max(self.x.frac + p.frac + p.shift - _least_zeros(p.x) for p in self.numerator)
-        found = {}
+        fracs = {}
         for k, kept in enumerate(self.fracs):
-            found[f"u{k}"] = frac
+            fracs[f"u{k}"] = frac
             frac = min(frac, kept)
             taps = self.factors[k] if k < len(self.factors) else ()
             frac = max([frac, *(frac + tap.frac for tap in taps)])
-        return found | {"v": max([frac, *(self.y_frac + tap.frac for tap in self.recursion)])}
+        return fracs | {"v": max([frac, *(self.y_frac + tap.frac for tap in self.recursion)])}
 
     @cached_property
     def graph(self) -> Graph:
@@ -147,7 +147,7 @@ class LookAhead:
         total = self.stated_fracs["v"]
         half = [(1, g.constant(1, self._kept + 1, "half_v"))] if total > self._kept else []
         # The newest sample comes last: what is added to it before is there in time.
-        products = [(-sign, made) for sign, made in _products(g, self.recursion[::-1], past)]
+        products = [(-sign, product) for sign, product in _products(g, self.recursion[::-1], past)]
         v = g.bound(g.combine([(1, wire), *half, *products]), *self.v_range, "v")
         y = g.floor(v, self._kept, "y")
         g.connect(first, y)
@@ -176,10 +176,10 @@ def _products(g: GraphBuilder, taps: Sequence[Tap], past: Sequence[Wire]) -> lis
 
 def _delayed(g: GraphBuilder, wire: Wire, name: str, count: int, before: int = 0) -> list[Wire]:
     """Return a signal one to `count` samples ago."""
-    found: list[Wire] = []
+    samples: list[Wire] = []
     for k in range(1, count + 1):
-        found.append(g.previous(found[-1] if found else wire, f"{name}_{before + k}"))
-    return found
+        samples.append(g.previous(samples[-1] if samples else wire, f"{name}_{before + k}"))
+    return samples
 
 
 def _least_zeros(taps: Sequence[int]) -> int:

@@ -24,7 +24,7 @@ is the graph's, bit for bit. The bound on its error is therefore that of the gra
 
 >>> from sosmith.model.sections.direct_form import DirectForm1, Product
 >>> from sosmith.model.dataflow.graph import Range
->>> made = DirectForm1(
+>>> direct = DirectForm1(
 ...     name="section0",
 ...     products=(Product("A1", 3, 3, (1, 1, 0), (-2, 0), 1),),
 ...     integer_part=(-1, 0),
@@ -33,7 +33,7 @@ is the graph's, bit for bit. The bound on its error is therefore that of the gra
 ...     y_frac=2,
 ...     v_range=(-16384, 16383),
 ... )
->>> section = online_section("section0", made.graph)
+>>> section = online_section("section0", direct.graph)
 >>> section.numerator, section.recursion, section.feedback
 ((Fraction(3, 16), Fraction(3, 16)), (Fraction(5, 8),), (1,))
 >>> section.delay, section.digits
@@ -321,14 +321,14 @@ def _recurrence(graph: Graph) -> tuple[_Row, _Row, tuple[int, ...], _Rest]:
 
 def _taps(graph: Graph, x: int, v: int) -> dict[int, _Key]:
     """DELAY nodes that hold the input or v of an earlier sample, with how many samples ago."""
-    found: dict[int, _Key] = {}
+    taps: dict[int, _Key] = {}
     for index in graph.delays:
         source, ago = graph.nodes[index].operands[0], 1
         while graph.nodes[source].op is Op.DELAY:
             source, ago = graph.nodes[source].operands[0], ago + 1
         if source in {x, v}:
-            found[index] = ("x" if source == x else "v", ago)
-    return found
+            taps[index] = ("x" if source == x else "v", ago)
+    return taps
 
 
 def _form(graph: Graph, node: Node, forms: list[_Form | None], tap: _Key | None, y_frac: int) -> _Form | None:
@@ -465,13 +465,13 @@ def online_schedule(datapath: Datapath, lead_in: int) -> OnlineSchedule:
         If a section is not one for on-line arithmetic.
     """
     stages = [datapath.stages[k] for k in sections_of(datapath)]
-    made = []
+    sections = []
     for stage in stages:
         try:
-            made.append(online_section(stage.name, stage.graph))
+            sections.append(online_section(stage.name, stage.graph))
         except OnlineError as error:
             raise OnlineError(f"{stage.name} is not a section in direct form I: {error}") from None
     node = stages[0].graph.nodes[stages[0].graph.inputs[0]]
-    schedule = OnlineSchedule(tuple(made), node.width + (not node.signed), lead_in)
+    schedule = OnlineSchedule(tuple(sections), node.width + (not node.signed), lead_in)
     schedule.check()
     return schedule

@@ -144,9 +144,9 @@ class TransposedForm:
             weights = self._weights(p, operand)
             if any(weights):
                 suffix = f"_{operand}" if any(p.x) and any(p.y) else ""
-                made = g.scale(wire, p.coefficient, p.frac, f"product_{p.name}{suffix}")
+                product = g.scale(wire, p.coefficient, p.frac, f"product_{p.name}{suffix}")
                 for total, weight in zip(totals, weights, strict=True):
-                    total += [(power, g.shift(made, -p.shift)) for power in _powers(weight)]
+                    total += [(power, g.shift(product, -p.shift)) for power in _powers(weight)]
         return totals
 
     def _quantized(self, g: GraphBuilder, total: Wire, k: int, frac: int) -> Wire:

@@ -100,6 +100,9 @@ _UNIT = re.compile(
     rf"{_KEY}([-+]?[0-9][0-9_]{{0,17}}(?:\.[0-9]{{1,18}})?)\s*([kKMGm]?)([A-Za-z][A-Za-z/]{{0,20}})?{_END}"
 )
 _WORD = re.compile(rf"{_KEY}([A-Za-z][A-Za-z0-9_-]{{0,60}}){_END}")
+_COMMAS = re.compile(rf"{_KEY}([0-9]{{1,3}}(?:,[0-9]{{3}}){{1,5}}(?:\.[0-9]{{0,18}})?){_END}")
+_COMMA = re.compile(rf"{_KEY}([-+]?[0-9]{{1,18}}),([0-9]{{1,18}}){_END}")
+_NO_EQUALS = re.compile(rf"\s*([A-Za-z][A-Za-z0-9_.-]{{0,60}})\s+([-+]?[0-9][0-9.]{{0,20}}|\"[^\"]{{0,60}}\"){_END}")
 _FLAGS = {"yes": "true", "on": "true", "True": "true", "TRUE": "true", "no": "false", "off": "false"}
 _FLAGS |= {"False": "false", "FALSE": "false"}
 
@@ -114,12 +117,18 @@ def _cure(text: str, place: str) -> str:
     number = re.match(r"line (\d+)", place)
     lines = text.splitlines()
     line = lines[int(number[1]) - 1] if number and int(number[1]) <= len(lines) else ""
-    if (found := _UNIT.fullmatch(line)) and (found[3] or found[4]):
-        value = Decimal(found[2].replace("_", "")).scaleb(_PREFIXES.get(found[3], 0))
-        return f"a number without a unit: {found[1]} = {value:f}"
-    if found := _WORD.fullmatch(line):
-        known = _FLAGS.get(found[2])
-        return f"true or false: {found[1]} = {known}" if known else f'a text in quotes: {found[1]} = "{found[2]}"'
+    if (match := _UNIT.fullmatch(line)) and (match[3] or match[4]):
+        value = Decimal(match[2].replace("_", "")).scaleb(_PREFIXES.get(match[3], 0))
+        return f"a number without a unit: {match[1]} = {value:f}"
+    if match := _COMMAS.fullmatch(line):
+        return f"a number without commas: {match[1]} = {match[2].replace(',', '')}"
+    if match := _COMMA.fullmatch(line):
+        return f"a number with a decimal point: {match[1]} = {match[2]}.{match[3]}"
+    if match := _NO_EQUALS.fullmatch(line):
+        return f"a key, an equals sign and a value: {match[1]} = {match[2]}"
+    if match := _WORD.fullmatch(line):
+        known = _FLAGS.get(match[2])
+        return f"true or false: {match[1]} = {known}" if known else f'a text in quotes: {match[1]} = "{match[2]}"'
     if re.match(r"\s*[\w.-]+\s*:", line):
         return "a key, an equals sign and a value, as in order = 4: TOML has no colons there"
     return ""

@@ -95,12 +95,12 @@ def _sentence(shape: type[Table], finding: ErrorDetails) -> str:
         return f"{where} must be one of the keys {', '.join(owner.model_fields)}, not an unknown one{hint}"
     assert field is not None
     assert field.description, f"{where} must have a description"
-    found = "missing" if finding["type"] == "missing" else shown(finding["input"])
+    given = "missing" if finding["type"] == "missing" else shown(finding["input"])
     inside = _path_text(path[_last_name(path) + 1 :])
     if inside:  # the description is of the whole list
         whole = _path_text(path[: _last_name(path) + 1])
-        return f"{whole} must be {field.description}, not one with {found} at {inside}"
-    return f"{where} must be {field.description}, not {found}"
+        return f"{whole} must be {field.description}, not one with {given} at {inside}"
+    return f"{where} must be {field.description}, not {given}"
 
 
 def _last_name(path: tuple[int | str, ...]) -> int:

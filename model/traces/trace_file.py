@@ -150,15 +150,15 @@ def read_traces(path: Path, ports: tuple[Port, ...], sample_rate: Fraction, chan
         an integer from 0 to ``channels - 1``; if a channel has no row, or more rows than another.
     """
     columns = _Columns.of(ports)
-    found: dict[int, _Gathered] = {}
+    gathered: dict[int, _Gathered] = {}
     for chunk in read_csv_chunks(path, columns.all):
         several = columns.channel in chunk
         parts = _by_channel(chunk, channels) if several else {0: chunk}
         for channel, part in parts.items():
-            found.setdefault(channel, _Gathered(columns, ports)).take(part)
+            gathered.setdefault(channel, _Gathered(columns, ports)).take(part)
     if several:
-        _check_lengths(path, found, channels)
-    return tuple(found[channel].trace(path, sample_rate, several=several) for channel in sorted(found))
+        _check_lengths(path, gathered, channels)
+    return tuple(gathered[channel].trace(path, sample_rate, several=several) for channel in sorted(gathered))
 
 
 def rows_of_channel(table: CsvTable, channel: int) -> CsvTable:
@@ -187,20 +187,20 @@ def _by_channel(table: CsvTable, channels: int) -> dict[int, CsvTable]:
     return {int(channel): table.take(np.flatnonzero(number == channel)) for channel in np.unique(number)}
 
 
-def _check_lengths(path: Path, found: Mapping[int, _Gathered], channels: int) -> None:
+def _check_lengths(path: Path, gathered: Mapping[int, _Gathered], channels: int) -> None:
     """Check that all channels have as many rows."""
-    lengths = [len(found[channel].lines) if channel in found else 0 for channel in range(channels)]
+    lengths = [len(gathered[channel].lines) if channel in gathered else 0 for channel in range(channels)]
     length = min(lengths)
     shortest = lengths.index(length)
     if not length:
-        given = ", ".join(map(str, sorted(found)))
+        given = ", ".join(map(str, sorted(gathered)))
         raise SpecificationError(f"{path} must have rows of channel {shortest}, not only of {given}")
     longer = [channel for channel in range(channels) if lengths[channel] > length]
     if longer:
-        first = min(longer, key=lambda channel: found[channel].lines[length])
+        first = min(longer, key=lambda channel: gathered[channel].lines[length])
         raise SpecificationError(
-            f"{path}, line {found[first].lines[length]}: {CHANNEL} {first} must end after row {length}, like channel "
-            f"{shortest}, not continue"
+            f"{path}, line {gathered[first].lines[length]}: {CHANNEL} {first} must end after row {length}, "
+            f"like channel {shortest}, not continue"
         )
 
 
@@ -263,11 +263,8 @@ def _read_only(values: npt.NDArray[Kind]) -> npt.NDArray[Kind]:
 
 def _check_time(path: Path, lines: Sequence[int], time: Values, sample_rate: Fraction, before: str) -> None:
     period = 1 / float(sample_rate)
-    digit = _last_digit(time)
+    digit = last_digit(time)
     few = digit > period / 2  # stamps of other instants would pass as rounded ones
-    # Instants that were rounded or cut to a digit are whole numbers of it apart, next below or next above a period.
-    ratio = period / digit
-    least, most = (np.floor(ratio) - 0.5) * digit, (np.ceil(ratio) + 0.5) * digit
 
     def check(bad: npt.NDArray[np.bool_], start: int, what: Callable[[int], str]) -> None:
         if bad.any():
@@ -280,9 +277,8 @@ def _check_time(path: Path, lines: Sequence[int], time: Values, sample_rate: Fra
         if not start:
             step[0] = period
         check(step <= 0, start, lambda k: f"above {time[k - 1]}, the value in {before}, not {time[k]}")
-        rounded = (step > least) & (step < most) & (not few)
         check(
-            (np.abs(step - period) > TIME_TOLERANCE * period) & ~rounded,
+            ~is_a_period(step, period, digit),
             start,
             lambda k: f"{period:.6g} s after {before}, not {time[k] - time[k - 1]:.6g} s",
         )
@@ -294,7 +290,19 @@ def _check_time(path: Path, lines: Sequence[int], time: Values, sample_rate: Fra
         )
 
 
-def _last_digit(time: Values) -> float:
+def is_a_period(step: Values, period: float, digit: float) -> npt.NDArray[np.bool_]:
+    """Tell which steps between time stamps that end with `digit` are a sample period, all in s."""
+    near: npt.NDArray[np.bool_] = np.abs(step - period) <= TIME_TOLERANCE * period
+    if digit > period / 2:  # stamps of other instants would pass as rounded ones
+        return near
+    # Instants that were rounded or cut to a digit are whole numbers of it apart, next below or next above a period.
+    ratio = period / digit
+    rounded = (step > (np.floor(ratio) - 0.5) * digit) & (step < (np.ceil(ratio) + 0.5) * digit)
+    near |= rounded
+    return near
+
+
+def last_digit(time: Values) -> float:
     """Return the decimal digit that time stamps in s end with, down to a picosecond: 1e-6 for microseconds."""
     doubles = float(np.spacing(max(time.max(), -time.min())))
     blocks = [time[start : start + CHUNK] for start in range(0, len(time), CHUNK)]

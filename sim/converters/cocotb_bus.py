@@ -291,7 +291,7 @@ class SpiBus:
             self.dut.miso.value = level
 
 
-def _least(what: str, seconds: Any, found: float) -> None:
-    """Check a time: `seconds` exact, `found` in ns."""
+def _least(what: str, seconds: Any, measured: float) -> None:
+    """Check a time: `seconds` exact, `measured` in ns."""
     least = float(seconds / ns)
-    assert found >= least - 0.01, f"{what} for {least:,.0f} ns, not for {found:,.0f} ns"
+    assert measured >= least - 0.01, f"{what} for {least:,.0f} ns, not for {measured:,.0f} ns"

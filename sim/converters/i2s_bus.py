@@ -183,7 +183,7 @@ def _signed(word: int) -> int:
     return word - (1 << _WIDTH) if word >> (_WIDTH - 1) else word
 
 
-def _least(what: str, seconds: Any, found: float) -> None:
-    """Check a time: `seconds` exact, `found` in ns."""
+def _least(what: str, seconds: Any, measured: float) -> None:
+    """Check a time: `seconds` exact, `measured` in ns."""
     least = float(seconds / ns)
-    assert found >= least - 0.01, f"{what} for {least:,.0f} ns, not for {found:,.0f} ns"
+    assert measured >= least - 0.01, f"{what} for {least:,.0f} ns, not for {measured:,.0f} ns"

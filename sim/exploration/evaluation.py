@@ -77,7 +77,7 @@ def _measured(design: CoreDesign, traces: tuple[Trace, ...], task: Task) -> Poin
     if task.board is not None:
         cost = synthesized(design, find_board(task.board))
         provenance = dataclasses.replace(provenance, cost=cost)
-    told = {"provenance": {"cost": provenance.cost}}
+    priced = {"provenance": {"cost": provenance.cost}}
     return {
         "passed": not shortfalls,
         "shortfalls": shortfalls,
@@ -89,7 +89,7 @@ def _measured(design: CoreDesign, traces: tuple[Trace, ...], task: Task) -> Poin
         "cycles_per_sample": provenance.cycles_per_sample,
         "samples_per_clock": design.architecture.samples_per_clock,
         "latency_cycles": design.architecture.latency_cycles,
-        "cost": {"value": hardware_cost(told), "unit": cost_unit(told), **provenance.cost},
+        "cost": {"value": hardware_cost(priced), "unit": cost_unit(priced), **provenance.cost},
         "reference_sha256": provenance.reference_sha256,
         "trace_sha256": provenance.trace_sha256,
         "datapath_sha256": provenance.datapath_sha256,

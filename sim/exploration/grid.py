@@ -37,7 +37,7 @@ class Traces(Protocol):
         """Name of the source; None for the default one."""
         ...
 
-    def told(self) -> list[str]:
+    def identity(self) -> list[str]:
         """Return what tells them from those of another source; nothing for the default one."""
         ...
 
@@ -120,7 +120,7 @@ class Subject:
 
     @cached_property
     def _stimuli(self) -> list[str]:
-        return self.traces.told()
+        return self.traces.identity()
 
     def task(self, changes: dict[str, Any]) -> Task:
         """Make the task with these values.
@@ -131,9 +131,18 @@ class Subject:
             If a key is of a table that the specification lacks.
         """
         tree = changed(self.spec.source, changes)
-        told = [tree, self.core, self.samples, self.seed, self.board, self._measurements, __version__, *self._stimuli]
+        determined_by = [
+            tree,
+            self.core,
+            self.samples,
+            self.seed,
+            self.board,
+            self._measurements,
+            __version__,
+            *self._stimuli,
+        ]
         return Task(
-            key=hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest(),
+            key=hashlib.sha256(json.dumps(determined_by, sort_keys=True).encode()).hexdigest(),
             changes=changes,
             tree=tree,
             path=self.spec.path,

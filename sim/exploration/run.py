@@ -103,9 +103,9 @@ class Outcome:
         writer.writerow([*self.parameters, *_COLUMNS])
         front = {point["key"] for point in self.front}
         for point in self.points:
-            told = {**point, "on_front": point["key"] in front}
+            row = {**point, "on_front": point["key"] in front}
             writer.writerow(
-                [*(point["changes"][key] for key in self.parameters), *(_at(told, column) for column in _COLUMNS)]
+                [*(point["changes"][key] for key in self.parameters), *(_at(row, column) for column in _COLUMNS)]
             )
         return stream.getvalue()
 

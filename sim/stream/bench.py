@@ -94,13 +94,13 @@ class StreamBench:
 
     def word(self) -> Word:
         """Output word, in which no bit may be X or Z."""
-        found = {}
+        values = {}
         for name, port in self._outputs:
             value = self.pins.read(port)
             if isinstance(value, str):
                 raise ProtocolError(f"{port} must be known, not {value}, at sample {self.count}")
-            found[name] = value
-        return Word(found.get("tdest", 0), found["tdata"], found.get("tuser", 0))
+            values[name] = value
+        return Word(values.get("tdest", 0), values["tdata"], values.get("tuser", 0))
 
     async def output_appears_without_ready(self) -> None:
         """Check that a core with a result asserts ``tvalid`` whether or not the sink is ready."""
@@ -135,7 +135,7 @@ class StreamBench:
         sent, offered, silence = 0, False, 0
         was_ready: bool | None = None
         was_offered: bool | None = None
-        held: Word | None = None  # the word that the core offers and the bench has not accepted
+        pending: Word | None = None  # the word that the core offers and the bench has not accepted
         while sent < len(words) or self.count < self._expected:
             if not offered:
                 offered = sent < len(words) and next(idle)
@@ -152,9 +152,9 @@ class StreamBench:
             valid = self.bit("m_axis_tvalid")
             accepted = offered and self.bit("s_axis_tready")
             word = self.word() if valid else None
-            if held is not None and word != held:
-                raise moved(held, word, self.count)
-            held = word if valid and not ready else None
+            if pending is not None and word != pending:
+                raise moved(pending, word, self.count)
+            pending = word if valid and not ready else None
             if word is not None and ready:
                 self.keep(word)
             if accepted:

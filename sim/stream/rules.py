@@ -33,13 +33,13 @@ def followed(clock: int) -> ProtocolError:
     )
 
 
-def moved(held: Word, word: Word | None, sample: int) -> ProtocolError:
-    """Make the error of a stalled core that offers `held` and then `word` or, for None, nothing."""
+def moved(offered: Word, word: Word | None, sample: int) -> ProtocolError:
+    """Make the error of a stalled core that offers `offered` and then `word` or, for None, nothing."""
     if word is None:
         change = "drop m_axis_tvalid"
     else:
-        name = next(name for name in Word._fields if getattr(held, name) != getattr(word, name))
-        change = f"change m_axis_{name} from {getattr(held, name):#x} to {getattr(word, name):#x}"
+        name = next(name for name in Word._fields if getattr(offered, name) != getattr(word, name))
+        change = f"change m_axis_{name} from {getattr(offered, name):#x} to {getattr(word, name):#x}"
     return ProtocolError(f"a stalled core must not {change}, as it did at sample {sample}")
 
 

@@ -1,6 +1,7 @@
 """What the commands tell of a decimated instrument."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -17,7 +18,7 @@ def path(tmp_path: Path) -> str:
 
 def test_the_design_tells_of_the_calibration(path: str) -> None:
     made = small()
-    ahead, behind = made.architecture.ahead, made.architecture.program
+    ahead, behind = made.architecture.calibration, made.architecture.program
     assert ahead is not None
     assert ahead.program is not None
     assert behind is not None
@@ -50,7 +51,43 @@ def test_factors_are_explored(path: str, tmp_path: Path) -> None:
     assert [point["changes"]["filter.decimate"] for point in found["points"]] == [2, 4]
     assert all(point["passed"] for point in found["points"])
     most = [point["cost"]["instructions"] for point in found["points"]]
-    ahead = small().architecture.ahead
+    ahead = small().architecture.calibration
     assert ahead is not None
     assert ahead.program is not None
     assert min(most) > len(ahead.program.instructions)
+
+
+FAR_BELOW = """
+name = "drift"
+sample_rate = 1000000.0
+
+[input.x]
+bits = 8
+range = [-1.0, 1.0]
+signed = true
+
+[filter]
+family = "butterworth"
+kind = "lowpass"
+order = 1
+cutoff = 0.5
+decimate = 1024
+
+[output]
+bits = 8
+range = [-1.0, 1.0]
+signed = true
+max_error = "faithful"
+"""
+"""A cutoff so low that no word lengths do without the decimator."""
+
+
+def test_a_filter_that_is_only_possible_behind_a_decimator(tmp_path: Path) -> None:
+    path = tmp_path / "drift.toml"
+    path.write_text(FAR_BELOW, encoding="utf-8")
+    table = Invocation("design", columns=200).good(str(path)).stdout
+    assert re.search(r"without a decimator +no word lengths meet the specification\n", table)
+    assert [*json.loads(Invocation("design").good(str(path), "--json").stdout)["rate_costs"]] == ["decimated"]
+    path.write_text(FAR_BELOW.replace("decimate = 1024", ""), encoding="utf-8")
+    refused = Invocation("design").run(str(path)).exception
+    assert str(refused).endswith("no word length suffices for a filter closer to them without filter.decimate, not 0.5")

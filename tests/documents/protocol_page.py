@@ -2,6 +2,7 @@
 
 import json
 import re
+from fractions import Fraction
 
 from tests.interface.small import instrument_design
 
@@ -13,11 +14,11 @@ from sosmith.model.link.device import Device
 from sosmith.model.link.frames import Message
 from sosmith.model.link.identity import Identity
 from sosmith.model.link.integer_core import IntegerCore
-from sosmith.model.link.protocol import LAYOUTS, VERSION, Counter, Status, Type, samples_per_message
+from sosmith.model.link.packing import Packing
+from sosmith.model.link.protocol import LAYOUTS, LINE_BITS, VERSION, Counter, Status, Type, samples_per_message
+from sosmith.model.port import Port
 
 _PART = re.compile(r"<!-- (?P<what>[a-z]+) -->\n.*?<!-- end of (?P=what) -->", re.DOTALL)
-_BITS = 10
-"""Bits of the line for a byte, with start and stop bit."""
 
 
 def with_parts(text: str) -> str:
@@ -33,6 +34,7 @@ def with_parts(text: str) -> str:
         "counters": _counters,
         "readings": _readings,
         "session": _session,
+        "packed": _packed,
         "throughput": _throughput,
     }
 
@@ -108,6 +110,7 @@ def _ranges() -> str:
         "LSB": f"{gate.MIN_LSB:g} to {gate.MAX_VALUE:g}",
         "unit": f"printable text of {gate.MAX_UNIT} characters at most, none of them a control character",
         "bits of `flags`": "0 to 7, each once; with converters, `fault` is one of the flags",
+        "`packed`": "missing, null, or some of the bits of `flags`, in increasing order",
     }
     return "| key | value |\n|---|---|\n" + "".join(f"| {key} | {value} |\n" for key, value in rows.items())
 
@@ -141,6 +144,15 @@ def _stray() -> str:
         ("C4 02 83", "damaged: no flag"),
     )
     return "".join(f"    {data}   {text}\n" for data, text in rows)
+
+
+def _packed() -> str:
+    form = Packing(Port(name="y", bits=16, signed=True, lsb=Fraction(1, 1 << 15), zero=Fraction(0), unit=""), (0, 2, 6))
+    rows = bytes.fromhex("01 80 40 FE 7F 05")
+    return (
+        f"    plain    {_hex(rows)}   code 0x8001, flag 6; code 0x7FFE, flags 0 and 2\n"
+        f"    packed   {_hex(form.packed(rows))}     flags {', '.join(map(str, form.flags))}: {form.bits} bits each\n"
+    )
 
 
 def _session() -> str:
@@ -189,8 +201,26 @@ def _throughput() -> str:
         request = len(Message(Type.SAMPLES, 0, bytes(1 + count * sample)).frame)
         response = len(Message(Type.SAMPLES | 0x80, 0, bytes(count * result + 1)).frame)
         used = count * max(sample, result) / max(request, response)
-        rates = " | ".join(f"{baud / _BITS * count / max(request, response):,.0f}" for baud in (1_000_000, 3_000_000))
+        rates = _rates(count, max(request, response))
         rows.append(f"| {sample} | {result} | {count} | {request} | {response} | {100 * used:.1f} % | {rates} |\n")
+    for bits, flags in ((16, 3), (12, 3)):
+        form = Packing(
+            Port(name="y", bits=bits, signed=True, lsb=Fraction(1), zero=Fraction(0), unit=""), tuple(range(flags))
+        )
+        count = form.per_message(2)
+        size = -(-count * form.bits // 8)
+        request = len(Message(Type.SAMPLES_PACKED, 0, bytes(1 + count * 2)).frame)
+        response = len(Message(Type.SAMPLES_PACKED | 0x80, 0, bytes(size + 1)).frame)
+        used = max(2 * count, size) / max(request, response)
+        rates = _rates(count, max(request, response))
+        rows.append(
+            f"| 2 | {form.bits} bits, packed | {count} | {request} | {response} | {100 * used:.1f} % | {rates} |\n"
+        )
     head = "| bytes of a sample | of a result | in a message | bytes of the frames | | of the line "
     head += "| samples/s at 1 Mbaud | at 3 Mbaud |\n"
     return head + "|---|---|---|---|---|---|---|---|\n" + "".join(rows)
+
+
+def _rates(count: int, longest: int) -> str:
+    """Return the samples a second at 1 and 3 Mbaud, of frames with `count` of them."""
+    return " | ".join(f"{baud / LINE_BITS * count / longest:,.0f}" for baud in (1_000_000, 3_000_000))

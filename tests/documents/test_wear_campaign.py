@@ -223,7 +223,7 @@ def test_a_refused_reload_keeps_the_active_set(tmp_path: Path, monkeypatch: pyte
     def watched(hardware: Any, before: Any, made: Any) -> Any:
         starts.append((before, active[-1] if active else None))
         swap = check_swap(hardware, before, made)
-        active.append(swap.made)
+        active.append(swap.new_set)
         return swap
 
     monkeypatch.setattr(reloads, "SET_ERROR", Fraction(week.MAX_ERROR))

@@ -144,11 +144,11 @@ def test_flags_lost_are_found_out(right: str, wrong: str, tmp_path: Path) -> Non
     ("right", "wrong"),
     [
         ("before.eq(value)", "before.eq(difference)"),  # a comb of another delay
-        ("total = Signal(made.width,", "total = Signal(made.width - 1,"),  # a register a bit short
-        ("(1 << made.dropped >> 1)", "0"),  # rounded down
+        ("total = Signal(cic.width,", "total = Signal(cic.width - 1,"),  # a register a bit short
+        ("(1 << cic.dropped >> 1)", "0"),  # rounded down
         ("filling = Signal(init=1)", "filling = Signal()"),  # a first sample that is there once only
         ("waiting & completes", "0"),  # a result overwritten while it waits
-        ("self.o_rail.eq(rail | found)", "self.o_rail.eq(found)"),  # a rail forgotten
+        ("self.o_rail.eq(rail | at_end)", "self.o_rail.eq(at_end)"),  # a rail forgotten
     ],
 )
 def test_a_broken_decimator_is_found_out(right: str, wrong: str, tmp_path: Path) -> None:

@@ -84,7 +84,7 @@ def test_samples_that_overlap_are_computed_one_by_one(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [
-        ("start | (fetching & ~held)", "start | fetching"),  # a result overwritten while it waits
+        ("start | (fetching & ~waits)", "start | fetching"),  # a result overwritten while it waits
         ("self._gives_last(pipeline) if", "1 if"),  # handed out before it is complete
     ],
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from dataclasses import replace
 
 from tests.host.lines import device_of
 from tests.interface.small import filter_design, instrument_design
@@ -39,6 +40,9 @@ class MeasuringDevice(Device):
         about = self._identity
         if request.type == Type.SAMPLES:
             return b"", Status.UNKNOWN
+        if request.type == Type.POLL_PACKED and about.packing is not None:
+            body, status = self._carried_out(replace(request, type=Type.POLL))
+            return body[:1] + about.packing.packed(body[1:]), status
         if request.type == Type.CONVERTERS:
             return bytes(about.channels * len(about.inputs)), Status.OK
         if request.type != Type.POLL:

@@ -11,7 +11,7 @@ import sosmith
 from sosmith.host.board import Board
 from sosmith.model.link.device import Device
 from sosmith.model.link.frames import Message, Receiver
-from sosmith.model.link.protocol import Counter, Type
+from sosmith.model.link.protocol import Counter, Status, Type
 from sosmith.sim.virtual_board.line_damage import LineDamage
 
 
@@ -36,6 +36,31 @@ def test_results_are_those_of_the_model(design, window: int) -> None:  # type: i
     assert np.array_equal(results.codes, expected)
     assert np.array_equal(results.status, status)
     assert np.array_equal(results.values, made.core.datapath.output.decode(expected))
+
+
+class Asked(Device):
+    """A board that packs, and remembers the types of requests."""
+
+    def __init__(self, design: sosmith.Design) -> None:
+        plain = device_of(design)
+        super().__init__(plain._identity.model_copy(update={"packed": tuple(range(7))}), plain._core)
+        self.asked: list[int] = []
+
+    def _carried_out(self, request: Message) -> tuple[bytes, Status]:
+        self.asked.append(request.type)
+        return super()._carried_out(request)
+
+
+def test_packed_results_are_those_of_the_model() -> None:
+    made = instrument_design()
+    codes = random_codes(made, 500)
+    device = Asked(made)
+    with Board.on(BadLine(device)) as board:
+        results = board.run_codes(codes)
+        assert board.faults["damaged"] == 0
+    assert np.array_equal(results.codes, made.core.datapath.compute(codes))
+    assert np.array_equal(results.status, made.core.datapath.compute_status(codes))
+    assert (device.asked.count(Type.SAMPLES), device.asked.count(Type.SAMPLES_PACKED)) == (0, -(-1000 // 60))
 
 
 def test_physical_values_as_in_a_design() -> None:

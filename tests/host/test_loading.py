@@ -31,7 +31,7 @@ def swap() -> tuple[CoreDesign, Datapath, dict[str, Any]]:
     made = sosmith.design(SPEC).core
     new = set_for(made, sosmith.design(OTHER).core.spec)
     proven = check_swap(made, own_set(made), new)
-    return made, proven.made.quantized.datapath, reload_json(made, proven, 7)
+    return made, proven.new_set.quantized.datapath, reload_json(made, proven, 7)
 
 
 def board(line_damage: LineDamage | None = None, design: int | None = None) -> tuple[Board, ReloadableCore]:

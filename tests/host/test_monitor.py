@@ -235,6 +235,20 @@ def test_times_are_right_after_results_were_missed() -> None:
                 break
 
 
+def test_packed_results_of_a_board_that_measures() -> None:
+    clock = Time()
+    device = MeasuringDevice(lambda: clock.now, measuring_identity(2).model_copy(update={"packed": (0, 6)}))
+    device.status = 0x41
+    numbers: list[int] = []
+    for event in watch(lambda: Board.on(BadLine(device)), lambda identity: CODES, clock=clock):
+        if isinstance(event, Received):
+            numbers += event.results.codes[:, 1].tolist()
+            assert np.all(event.results.status == 0x41)
+            if len(numbers) > 90:
+                break
+    assert numbers == list(range(len(numbers)))
+
+
 @pytest.mark.parametrize("factor", [0.99, 1.01])
 def test_times_follow_a_board_whose_clock_is_wrong(factor: float) -> None:
     clock = Time()

@@ -11,7 +11,7 @@ from urllib.error import HTTPError
 from urllib.request import urlopen
 
 import pytest
-from tests.host.browser import BROWSER, browser
+from tests.host.browser import BROWSER, Tab, browser
 from tests.host.gauges import feed, gauge
 from tests.host.lines import device_of
 from tests.interface.small import filter_design
@@ -139,6 +139,12 @@ def test_everybody_can_read_it(live: tuple[Readings, LivePage], tmp_path: Path, 
         assert tab.faults() == []
 
 
+def _limits(tab: Tab) -> list[str]:
+    names: list[str] = tab.value("[...document.querySelectorAll('#plot .limit-name')].map((text) => text.textContent)")
+    assert tab.value("document.querySelectorAll('#plot line.limit').length") == sum(name[0].isalpha() for name in names)
+    return names
+
+
 @pytest.mark.skipif(BROWSER is None, reason="there is no Chromium on this machine")
 def test_the_page_in_a_browser(live: tuple[Readings, LivePage], tmp_path: Path) -> None:
     readings, page = live
@@ -162,8 +168,12 @@ def test_the_page_in_a_browser(live: tuple[Readings, LivePage], tmp_path: Path) 
         ]
         assert tab.value("document.querySelectorAll('#plot path.line').length") == 2
         assert tab.value("document.querySelectorAll('#plot .raised').length") == 1
+        # Warnings at 1.5 and criticals at 3 mm; the curves reach from 1 to 2.
+        assert _limits(tab) == ["critical 3 mm", "warning 1.5 mm"]
         tab.value("document.querySelector('#channels input').click()")
         assert tab.value("document.querySelectorAll('#plot path.line').length") == 1
+        # The second channel's limits, as the first one is hidden; it stays at 2 mm, from where neither is near.
+        assert _limits(tab) == ["\u2191 critical 3 mm", "\u2193 warning 1.5 mm"]
         tab.value("document.querySelector('input[data-what=wear]').click(); document.getElementById('plot').focus()")
         tab.key("End")
         assert tab.value("document.getElementById('cursor').textContent") == "At 0:00:09.99, wear in mm: 1: 1.000"

@@ -310,3 +310,20 @@ def test_facts_and_certificate_are_made_once(tmp_path: Path, monkeypatch: pytest
     monkeypatch.setattr(writing, "certificate", None)
     written = {path.name: path.read_text(encoding="utf-8") for path in made.generate(tmp_path)}
     assert written == expected
+
+
+@pytest.mark.parametrize(
+    ("trace", "seconds", "message"),
+    [
+        (
+            np.zeros(3),
+            None,
+            "the trace must be the name of one, a path, or arrays by the names of the inputs, not something "
+            "of type ndarray",
+        ),
+        ("noise", "x", "seconds must be a number, not 'x'"),
+    ],
+)
+def test_traces_that_are_none(trace: Any, seconds: Any, message: str) -> None:
+    with pytest.raises(SpecificationError, match=f"^{message}$"):
+        filter_design().simulate(trace, seconds=seconds)

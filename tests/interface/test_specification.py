@@ -53,6 +53,14 @@ BAD = {
         r"filter\.sos\[0\]\[0\] must be a finite number, not",
     ),
     "range of one": ([[1.0, 0.0, 0.0, 1.0, 0.0, 0.0]], {"input_range": (1.0,)}, r"a range must be two numbers"),
+    "range of text": ([[1.0, 0.0, 0.0, 1.0, 0.0, 0.0]], {"input_range": ("a", 1)}, r"a range must be two numbers.*'a'"),
+    "range of a number": ([[1.0, 0.0, 0.0, 1.0, 0.0, 0.0]], {"input_range": 5}, r"a range must be two numbers.*not 5$"),
+    "masked": (
+        np.ma.masked_array([[1.0, 0, 0, 1, 0, 0]], [[0, 0, 0, 0, 1, 0]]),
+        {},
+        r"sos must all be known, not mask",
+    ),
+    "complex": ([[1.0, 0.0, 0.0, 1.0, 1j, 0.0]], {}, r"sos must be real numbers, not complex ones"),
     "realization": (
         [[1.0, 0.0, 0.0, 1.0, 0.0, 0.0]],
         {"realization": "df1_ef3"},
@@ -91,3 +99,10 @@ def test_replaced_keys() -> None:
     assert spec.channels == 1
     assert "hardware" not in spec.as_dict()
     assert sosmith.Specification.load(INSTRUMENT).channels == 2
+
+
+@pytest.mark.parametrize(("source", "found"), [(None, "None"), (5, "5"), ([1], "something of type list")])
+def test_what_is_no_specification(source: object, found: str) -> None:
+    message = f"^the specification must be a path, a dict or a Specification, not {found}$"
+    with pytest.raises(SpecificationError, match=message):
+        Specification.load(source)  # type: ignore[arg-type]

@@ -50,9 +50,7 @@ def test_encoding_saturates() -> None:
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
 def test_only_finite_values_are_encoded(value: float) -> None:
-    with pytest.raises(
-        ValueError, match=f"^{re.escape(f'values of voltage must be finite, not {np.float64(value)!r}')}$"
-    ):
+    with pytest.raises(ValueError, match=f"^{re.escape(f'values of voltage must be finite, not {value}')}$"):
         VOLTAGE.encode(np.array([1.0, value]))
 
 

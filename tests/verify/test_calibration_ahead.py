@@ -69,7 +69,7 @@ def test_both_programs_are_proven_from_the_text(tmp_path: Path) -> None:
     (tmp_path / "spec.toml").write_text(made.spec.text, encoding="utf-8")
     certificate = Certificate.load(tmp_path / f"{made.spec.name}.certificate.json")
     proof = certificate.verify(spec=tmp_path / "spec.toml", files=tmp_path, rebuild=True)
-    behind, ahead = made.architecture.program, made.architecture.ahead
+    behind, ahead = made.architecture.program, made.architecture.calibration
     assert behind is not None
     assert ahead is not None
     assert ahead.program is not None

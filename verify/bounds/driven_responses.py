@@ -62,13 +62,13 @@ class Denominator:
         """Upper bound of the sum of magnitudes; if `rough`, it need not be close."""
         if self.step > 1:
             parts = (fmpq_poly(numerator.coeffs()[k :: self.step]) for k in range(self.step))
-            return sum((self.turn.norm(part, rough=rough) for part in parts if part), Fraction(0))
+            return sum((self.phase.norm(part, rough=rough) for part in parts if part), Fraction(0))
         if self.pieces is None:
             return response(numerator, self.inverse).gain
         return self.pieces.norm(numerator, rough=rough)
 
     @cached_property
-    def turn(self) -> Denominator:
+    def phase(self) -> Denominator:
         """The polynomial in w, if this is one in ``w**step``."""
         return Denominator(fmpq_poly(self.polynomial.coeffs()[:: self.step]))
 
@@ -88,7 +88,7 @@ def magnitude(over: Denominator, driven: Sequence[Driven]) -> Fraction:
 
 def deviation(
     over: Denominator,
-    made: fmpq_poly,
+    numerator: fmpq_poly,
     ideal: Denominator,
     exact: fmpq_poly,
     windows: Sequence[tuple[Fraction, Fraction]],
@@ -98,14 +98,14 @@ def deviation(
         # Over a denominator in the same power of w, the ideal filter's responses take turns as well.
         factor, scattered = _scattered(ideal.polynomial, over.step)
         ideal, exact = Denominator(scattered), exact * factor
-    difference = made * ideal.polynomial - exact * over.polynomial
+    difference = numerator * ideal.polynomial - exact * over.polynomial
     size = None
     if difference and over.pieces is not None and ideal.pieces is not None:
-        size = over.pieces.distance(made, ideal.pieces, exact)
+        size = over.pieces.distance(numerator, ideal.pieces, exact)
     if size is None or any(low > 0 or high < 0 for low, high in windows):
         both = Denominator(over.polynomial * ideal.polynomial)
         return max(magnitude(both, [(difference, *window)]) for window in windows)
-    gain = abs(over.total(made) - ideal.total(exact))
+    gain = abs(over.total(numerator) - ideal.total(exact))
     return max(abs(low + high) / 2 * gain + (high - low) / 2 * size for low, high in windows)
 
 
@@ -115,9 +115,9 @@ def _scattered(polynomial: fmpq_poly, step: int) -> tuple[fmpq_poly, fmpq_poly]:
         return fmpq_poly([1]), polynomial
     mirrored = polynomial(fmpq_poly([0, -1]))
     even = fmpq_poly((polynomial * mirrored).coeffs()[::2])  # in w**2
-    factor, made = _scattered(even, step // 2)
+    factor, scattered = _scattered(even, step // 2)
     square = fmpq_poly([0, 0, 1])
-    return mirrored * factor(square), made(square)
+    return mirrored * factor(square), scattered(square)
 
 
 def extremes(over: Denominator, driven: Sequence[Driven], *, rough: bool = False) -> tuple[Fraction, Fraction]:
@@ -137,10 +137,10 @@ def extremes(over: Denominator, driven: Sequence[Driven], *, rough: bool = False
     if not apart:
         return centre - reach, centre + reach
     if rough and over.step > 1:
-        # No sum of all turns up to some n is beyond the sum of their own limits, and of 0 for a turn still to come.
-        limits = [extremes(over.turn, turn, rough=True) for turn in _turns(driven, over.step)]
+        # No sum of all phases up to some n is beyond the sum of their own limits, and of 0 for one still to come.
+        limits = [extremes(over.phase, phase, rough=True) for phase in _phases(driven, over.step)]
         none = Fraction(0)
-        in_turns = [
+        by_phase = [
             sum((min(none, low) for low, _ in limits), none),
             sum((max(none, high) for _, high in limits), none),
         ]
@@ -148,7 +148,7 @@ def extremes(over: Denominator, driven: Sequence[Driven], *, rough: bool = False
         coming = _still_to_come(over, apart)
         odd = int(coming.denom()) // (int(coming.denom()) & -int(coming.denom()))  # a norm is of binary fractions
         beyond = over.norm(coming * odd, rough=True) / odd
-        return max(in_turns[0], centre - reach - beyond), min(in_turns[1], centre + reach + beyond)
+        return max(by_phase[0], centre - reach - beyond), min(by_phase[1], centre + reach + beyond)
     more = _overshoot(over, apart, summed)
     if more is None or (max(more) > reach * _NEGLIGIBLE and not rough):
         return _running_extremes(over, summed)
@@ -156,8 +156,8 @@ def extremes(over: Denominator, driven: Sequence[Driven], *, rough: bool = False
     return centre - reach - below, centre + reach + above
 
 
-def _turns(driven: Sequence[Driven], step: int) -> list[list[Driven]]:
-    """Numerators of the responses that take turns over a denominator in ``w**step``, with the same drives."""
+def _phases(driven: Sequence[Driven], step: int) -> list[list[Driven]]:
+    """Numerators of the polyphase components over a denominator in ``w**step``, with the same drives."""
     return [[(fmpq_poly(over.coeffs()[k::step]), low, high) for over, low, high in driven] for k in range(step)]
 
 

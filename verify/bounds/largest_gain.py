@@ -66,16 +66,16 @@ class _LeftSide:
 
     def on(self, low: Fraction, high: Fraction) -> _Interval:
         """Bound it on an interval."""
-        found = self._known.get((low, high))
-        if found is None:
+        interval = self._known.get((low, high))
+        if interval is None:
             over, under = (self._bernstein(each, low, high) for each in (self._over, self._under))
             middle = (low + high) / 2
             positive = min(under) > 0
             most = max(fraction(p / q) for p, q in zip(over, under, strict=True)) if positive else None
             at = _fmpq(middle)
             value = fraction(self._over(at) / self._under(at))
-            found = self._known[low, high] = _Interval(most, value, _frequency(low), _frequency(middle))
-        return found
+            interval = self._known[low, high] = _Interval(most, value, _frequency(low), _frequency(middle))
+        return interval
 
     def _bernstein(self, polynomial: fmpq_poly, low: Fraction, high: Fraction) -> list[fmpq]:
         """Bernstein coefficients on an interval, each times a binomial coefficient."""
@@ -142,16 +142,16 @@ def _check_bound(left: _LeftSide, entry: DecimationEntry, band: int, gain: Fract
     left_to_do = [(Fraction(-1), Fraction(1))]
     while left_to_do:
         low, high = left_to_do.pop()
-        found = left.on(low, high)
-        least = square * _right_side(entry, band, found.lowest)
-        if found.most is not None and arb(_fmpq(found.most)) <= least:
+        interval = left.on(low, high)
+        least = square * _right_side(entry, band, interval.lowest)
+        if interval.most is not None and arb(_fmpq(interval.most)) <= least:
             continue
-        there = _right_side(entry, band, found.central)
-        reached = (arb(_fmpq(found.middle)) / there).sqrt()
+        there = _right_side(entry, band, interval.central)
+        reached = (arb(_fmpq(interval.middle)) / there).sqrt()
         require(
             not reached > arb(_fmpq(gain)),
             f"the largest gain from band {band} must be at least {float(reached):.6g}, which "
-            f"is reached at {float(found.central):.6g} of the lower rate, not {float(gain):.6g}",
+            f"is reached at {float(interval.central):.6g} of the lower rate, not {float(gain):.6g}",
         )
         if high - low <= _SMALLEST:
             raise UndecidedError(f"the largest gain from band {band}")

@@ -90,8 +90,8 @@ class Pieces:
         if key not in self._found:
             total, residual = self._sequence(numerator, rough=rough)
             self._found[key] = leading, total + self._inverse * residual
-        first, found = self._found[key]
-        return abs(fraction(leading / first)) * found
+        first, norm = self._found[key]
+        return abs(fraction(leading / first)) * norm
 
     def excess(
         self, numerator: fmpq_poly, rising: fmpq_poly, low: Fraction, high: Fraction
@@ -105,13 +105,13 @@ class Pieces:
         (f, f_doubts, off), (r, r_doubts, r_off) = map(self._samples, (numerator, rising))
         count, largest = max(len(f), len(r)) + 1, max(-low, high)
         most = np.pad(np.abs(f) + f_doubts, (0, count - len(f)))
-        found = []
+        bounds = []
         for ends in ((float(low), float(high)), (-float(high), -float(low))):
             least = np.maximum(np.maximum(ends[0] * r, ends[1] * r) - float(largest) * r_doubts, 0.0)
             least = np.pad(least, (0, count - len(r)))
             behind = np.cumsum(least[:0:-1])[::-1] * (1 - 2.0**-20)  # more than the rounding of these sums
-            found.append(Fraction(max(0.0, float((most[:-1] - behind).max()))) + off + largest * r_off)
-        return found[0], found[1]
+            bounds.append(Fraction(max(0.0, float((most[:-1] - behind).max()))) + off + largest * r_off)
+        return bounds[0], bounds[1]
 
     def distance(self, numerator: fmpq_poly, other: Pieces, subtracted: fmpq_poly) -> Fraction | None:
         """Upper bound of the sum of magnitudes ``|N/D - N'/D'|``, the second response one of `other`, hardly above it.
@@ -171,12 +171,12 @@ class Pieces:
 
     def _impulse_up_to(self, length: int) -> list[int]:
         """Approximate samples of 1/D in units of ``2**-fine``."""
-        made = self._impulse
+        samples = self._impulse
         drop = max(0, self._shift - 2 * self._fine)
         weights, shift = [-value >> drop for value in self._under[1:]], self._shift - drop
-        while len(made) < length:
-            made.append(sum(map(mul, weights, made[: -len(weights) - 1 : -1])) >> shift)
-        return made
+        while len(samples) < length:
+            samples.append(sum(map(mul, weights, samples[: -len(weights) - 1 : -1])) >> shift)
+        return samples
 
     def _find_forms(self, window: int, fine: int) -> None:
         """Choose the samples that x stands for, by elimination, and find P and T from those of 1/D."""
@@ -294,9 +294,9 @@ class Pieces:
         samples = [*(value << self._bits for value in head), *(self._forms[: self._order] @ first).tolist()]
         total = Fraction(0)
         for n in range(len(samples)):
-            made = sum(value * samples[n - k] for k, value in enumerate(self._under[: n + 1]))
+            product = sum(value * samples[n - k] for k, value in enumerate(self._under[: n + 1]))
             wanted = Fraction(taps[n] if n < len(taps) else 0, scale)
-            total += abs(wanted - Fraction(made, 1 << self._shift + bits))
+            total += abs(wanted - Fraction(product, 1 << self._shift + bits))
         return total
 
     def _numbers(self, first: Integers) -> tuple[Integers, int]:
@@ -305,12 +305,12 @@ class Pieces:
         rows, error = [[fmpz(value)] for value in first.tolist()], 0
         largest = max(map(abs, first.tolist()))
         for power, norm in zip(self._powers, self._norms, strict=False):
-            made = [value >> bits for value in (power * fmpz_mat(rows)).entries()]
+            following = [value >> bits for value in (power * fmpz_mat(rows)).entries()]
             # The power is within two units, and the product is rounded down.
             error = max(error, math.ceil(norm * error) + (2 * d * (largest + error) >> bits) + 2)
-            largest = max(largest, int(max(map(abs, made))))
+            largest = max(largest, int(max(map(abs, following))))
             count = len(rows[0])
-            rows = [row + made[k * count : (k + 1) * count] for k, row in enumerate(rows)]
+            rows = [row + following[k * count : (k + 1) * count] for k, row in enumerate(rows)]
         return np.array([list(map(int, row)) for row in rows], dtype=object), error
 
 

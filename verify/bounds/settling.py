@@ -82,8 +82,8 @@ def _check_counter(stage: StageEntry, count: int, samples: int) -> None:
                 f"{label(stage, index)} must stay in {node.low}..{node.high}, not be {codes[index]}",
             )
         wanted = -1 if sample < samples else 0
-        found = codes[stage.outputs[1]]
-        require(found == wanted, f"the flag of {stage.name} must be {wanted} at sample {sample}, not {found}")
+        flag = codes[stage.outputs[1]]
+        require(flag == wanted, f"the flag of {stage.name} must be {wanted} at sample {sample}, not {flag}")
         following = {index: codes[nodes[index].operands[0]] for index in states}
         if sample == samples:
             require(following == states, f"the counter of {stage.name} must stop at sample {samples}")
@@ -117,7 +117,7 @@ def check_fading(sections: Sequence[StageEntry], samples: int) -> None:
     """
     models = [Transfer(section) for section in sections]
     over = inverse(prod((model.denominator for model in models), start=fmpq_poly([1])))
-    found: list[tuple[Fraction, list[int]]] = []
+    tails: list[tuple[Fraction, list[int]]] = []
     slack = Fraction(0)
     for number, section in enumerate(sections):
         before = prod((model.denominator for model in models[:number]), start=fmpq_poly([1]))
@@ -132,10 +132,10 @@ def check_fading(sections: Sequence[StageEntry], samples: int) -> None:
                 ]
             reached = response(numerators[0] * before, over)
             width = (entry.high - entry.low) * Fraction(2) ** -entry.frac
-            found.append((width, reached.samples[samples + 1 :]))  # the first one is that of the impulse
+            tails.append((width, reached.samples[samples + 1 :]))  # the first one is that of the impulse
             slack += width * reached.error
-    scale = lcm(*(width.denominator for width, _ in found))
-    late = zip_longest(*([abs(h) * int(width * scale) for h in rest] for width, rest in found), fillvalue=0)
+    scale = lcm(*(width.denominator for width, _ in tails))
+    late = zip_longest(*([abs(h) * int(width * scale) for h in rest] for width, rest in tails), fillvalue=0)
     left = Fraction(max(map(sum, late), default=0), scale << BITS) + slack
     require(
         left <= SETTLED,
@@ -146,7 +146,7 @@ def check_fading(sections: Sequence[StageEntry], samples: int) -> None:
 
 def _with_impulses(section: StageEntry) -> list[tuple[NodeEntry, StageEntry]]:
     """Return each state of a section, and the section with one more input that is added to what it takes over."""
-    found = []
+    driven = []
     for index, node in enumerate(section.nodes):
         if node.op is not Operation.DELAY or section.nodes[node.operands[0]].op is Operation.FRACTION:
             continue
@@ -156,5 +156,5 @@ def _with_impulses(section: StageEntry) -> list[tuple[NodeEntry, StageEntry]]:
         total = section.nodes[of].model_copy(update={"op": Operation.ADD, "operands": (of, count)})
         nodes = list(section.nodes)
         nodes[index] = node.model_copy(update={"operands": (count + 1,)})
-        found.append((node, section.model_copy(update={"nodes": (*nodes, added, total)})))
-    return found
+        driven.append((node, section.model_copy(update={"nodes": (*nodes, added, total)})))
+    return driven

@@ -32,7 +32,7 @@ _SUM_BITS = 62
 
 @dataclass(frozen=True)
 class ModelVerdict:
-    """What the check of a C model has found: the number of nodes that its statements compute, and of states."""
+    """The result of the check of a C model: the number of nodes that its statements compute, and of states."""
 
     nodes: int
     states: int
@@ -190,7 +190,7 @@ class _Model:
         if node.op is Operation.CLAMP:
             before = f"w.{stages.member((number, node.operands[0]))}"
             conditions[_SATURATED] += [f"{before} < {_literal(node.low)}", f"{before} > {_literal(node.high)}"]
-        terms = [f"({' || '.join(found)}) << {bit}" for bit, found in conditions.items() if found]
+        terms = [f"({' || '.join(alternatives)}) << {bit}" for bit, alternatives in conditions.items() if alternatives]
         settling = ""
         if settles:
             settling = f"w.{stages.member((number, last.outputs[1]))} < 0"
@@ -228,7 +228,7 @@ class _Model:
         inputs = self._certificate.inputs
         codes = ", ".join(f"{port.name}_code" for port in inputs)
         taken, flags = inputs[0], "uint8_t flags;"
-        ahead = entry.calibration is not None
+        calibrates = entry.calibration is not None
         return filled(
             text,
             NAME=self._name,
@@ -236,17 +236,17 @@ class _Model:
             LAST=entry.stages - 1,
             TAKEN=self._parameters(inputs, self._channel),
             FIRST=f"{flags} const int64_t code = ahead_step(NULL, {codes}, &flags);"
-            if ahead
+            if calibrates
             else f"const int64_t code = {codes}; {flags}",
             WARM=entry.stages * entry.factor,
             FACTOR=entry.factor,
-            KEPT="flags" if ahead else "at_rail",
-            SEEN="flags & 0x03" if ahead else f"code == {taken.lowest} || code == {taken.highest}",
+            KEPT="flags" if calibrates else "at_rail",
+            SEEN="flags & 0x03" if calibrates else f"code == {taken.lowest} || code == {taken.highest}",
             HALF=1 << entry.dropped >> 1,
             DROPPED=entry.dropped,
             CHANNEL=self._channel,
-            MASK="0x03" if ahead else "0x01",
-            PASSED="state->flags" if ahead else "(state->at_rail ? 0x01 : 0)",
+            MASK="0x03" if calibrates else "0x01",
+            PASSED="state->flags" if calibrates else "(state->at_rail ? 0x01 : 0)",
         )
 
 

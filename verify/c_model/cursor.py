@@ -28,7 +28,7 @@ class Cursor:
         """The next token; empty at the end."""
         return self._tokens[self._place].text if self._place < len(self._tokens) else ""
 
-    def ahead(self, count: int) -> str:
+    def peek(self, count: int) -> str:
         """Return the token `count` places behind the next one."""
         index = self._place + count
         return self._tokens[index].text if index < len(self._tokens) else ""
@@ -41,11 +41,11 @@ class Cursor:
         RejectedError
             If the next one is not.
         """
-        found = self.next
-        if not found or re.fullmatch(pattern, found, re.ASCII) is None:
+        token = self.next
+        if not token or re.fullmatch(pattern, token, re.ASCII) is None:
             raise self.refused(f"{pattern}")
         self._place += 1
-        return found
+        return token
 
     def expect(self, text: str) -> None:
         """Take exactly the tokens of a text.
@@ -62,15 +62,15 @@ class Cursor:
 
     def accepts(self, mark: str) -> bool:
         """Take a token if it is the next one, and say whether it was."""
-        found = self.next == mark
-        self._place += found
-        return found
+        accepted = self.next == mark
+        self._place += accepted
+        return accepted
 
     def refused(self, wanted: str) -> RejectedError:
         """Return the error that something else is wanted here."""
         token = self._tokens[min(self._place, len(self._tokens) - 1)] if self._tokens else Token("", 1)
-        found = "its end" if not self.next else token.text[:60]
-        return RejectedError(f"line {token.line} of {self._file} must go on with {wanted}, not with {found!a}")
+        read = "its end" if not self.next else token.text[:60]
+        return RejectedError(f"line {token.line} of {self._file} must go on with {wanted}, not with {read!a}")
 
     def end(self) -> None:
         """Check that nothing is left.

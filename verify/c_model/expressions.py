@@ -187,7 +187,7 @@ class Reader:
         return left
 
     def _cast(self) -> Value:
-        if self._cursor.next == "(" and self._cursor.ahead(1) in HELD and self._cursor.ahead(2) == ")":
+        if self._cursor.next == "(" and self._cursor.peek(1) in HELD and self._cursor.peek(2) == ")":
             self._cursor.expect("(")
             kind = self._cursor.take()
             self._cursor.expect(")")

@@ -191,7 +191,7 @@ int NAME_push(NAME_decimator *state, TAKEN, int64_t *result, uint8_t *status);
 def filled(text: str, **words: object) -> str:
     """Return a text with its words in capitals replaced, all at once."""
     keys = "|".join(sorted(words, key=len, reverse=True))
-    return re.sub(rf"\b(?:{keys})", lambda found: str(words[found[0]]), text)
+    return re.sub(rf"\b(?:{keys})", lambda match: str(words[match[0]]), text)
 
 
 def ticks(given: str, stages: int, result: str) -> str:

@@ -101,10 +101,10 @@ class Stages:
         RejectedError
             If there is none.
         """
-        found = next((name for name, other in self.stored.items() if other == place), None)
-        require(found is not None, f"the stages must hand on {label(self.stages[place[0]], place[1])}")
-        assert found is not None
-        return found
+        member = next((name for name, other in self.stored.items() if other == place), None)
+        require(member is not None, f"the stages must hand on {label(self.stages[place[0]], place[1])}")
+        assert member is not None
+        return member
 
     def value(self, place: Place) -> Value:
         """Return what a node or an input is worth, as a variable."""
@@ -159,9 +159,9 @@ class _Body:
         elif node.op is Operation.DELAY:
             self._take_state(place)
         else:
-            found = self._expression(kind)
+            value = self._expression(kind)
             require(
-                found.form == self._wanted(node),
+                value.form == self._wanted(node),
                 f"{name} of the C model must compute {label(self._stage, index)}, and computes something else",
             )
         self._cursor.expect(";")
@@ -170,9 +170,9 @@ class _Body:
 
     def _expression(self, kind: str) -> Value:
         """Read the expression of a node, and the conversion to its type, which keeps what the node's range allows."""
-        ahead = self._cursor.ahead
+        peek = self._cursor.peek
         reader = Reader(self._cursor, self._names)
-        if (self._cursor.next, ahead(1), ahead(2)) == ("(", kind, ")") and (ahead(3) == "(" or ahead(4) == ";"):
+        if (self._cursor.next, peek(1), peek(2)) == ("(", kind, ")") and (peek(3) == "(" or peek(4) == ";"):
             self._cursor.expect(f"({kind})")
             return reader.primary()
         return reader.expression()

@@ -50,7 +50,7 @@ def tokens_of(text: str, file: str) -> list[Token]:
     RejectedError
         If it has anything else.
     """
-    found: list[Token] = []
+    tokens: list[Token] = []
     place, line = 0, 1
     while place < len(text):
         match, where = _TOKEN.match(text, place), f"line {line} of {file}"
@@ -58,16 +58,16 @@ def tokens_of(text: str, file: str) -> list[Token]:
         assert match is not None
         word, kind = match[0], match.lastgroup
         if kind == "directive":
-            found.append(Token(_directive(word, where), line))
+            tokens.append(Token(_directive(word, where), line))
         elif kind == "comment":
             require(_is_plain(word), f"{where} must have a comment of plain letters")
         elif kind != "space":
             after = None if kind != "number" else _AFTER_NUMBER.match(text, match.end())
             require(after is None, f"{where} must have numbers apart from names")
             require(_ALIKE.match(text, place) is None, f"{where} must not have what means something else")
-            found.append(Token(word, line))
+            tokens.append(Token(word, line))
         place, line = match.end(), line + word.count("\n")
-    return found
+    return tokens
 
 
 def _is_plain(comment: str) -> bool:

@@ -83,15 +83,15 @@ class BitLogic:
             self.sources.append(source)
         return self._numbers[source]
 
-    def _loaded(self, statements: Sequence[Statement], held: tuple[Bit, ...]) -> tuple[Bit, ...]:
+    def _loaded(self, statements: Sequence[Statement], word: tuple[Bit, ...]) -> tuple[Bit, ...]:
         """Return what a register holds after statements."""
         for statement in statements:
             if isinstance(statement, Load):
-                held = self._value(statement.value, max(len(held), self._netlist.width(statement.value)))[: len(held)]
+                word = self._value(statement.value, max(len(word), self._netlist.width(statement.value)))[: len(word)]
             else:
-                yes, no = (self._loaded(part, held) for part in (statement.yes, statement.no))
-                held = self._chosen(self._any(self._own(statement.condition)), yes, no)
-        return held
+                yes, no = (self._loaded(part, word) for part in (statement.yes, statement.no))
+                word = self._chosen(self._any(self._own(statement.condition)), yes, no)
+        return word
 
     # Expressions.
 

@@ -83,7 +83,7 @@ class Gate:
         """Whether a sample is accepted, and what enters the calibration."""
         if self.connections is None:
             return {"s_axis_tready": 1}
-        entering = {name: self.widths[found] for name, found in self.connections.entering.items()}
+        entering = {name: self.widths[source] for name, source in self.connections.entering.items()}
         return {"s_axis_tready": 1, self.connections.offered: 1, self.connections.ready: 1, **entering}
 
     @property
@@ -138,7 +138,7 @@ class CalibrationPorts:
     @property
     def nets(self) -> Mapping[str, int]:
         """Whether a sample is accepted, and what enters the calibration."""
-        entering = {name: self.width if found == DATA else 1 for name, found in self.connections.entering.items()}
+        entering = {name: self.width if source == DATA else 1 for name, source in self.connections.entering.items()}
         return {"s_axis_tready": 1, self.connections.offered: 1, self.connections.ready: 1, **entering}
 
     @property

@@ -131,26 +131,26 @@ def check_channels(
     closed, bits = netlist.registers.get("closed"), (channels - 1).bit_length()
     if closed is None:
         raise RejectedError("there must be a register closed")
-    taken = next(name for name, found in connections.entering.items() if found == names.dest)
+    taken = next(name for name, source in connections.entering.items() if source == names.dest)
     whole = -(-bits // 8) * 8
     for port_name, least in ((DEST, whole), ("m_axis_tdest", whole), (taken, bits)):
-        found = netlist.widths.get(port_name, 0)
-        require(found >= least, f"{port_name} must have {least} bits, not {found}")
+        width = netlist.widths.get(port_name, 0)
+        require(width >= least, f"{port_name} must have {least} bits, not {width}")
     if entry.calibration is None:
-        (port,), ahead = certificate.inputs, None
+        (port,), calibration = certificate.inputs, None
         layout = {DATA: [Field(DATA, port.bits)]}
         enters = _Enters(DATA, DEST, netlist.widths[DEST], ())
     else:
         port = entry.calibration.output
-        ahead = calibration_connections(netlist, box, port.bits, bits)
-        layout = layout_of(netlist, ahead, port, bits)
+        calibration = calibration_connections(netlist, box, port.bits, bits)
+        layout = layout_of(netlist, calibration, port, bits)
         enters = _Enters(CODE, CHANNEL, bits, FLAGS)
 
     def valid(now: Logic) -> int:
-        return gate.offered(now) if ahead is None else now.bit(ahead.valid)
+        return gate.offered(now) if calibration is None else now.bit(calibration.valid)
 
     cic = ChannelCic(entry, port, channels, connections, names, enters, valid, netlist.widths[taken])
-    gate: Gate = Gate(closed.first, closed.width, cic.ready, ahead, netlist.widths)
+    gate: Gate = Gate(closed.first, closed.width, cic.ready, calibration, netlist.widths)
     return check_parts(netlist, [leaving, cic, gate], Signals({**layout, **cic.layout}, cic.one_hot), cic)
 
 
@@ -199,13 +199,13 @@ class ChannelCic:
         """What enters the core."""
         widths = {CIC + "o_data": self.entry.width - self.entry.dropped, CIC + "o_flags": self._flag_bits}
         widths[self.names.dest] = self.dest_width
-        return {name: widths.get(found, 1) for name, found in self.connections.entering.items()}
+        return {name: widths.get(source, 1) for name, source in self.connections.entering.items()}
 
     @property
     def registers(self) -> Mapping[str, RegisterShape]:
         """The states, what is kept of a sample, the adder's, and a result."""
         width, shapes = self.entry.width, self.memories
-        found = {
+        own = {
             "channel": RegisterShape(self._channel_bits, 0),
             "sample": RegisterShape(self.port.bits, None),
             "gathered": RegisterShape(self._flag_bits, None),
@@ -216,7 +216,7 @@ class ChannelCic:
             "o_flags": RegisterShape(self._flag_bits, None),
         }
         return {
-            **{CIC + name: held for name, held in found.items()},
+            **{CIC + name: shape for name, shape in own.items()},
             **{name: RegisterShape(1, int(not place)) for place, name in enumerate(self.names.states)},
             self.names.control: RegisterShape(shapes[_CONTROL].width, None),
             self.names.state: RegisterShape(width, None),
@@ -358,7 +358,7 @@ class ChannelCic:
             case "sample" if idle:
                 return now.signal(self.enters.code)
             case "gathered" if idle:
-                return constant(self._told(now))
+                return constant(self._flags_handed_on(now))
             case "acc" if self._is(now, "takes"):
                 return plus(self._signed(now, CIC + "sample"), self._signed_first(now), -1)
             case "acc" if adds:
@@ -408,7 +408,7 @@ class ChannelCic:
         before = now.limits(_FLAGS)[0] if self._started(now) else 0
         return before | now.limits(CIC + "gathered")[0]
 
-    def _told(self, now: Logic) -> int:
+    def _flags_handed_on(self, now: Logic) -> int:
         """Return the flags of the sample that enters."""
         if self.enters.flags:
             return sum(now.bit(flag) << place for place, flag in enumerate(self.enters.flags))

@@ -45,8 +45,8 @@ from sosmith.verify.multirate.connections import (
     calibration_connections,
     core_connections,
     passed_on,
-    read_around,
     read_core,
+    read_shell,
 )
 from sosmith.verify.multirate.logic import BIT, Field, Logic, Part, Ranges, RegisterShape, Signals, check_parts
 from sosmith.verify.multirate.passed_flags import check_passed
@@ -64,7 +64,7 @@ _NAME = re.compile(r"(\w*?)(\d*)(?:_control(\d))?")
 
 @dataclass(frozen=True)
 class DecimatorVerdict:
-    """What the check of a decimator's hardware has found.
+    """The result of the check of a decimator's hardware.
 
     Attributes
     ----------
@@ -100,25 +100,25 @@ def check_decimator(text: str, certificate: Certificate, channels: int = 1) -> D
         If a register is loaded with anything else, a port is connected otherwise, or the text has anything that cannot
         be read; the sentence names the first register or port that is wrong.
     """
-    found, output = multirate_top(text, certificate, channels), certificate.output
+    shell, output = multirate_top(text, certificate, channels), certificate.output
     entry = certificate.decimation
     assert entry is not None
-    netlist, connections, word = found.netlist, found.connections, found.word
+    netlist, connections, word = shell.netlist, shell.connections, shell.word
     leaving = _Holder(connections, output, word, entry.factor) if word else _Passing(connections, output)
-    box = found.modules.get(f"{certificate.name}_ahead")
-    if found.names is None:
+    box = shell.modules.get(f"{certificate.name}_ahead")
+    if shell.names is None:
         registers = _check_one(netlist, box, certificate, connections, leaving)
     else:
-        registers = check_channels(netlist, box, certificate, channels, connections, found.names, leaving)
+        registers = check_channels(netlist, box, certificate, channels, connections, shell.names, leaving)
     check_passed(netlist, connections, word, (channels - 1).bit_length())
-    check_signs(found.modules, output, CLOCK)
+    check_signs(shell.modules, output, CLOCK)
     return DecimatorVerdict(registers, entry.factor if word else 1, channels)
 
 
 class MultirateTop(NamedTuple):
-    """What is around a core: all modules, a netlist without the core, its connections, and what has no own names.
+    """The shell around a core: all modules, a netlist without the core, its connections, and what has no own names.
 
-    `told` is the net with the flags of a result of the decimator, and `word` the register that holds results, "" if
+    `flags` is the net with the flags of a result of the decimator, and `word` the register that holds results, "" if
     they leave at once.
     """
 
@@ -126,23 +126,23 @@ class MultirateTop(NamedTuple):
     netlist: Netlist
     connections: CoreConnections
     names: Names | None
-    told: str
+    flags: str
     word: str
 
 
 def multirate_top(text: str, certificate: Certificate, channels: int) -> MultirateTop:
-    """Find what is around a core; the rest is as of `check_decimator`."""
+    """Read the shell around a core; the rest is as of `check_decimator`."""
     entry = certificate.decimation
     assert entry is not None
     modules = read_core(text, certificate.name)
-    netlist, held = read_around(modules, certificate.name), f"{certificate.name}_holder" in modules
+    netlist, has_holder = read_shell(modules, certificate.name), f"{certificate.name}_holder" in modules
     if certificate.about is not None:
         stated = table_of(words_of(certificate.about.specification), "filter").get("hold", False)
-        require(held == stated, f"results must {'' if stated else 'not '}be held, as specified")
+        require(has_holder == stated, f"results must {'' if stated else 'not '}be held, as specified")
     names = names_of(netlist) if channels > 1 else None
-    told = "o_rail" if entry.calibration is None and names is None else "o_flags"
-    connections = core_connections(netlist, told, held=held, dest=None if names is None else names.dest)
-    return MultirateTop(modules, netlist, connections, names, CIC + told, _held_word(netlist) if held else "")
+    flags = "o_rail" if entry.calibration is None and names is None else "o_flags"
+    connections = core_connections(netlist, flags, has_holder=has_holder, dest=None if names is None else names.dest)
+    return MultirateTop(modules, netlist, connections, names, CIC + flags, _held_word(netlist) if has_holder else "")
 
 
 def _check_one(
@@ -156,10 +156,10 @@ def _check_one(
         cic = _Cic(entry, port, connections, _Source(SOURCE, DATA, ()), {"s_axis_tready": 1})
         return check_parts(netlist, [leaving, cic], Signals({DATA: [Field(DATA, port.bits)]}))
     port = entry.calibration.output
-    ahead = calibration_connections(netlist, box, port.bits)
-    cic = _Cic(entry, port, connections, _Source(ahead.valid, CODE, FLAGS), {})
-    parts = [leaving, cic, CalibrationPorts(ahead, cic.ready, netlist.widths[DATA])]
-    return check_parts(netlist, parts, Signals(layout_of(netlist, ahead, port)))
+    calibration = calibration_connections(netlist, box, port.bits)
+    cic = _Cic(entry, port, connections, _Source(calibration.valid, CODE, FLAGS), {})
+    parts = [leaving, cic, CalibrationPorts(calibration, cic.ready, netlist.widths[DATA])]
+    return check_parts(netlist, parts, Signals(layout_of(netlist, calibration, port)))
 
 
 def _held_word(netlist: Netlist) -> str:
@@ -192,24 +192,24 @@ class _Cic:
         """Whether a sample is taken, and what enters the core."""
         code = self.entry.width - self.entry.dropped
         widths = {CIC + "o_data": code, CIC + "o_flags": len(self.source.flags)}
-        return {**self.accepting, **{name: widths.get(found, 1) for name, found in self.connections.entering.items()}}
+        return {**self.accepting, **{name: widths.get(source, 1) for name, source in self.connections.entering.items()}}
 
     @property
     def registers(self) -> Mapping[str, RegisterShape]:
         """Control, N sums, N combs and differences, and the output."""
         bits, flags, width = self.entry.factor.bit_length() - 1, len(self.source.flags), self.entry.width
-        found = {"phase": RegisterShape(bits, 0), "filled": RegisterShape(self.entry.stages.bit_length(), 0)}
-        found |= {"filling": RegisterShape(1, 1), "waiting": RegisterShape(1, 0)}
+        shapes = {"phase": RegisterShape(bits, 0), "filled": RegisterShape(self.entry.stages.bit_length(), 0)}
+        shapes |= {"filling": RegisterShape(1, 1), "waiting": RegisterShape(1, 0)}
         for k in range(1, self.entry.stages + 1):
-            found |= dict.fromkeys((f"integrator{k}_control0", f"comb{k}_control0"), RegisterShape(1, 0))
-            found |= dict.fromkeys(
+            shapes |= dict.fromkeys((f"integrator{k}_control0", f"comb{k}_control0"), RegisterShape(1, 0))
+            shapes |= dict.fromkeys(
                 (f"integrator{k}_control1", f"integrator{k}_control2", f"comb{k}_control1"), RegisterShape(1, None)
             )
-            found |= dict.fromkeys((f"sum{k}", f"comb{k}", f"difference{k}"), RegisterShape(width, None))
-        found |= {"o_valid": RegisterShape(1, 0), "o_data": RegisterShape(width - self.entry.dropped, None)}
-        told = {"found": RegisterShape(flags, 0), "o_flags": RegisterShape(flags, None)}
-        found |= told if flags else {"rail": RegisterShape(1, 0), "o_rail": RegisterShape(1, None)}
-        return {CIC + name: held for name, held in found.items()}
+            shapes |= dict.fromkeys((f"sum{k}", f"comb{k}", f"difference{k}"), RegisterShape(width, None))
+        shapes |= {"o_valid": RegisterShape(1, 0), "o_data": RegisterShape(width - self.entry.dropped, None)}
+        flag_shapes = {"found": RegisterShape(flags, 0), "o_flags": RegisterShape(flags, None)}
+        shapes |= flag_shapes if flags else {"rail": RegisterShape(1, 0), "o_rail": RegisterShape(1, None)}
+        return {CIC + name: shape for name, shape in shapes.items()}
 
     @property
     def ranges(self) -> Mapping[str, Ranges]:
@@ -222,11 +222,11 @@ class _Cic:
         code = tuple((start, after - 1) for start, after in pairwise(sorted(starts)))
         last, count = self.entry.factor - 1, 1 << self.entry.stages.bit_length()
         phase = ((0, 0), (1, last - 1), (last, last)) if last > 1 else BIT
-        found: dict[str, Ranges] = {CIC + "phase": phase, CIC + "filled": tuple((k, k) for k in range(count))}
+        ranges: dict[str, Ranges] = {CIC + "phase": phase, CIC + "filled": tuple((k, k) for k in range(count))}
         if self.source.flags:
-            found[CIC + "found"] = tuple((k, k) for k in range(1 << len(self.source.flags)))
-            found |= dict.fromkeys(self.source.flags, BIT)
-        return {**found, self.source.code: code}
+            ranges[CIC + "found"] = tuple((k, k) for k in range(1 << len(self.source.flags)))
+            ranges |= dict.fromkeys(self.source.flags, BIT)
+        return {**ranges, self.source.code: code}
 
     def wanted(self, now: Logic, name: str) -> Form:
         """Return what the text at the top of this file says."""

@@ -21,7 +21,7 @@ AHEAD, BEHIND, CIC, HOLDER = "ahead.", "behind.", "decimator.", "holder."
 """Prefixes of ports of the calibration and of the core, and of nets of the decimator and of what holds results."""
 
 OF_INPUT = 2
-"""Flags that are told of inputs: input_at_rail and outside_calibration."""
+"""Flags of inputs: input_at_rail and outside_calibration."""
 
 CLOCK, DATA, DEST = "aclk", "s_axis_tdata", "s_axis_tdest"
 
@@ -81,26 +81,30 @@ _OFFERED, _TAKEN = ("s_axis_tvalid", "i_valid"), ("s_axis_tready", "advance")
 _READY, _VALID = ("m_axis_tready", "o_ready"), ("m_axis_tvalid",)
 
 
-def core_connections(netlist: Netlist, told: str, *, held: bool, dest: str | None = None) -> CoreConnections:
+def core_connections(netlist: Netlist, flags: str, *, has_holder: bool, dest: str | None = None) -> CoreConnections:
     """Find the ports of the core behind.
 
-    A result of the decimator has its flags in the net `told`, and its channel in the register `dest`, if there are any.
+    A result of the decimator has its flags in the net `flags`, and its channel in the register `dest`, if there are
+    any.
 
     Raises
     ------
     RejectedError
         If the core has others, or not all of them.
     """
-    results = (CIC + "o_data", CIC + told, CIC + "o_valid")
+    results = (CIC + "o_data", CIC + flags, CIC + "o_valid")
     entering, others = _entering(netlist, BEHIND, (RESET, *results), () if dest is None else (dest,))
     require(len(others) == 1, f"the core must have one other input, which takes its results, not {len(others)}")
     ready = _one_of(netlist, BEHIND, _READY)
     require(others[0] == ready, f"{ready} must be an input of the core")
-    taken, valid = _source(netlist, CIC + "o_ready"), _source(netlist, HOLDER + "i_valid" if held else "m_axis_tvalid")
-    for name, found, wanted in ((CIC + "o_ready", taken, _TAKEN), ("a valid result", valid, _VALID)):
-        require(found.startswith(BEHIND), f"{name} must be an output of the core")
+    taken, valid = (
+        _source(netlist, CIC + "o_ready"),
+        _source(netlist, HOLDER + "i_valid" if has_holder else "m_axis_tvalid"),
+    )
+    for name, source, wanted in ((CIC + "o_ready", taken, _TAKEN), ("a valid result", valid, _VALID)):
+        require(source.startswith(BEHIND), f"{name} must be an output of the core")
         own = _one_of(netlist, BEHIND, wanted)
-        require(found == own, f"{name} must be {own}, not {found}")
+        require(source == own, f"{name} must be {own}, not {source}")
     return CoreConnections(entering, taken, ready, valid)
 
 
@@ -140,7 +144,7 @@ def _digits(box: Module, outlets: Sequence[str], bits: int) -> tuple[str, ...]:
 
     A digit is what a register has that is called ``given`` with its number, from its lowest bit on.
     """
-    found: dict[int, tuple[str, int]] = {}
+    digits: dict[int, tuple[str, int]] = {}
     for outlet in outlets:
         name = outlet.removeprefix(AHEAD)
         driven = [value for target, value in box.assigns if target == Bits(name)]
@@ -151,13 +155,13 @@ def _digits(box: Module, outlets: Sequence[str], bits: int) -> tuple[str, ...]:
         right = digit is not None and isinstance(source, Bits) and source.low == 0 and source.name in box.registers
         require(right, f"{outlet} must be a digit of the result, as there are {len(outlets)} outputs for it")
         assert digit is not None
-        found[int(digit[1])] = outlet, box.widths[name]
+        digits[int(digit[1])] = outlet, box.widths[name]
     places = range(len(outlets))
-    require(found.keys() == {*places}, f"the digits of the calibration must be 0..{len(outlets) - 1}, each once")
-    below = [box.widths[f"given{place}"] == found[place][1] for place in places[:-1]]
-    whole = all(below) and sum(width for _, width in found.values()) == bits
+    require(digits.keys() == {*places}, f"the digits of the calibration must be 0..{len(outlets) - 1}, each once")
+    below = [box.widths[f"given{place}"] == digits[place][1] for place in places[:-1]]
+    whole = all(below) and sum(width for _, width in digits.values()) == bits
     require(whole, f"the digits of the calibration must have {bits} bits in all, and all of each but for the last")
-    return tuple(found[place][0] for place in places)
+    return tuple(digits[place][0] for place in places)
 
 
 def _entering(
@@ -167,7 +171,7 @@ def _entering(
     wanted = (*whole, *extended)
     sources = {name: _source(netlist, name) for name in sorted(netlist.inlets) if name.startswith(prefix)}
     for source in (CLOCK, *wanted):
-        names = [name for name, found in sources.items() if found == source]
+        names = [name for name, net in sources.items() if net == source]
         require(len(names) == 1, f"one port of the core must be {source}, not {len(names)}")
         own, other = netlist.widths[names[0]], netlist.widths[source]
         require(own == other or source in extended, f"{names[0]} must have {other} bits, as {source} has, not {own}")
@@ -178,9 +182,9 @@ def _entering(
 def _one_of(netlist: Netlist, prefix: str, names: Sequence[str]) -> str:
     """Return the one port of a core that has one of these names."""
     ports = sorted(name for name in netlist.widths if name.startswith(prefix))
-    found = [name for name in ports if re.sub(r"_\d+$", "", name.removeprefix(prefix)) in names]
-    require(len(found) == 1, f"one port of the core must be {' or '.join(names)}, not {len(found)}")
-    return found[0]
+    matches = [name for name in ports if re.sub(r"_\d+$", "", name.removeprefix(prefix)) in names]
+    require(len(matches) == 1, f"one port of the core must be {' or '.join(names)}, not {len(matches)}")
+    return matches[0]
 
 
 def _source(netlist: Netlist, name: str) -> str:
@@ -205,7 +209,7 @@ def read_core(text: str, name: str) -> dict[str, Module]:
     return {**source.modules, **{inside: inlined(source, inside).modules[inside] for inside in sorted(inner)}}
 
 
-def read_around(modules: Mapping[str, Module], name: str) -> Netlist:
+def read_shell(modules: Mapping[str, Module], name: str) -> Netlist:
     """Put together everything but the core itself, and the calibration before the decimator."""
     boxes = {}
     for inside in (f"{name}_behind", f"{name}_ahead"):

@@ -106,7 +106,7 @@ class MemoryPart(Part, Protocol):
 
 
 def check_parts(netlist: Netlist, parts: Sequence[Part], signals: Signals, remembers: MemoryPart | None = None) -> int:
-    """Check all that is around a core; return its number of registers.
+    """Check the shell around a core; return its number of registers.
 
     Parameters
     ----------
@@ -124,30 +124,33 @@ def check_parts(netlist: Netlist, parts: Sequence[Part], signals: Signals, remem
     RejectedError
         If there is anything else: the sentence names the first register or net that is wrong.
     """
-    registers = {name: held for part in parts for name, held in part.registers.items()}
+    registers = {name: register_shape for part in parts for name, register_shape in part.registers.items()}
     memories: Mapping[str, MemoryShape] = {} if remembers is None else remembers.memories
     require(
         netlist.registers.keys() == registers.keys() and netlist.memories.keys() == memories.keys(),
         f"the registers around the core must be {', '.join(sorted({*registers, *memories}))}, not "
         f"{', '.join(sorted({*netlist.registers, *netlist.memories}))}",
     )
-    for name, held in registers.items():
+    for name, register_shape in registers.items():
         width, first = netlist.registers[name].width, netlist.registers[name].first
-        require(held.first in {None, first}, f"{name} must be {held.first} before the first clock, not {first}")
-        require(held.width in {None, width}, f"{name} must have {held.width} bits, not {width}")
-    ranges = {name: found for part in parts for name, found in part.ranges.items()}
+        require(
+            register_shape.first in {None, first},
+            f"{name} must be {register_shape.first} before the first clock, not {first}",
+        )
+        require(register_shape.width in {None, width}, f"{name} must have {register_shape.width} bits, not {width}")
+    ranges = {name: limits for part in parts for name, limits in part.ranges.items()}
     for name in ranges.keys() & registers.keys():
         assert ranges[name][-1][1] == (1 << netlist.widths[name]) - 1  # as these are all values
     for part in parts:
         for name, width in part.nets.items():
-            found = netlist.widths.get(name)
-            require(found == width, f"{name} must have {width} bits, not {found or 'none'}")
+            own = netlist.widths.get(name)
+            require(own == width, f"{name} must have {width} bits, not {own or 'none'}")
         for name in (*part.nets, *part.registers):
             _check(netlist, signals, ranges, part, name)
     for name, shape in memories.items():
         memory = netlist.memories[name]
-        found_shape = MemoryShape(memory.width, len(memory.first))
-        require(found_shape == shape, f"{name} must have {shape.depth} words of {shape.width} bits")
+        own_shape = MemoryShape(memory.width, len(memory.first))
+        require(own_shape == shape, f"{name} must have {shape.depth} words of {shape.width} bits")
         assert remembers is not None
         _check_memory(netlist, signals, ranges, remembers, name)
     return len(registers)
@@ -161,11 +164,11 @@ def _check_memory(
 
     def right(case: Case) -> bool:
         now = Logic(netlist, signals, case, ranges)
-        found, wanted = now.written(name, (shape.depth - 1).bit_length()), part.written(now, name)
-        if found is None or wanted is None:
-            return found == wanted
-        there = same_word(now.forms, found.address, wanted.address, (shape.depth - 1).bit_length())
-        return there and same_word(now.forms, found.word, wanted.word, shape.width)
+        written, wanted = now.written(name, (shape.depth - 1).bit_length()), part.written(now, name)
+        if written is None or wanted is None:
+            return written == wanted
+        there = same_word(now.forms, written.address, wanted.address, (shape.depth - 1).bit_length())
+        return there and same_word(now.forms, written.word, wanted.word, shape.width)
 
     _in_all_cases(right, ranges, name, " after a clock")
 
@@ -176,11 +179,11 @@ def _check(netlist: Netlist, signals: Signals, ranges: Mapping[str, Ranges], par
     def right(case: Case) -> bool:
         now = Logic(netlist, signals, case, ranges)
         register = name in netlist.registers
-        found = now.after(name) if register else now.net(name)
+        word = now.after(name) if register else now.net(name)
         if register and not now.bit(RESET):
             first = part.registers[name].first
-            return first is None or same_word(now.forms, found, constant(first), netlist.widths[name])
-        return same_word(now.forms, found, part.wanted(now, name), netlist.widths[name])
+            return first is None or same_word(now.forms, word, constant(first), netlist.widths[name])
+        return same_word(now.forms, word, part.wanted(now, name), netlist.widths[name])
 
     _in_all_cases(right, ranges, name, " after a clock" * (name in netlist.registers))
 
@@ -193,12 +196,12 @@ def _in_all_cases(right: Callable[[Case], bool], ranges: Mapping[str, Ranges], n
 
     for case, same in cases({}, right, values):
         if not same:
-            stated = ", ".join(f"{signal} = {_told(ranges.get(signal, BIT)[k])}" for signal, k in case.items())
+            stated = ", ".join(f"{signal} = {_shown(ranges.get(signal, BIT)[k])}" for signal, k in case.items())
             when += f" with {stated}" if stated else ""
             raise RejectedError(f"{name} must be what a decimator has there{when}, not another value")
 
 
-def _told(limits: tuple[int, int]) -> str:
+def _shown(limits: tuple[int, int]) -> str:
     low, high = limits
     return f"{low}" if low == high else f"{low}..{high}"
 

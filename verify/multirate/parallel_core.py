@@ -6,7 +6,7 @@ Its ports are connected to those that a core with streams has, in a top that is 
                                   flags -->
 
 and that is proven like any parallel core (`sosmith.verify.parallel.check`). Which bit of a port leaves the core
-where is taken from what is around it, which `sosmith.verify.multirate.cic` proves: flags that the core behind makes
+where is taken from the shell around it, which `sosmith.verify.multirate.cic` proves: flags that the core behind makes
 are then proven to leave at their places. Flags of the inputs come with each result of the decimator, and the core must
 hand on those of the same sample.
 """
@@ -38,7 +38,7 @@ def check_behind(text: str, certificate: Certificate, channels: int = 1) -> Hard
     Parameters
     ----------
     text : str
-        SystemVerilog of the core, of which `check_decimator` has accepted what is around it.
+        SystemVerilog of the core, of which `check_decimator` has accepted the shell around it.
     certificate : Certificate
         Its certificate, with a decimator, which `verify` has accepted.
     channels : int
@@ -49,43 +49,43 @@ def check_behind(text: str, certificate: Certificate, channels: int = 1) -> Hard
     RejectedError
         If it computes anything else.
     """
-    found, behind = multirate_top(text, certificate, channels), at_lower_rate(certificate)
+    shell, behind = multirate_top(text, certificate, channels), at_lower_rate(certificate)
     (port,) = behind.inputs
     whole = -(-port.bits // _BYTE) * _BYTE
-    told = found.netlist.widths[found.told]
+    flag_bits = shell.netlist.widths[shell.flags]
     supplied: dict[str, Expression] = {
         RESET: Bits(RESET),
         CIC + "o_data": Bits(DATA, 0, port.bits),
-        found.told: Bits(DATA, whole, told),
+        shell.flags: Bits(DATA, whole, flag_bits),
         CIC + "o_valid": Bits(SOURCE),
     }
-    widths = {DATA: whole + told}
-    if found.names is not None:
-        supplied[found.names.dest] = Bits(DEST)
-        (taken,) = (name for name, source in found.connections.entering.items() if source == found.names.dest)
-        widths[DEST] = found.netlist.widths[taken]
-    wires = {name: supplied[source] for name, source in found.connections.entering.items()}
+    widths = {DATA: whole + flag_bits}
+    if shell.names is not None:
+        supplied[shell.names.dest] = Bits(DEST)
+        (taken,) = (name for name, source in shell.connections.entering.items() if source == shell.names.dest)
+        widths[DEST] = shell.netlist.widths[taken]
+    wires = {name: supplied[source] for name, source in shell.connections.entering.items()}
     wires |= {
-        found.connections.ready: Bits(SINK),
-        found.connections.taken: Bits(_READY),
-        found.connections.valid: Bits(_VALID),
+        shell.connections.ready: Bits(SINK),
+        shell.connections.taken: Bits(_READY),
+        shell.connections.valid: Bits(_VALID),
     }
-    top = _top(found, f"{certificate.name}_behind", BEHIND, wires, widths, _leaving(found))
-    return check_modules({_TOP: top, **found.modules}, behind, channels, Inside(f"{_CORE}.", told))
+    top = _top(shell, f"{certificate.name}_behind", BEHIND, wires, widths, _leaving(shell))
+    return check_modules({_TOP: top, **shell.modules}, behind, channels, Inside(f"{_CORE}.", flag_bits))
 
 
 def check_ahead(text: str, certificate: Certificate, channels: int = 1) -> HardwareVerdict:
     """Prove that the parallel calibration before a decimator computes its graph; the rest is as of `check_behind`."""
-    found, alone = multirate_top(text, certificate, channels), calibration_alone(certificate)
+    shell, alone = multirate_top(text, certificate, channels), calibration_alone(certificate)
     assert alone is not None
     port, count = alone.output, (channels - 1).bit_length()
     name = f"{certificate.name}_ahead"
-    connections = calibration_connections(found.netlist, found.modules.get(name), port.bits, count)
+    connections = calibration_connections(shell.netlist, shell.modules.get(name), port.bits, count)
     wires = {entry: Bits(source) for entry, source in connections.entering.items()}
     wires |= {connections.offered: Bits(SOURCE), connections.taken: Bits(_READY)}
     wires |= {connections.ready: Bits(SINK), connections.valid: Bits(_VALID)}
     bits: dict[str, list[Expression]] = {}
-    for outlet, fields in layout_of(found.netlist, connections, port, count).items():
+    for outlet, fields in layout_of(shell.netlist, connections, port, count).items():
         place = 0
         for field in fields:
             bits.setdefault(field.signal, []).extend(Bits(outlet, place + k, 1) for k in range(field.width))
@@ -93,17 +93,17 @@ def check_ahead(text: str, certificate: Certificate, channels: int = 1) -> Hardw
     code, zero = bits[CODE], Number(0, 1)
     left = {OUTPUT: [*code, *[code[-1] if port.signed else zero] * (-port.bits % _BYTE)]}
     left[LEAVING_FLAGS] = [*(bit for flag in FLAGS for bit in bits[flag]), *[zero] * (_BYTE - len(FLAGS))]
-    widths = {DATA: found.netlist.widths[DATA]}
+    widths = {DATA: shell.netlist.widths[DATA]}
     if channels > 1:
         left[OUTPUT_DEST] = [*bits[CHANNEL], *[zero] * (-count % _BYTE)]
-        widths[DEST] = found.netlist.widths[DEST]
-    top = _top(found, name, AHEAD, wires, widths, left)
-    return check_modules({_TOP: top, **found.modules}, alone, channels, Inside(f"{_CORE}."))
+        widths[DEST] = shell.netlist.widths[DEST]
+    top = _top(shell, name, AHEAD, wires, widths, left)
+    return check_modules({_TOP: top, **shell.modules}, alone, channels, Inside(f"{_CORE}."))
 
 
-def _leaving(found: MultirateTop) -> dict[str, list[Expression]]:
+def _leaving(shell: MultirateTop) -> dict[str, list[Expression]]:
     """Return the bits of the core behind that leave at each port."""
-    logic, left = origins(found.netlist, found.word)
+    logic, left = origins(shell.netlist, shell.word)
     leaving: dict[str, list[Expression]] = {}
     for name, bits in left.items():
         for bit in bits:
@@ -115,7 +115,7 @@ def _leaving(found: MultirateTop) -> dict[str, list[Expression]]:
 
 
 def _top(
-    found: MultirateTop,
+    shell: MultirateTop,
     box: str,
     prefix: str,
     wires: Mapping[str, Expression],
@@ -131,12 +131,12 @@ def _top(
     ports |= dict.fromkeys(widths, "input") | dict.fromkeys(left, "output")
     top = Module(ports=ports, widths={**dict.fromkeys(ports, 1), **widths})
     connected: dict[str, Expression] = {}
-    for port, direction in found.modules[box].ports.items():
+    for port, direction in shell.modules[box].ports.items():
         name = prefix + port
         if name in wires:
             connected[port] = wires[name]
         elif direction == "output":
-            top.widths[name] = found.modules[box].widths[port]
+            top.widths[name] = shell.modules[box].widths[port]
             connected[port] = Bits(name)
         else:
             connected[port] = Bits(CLOCK)

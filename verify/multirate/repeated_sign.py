@@ -59,13 +59,13 @@ def _without_parts(module: Module) -> Module:
     """Let registers that are loaded in parts hold anything at any time."""
 
     def parts(statements: Sequence[Statement]) -> set[str]:
-        found = set()
+        targets = set()
         for statement in statements:
             if isinstance(statement, Choice):
-                found |= parts((*statement.yes, *statement.no))
+                targets |= parts((*statement.yes, *statement.no))
             elif isinstance(statement.target, Bits) and statement.target.width is not None:
-                found.add(statement.target.name)
-        return found
+                targets.add(statement.target.name)
+        return targets
 
     names = set().union(*(parts(statements) for _, statements in module.clocked))
     return replace(

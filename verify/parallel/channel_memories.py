@@ -77,11 +77,11 @@ class ChannelMemories(StateMemories):
             width = self._netlist.widths[repeated]
             here = self._registers.behind(repeated) == count
             require(
-                here and self._registers.same(self._registers.held(repeated), channel, width),
+                here and self._registers.same(self._registers.content_of(repeated), channel, width),
                 f"{repeated} must hold the channel of the sample at position {count + 1}",
             )
             met: Mapping[str, Form] = {
-                self._entrance.buffer.held: constant(1), near: constant(1), repeated: channel
+                self._entrance.buffer.valid: constant(1), near: constant(1), repeated: channel
             }  # fmt: skip
             if self._registers.in_front(met, enters).net(enters):
                 return count

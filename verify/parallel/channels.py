@@ -42,12 +42,12 @@ def find_channels(netlist: Netlist, channels: int, prefix: str = "") -> Control:
         If samples do not move as they must.
     """
     buffer, full = Buffer(*(f"{prefix}input_buffer.{name}" for name in _BUFFER)), f"{prefix}output_buffer.full"
-    for name in (buffer.held, buffer.full, buffer.coming, buffer.ready, full):
+    for name in (buffer.valid, buffer.full, buffer.coming, buffer.ready, full):
         require(name in netlist.widths, f"a core with several channels must have {name}")
     search = Search(netlist, {buffer.coming, buffer.ready})
-    held = search.register(search.net("m_axis_tvalid", {}), "m_axis_tvalid")
-    chain = search.chain(held, full)
-    if chain[0] == buffer.held and len(chain) > 1:  # without states, nothing holds a sample back
+    valid = search.register(search.net("m_axis_tvalid", {}), "m_axis_tvalid")
+    chain = search.chain(valid, full)
+    if chain[0] == buffer.valid and len(chain) > 1:  # without states, nothing holds a sample back
         chain = chain[1:]
     enters = _source(netlist, chain[0])
     search = Search(netlist, {buffer.coming, buffer.ready, enters})
@@ -56,7 +56,7 @@ def find_channels(netlist: Netlist, channels: int, prefix: str = "") -> Control:
     word = _counter(netlist, search, clearing, channels)
     near = tuple(name for name in (f"{prefix}near{k}" for k in range(len(chain))) if name in netlist.registers)
     control = Control(
-        (enters, *chain), Buffer(held, full, chain[-1], SINK), Entrance(buffer, clearing, word, channels, near)
+        (enters, *chain), Buffer(valid, full, chain[-1], SINK), Entrance(buffer, clearing, word, channels, near)
     )
     search.check_chain(control.valid, full)
     search.check_chain((enters, *near), full)
@@ -69,9 +69,9 @@ def find_channels(netlist: Netlist, channels: int, prefix: str = "") -> Control:
 
 def _source(netlist: Netlist, register: str) -> str:
     """Return the net that a valid bit takes over, followed back through the ports of instances up to a register."""
-    found = [value for value in _loaded(netlist.registers[register].statements) if isinstance(value, Bits)]
-    require(len(found) == 1, f"{register} must take over one net, not {len(found)}")
-    name = found[0].name
+    loaded = [value for value in _loaded(netlist.registers[register].statements) if isinstance(value, Bits)]
+    require(len(loaded) == 1, f"{register} must take over one net, not {len(loaded)}")
+    name = loaded[0].name
     while True:
         drivers = netlist.drivers.get(name, [])
         if len(drivers) != 1 or not isinstance(drivers[0].value, Bits) or drivers[0].value.width is not None:
@@ -82,13 +82,13 @@ def _source(netlist: Netlist, register: str) -> str:
 
 
 def _loaded(statements: Sequence[Statement]) -> list[Expression]:
-    found: list[Expression] = []
+    values: list[Expression] = []
     for statement in statements:
         if isinstance(statement, Load):
-            found.append(statement.value)
+            values.append(statement.value)
         else:
-            found += [*_loaded(statement.yes), *_loaded(statement.no)]
-    return found
+            values += [*_loaded(statement.yes), *_loaded(statement.no)]
+    return values
 
 
 def _counter(netlist: Netlist, search: Search, clearing: str, channels: int) -> str:
@@ -98,15 +98,15 @@ def _counter(netlist: Netlist, search: Search, clearing: str, channels: int) -> 
     search.expect(clearing, {RESET: 0}, 1)
     search.expect(clearing, {RESET: 1, clearing: 0}, 0)
     width = (channels - 1).bit_length()
-    found = [
+    counters = [
         name
         for name, register in netlist.registers.items()
         if register.width == width and name != clearing and _counts(search, name, {RESET: 1, clearing: 1}, channels)
     ]
-    require(len(found) == 1, f"one register must count to {channels - 1} while {clearing} is 1, not {len(found)}")
+    require(len(counters) == 1, f"one register must count to {channels - 1} while {clearing} is 1, not {len(counters)}")
     for k in range(channels):
-        search.expect(clearing, {RESET: 1, clearing: 1, found[0]: k}, int(k < channels - 1))
-    return found[0]
+        search.expect(clearing, {RESET: 1, clearing: 1, counters[0]: k}, int(k < channels - 1))
+    return counters[0]
 
 
 def _counts(search: Search, name: str, case: dict[str, int], channels: int) -> bool:
@@ -141,14 +141,14 @@ def _check_acceptance(netlist: Netlist, buffer: Buffer, clearing: str, channels:
 def _check_leaving(netlist: Netlist, buffer: Buffer, control: Control) -> None:
     """Check that a sample leaves the input buffer just when it enters the pipeline."""
     search, enters, ready = Search(netlist), control.valid[0], buffer.ready
-    _, value = search.net(enters, {buffer.held: 0})
+    _, value = search.net(enters, {buffer.valid: 0})
     require(not value, f"{enters} must be 0 while the input buffer is empty")
-    _, value = search.net(ready, {buffer.held: 1, control.full: 1})
+    _, value = search.net(ready, {buffer.valid: 1, control.full: 1})
     require(not value, f"{ready} must be 0 while the pipeline stands")
-    forms, logic = search.logic({buffer.held: 1, control.full: 0})
+    forms, logic = search.logic({buffer.valid: 1, control.full: 0})
     require(same_word(forms, logic.net(enters), logic.net(ready), 1), f"{ready} must be 1 just when {enters} is")
     assert control.entrance is not None
-    _, value = search.net(enters, {buffer.held: 1, control.full: 0, **dict.fromkeys(control.entrance.near, 0)})
+    _, value = search.net(enters, {buffer.valid: 1, control.full: 0, **dict.fromkeys(control.entrance.near, 0)})
     require(
         value == constant(1),
         f"{enters} must be 1 for a sample in front while none of those that it may wait for is in the pipeline",

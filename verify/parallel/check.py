@@ -54,12 +54,12 @@ _FLAG_BITS = 8
 
 @dataclass(frozen=True)
 class HardwareVerdict:
-    """What the check of the hardware has found.
+    """The result of the check of the hardware.
 
     Attributes
     ----------
     registers, memories, states : int
-        Number of registers whose content was found, of memories, and of those of both that hold a DELAY node.
+        Number of registers whose content is known, of memories, and of those of both that hold a DELAY node.
     latency : int
         Clocks from the edge that accepts a sample to the edge that can hand its result on, without a stall.
     waits : int
@@ -104,7 +104,7 @@ def check_hardware(text: str, certificate: Certificate, channels: int = 1, lanes
     Returns
     -------
     HardwareVerdict
-        What was found.
+        The result.
 
     Raises
     ------
@@ -126,14 +126,14 @@ class Inside:
     ----------
     prefix : str
         Prefix of its nets.
-    told : int
+    flag_count : int
         Number of flags of the inputs that come with a sample, above its fields, in place of what the ports say.
     lanes : int
         Samples of a beat.
     """
 
     prefix: str = ""
-    told: int = 0
+    flag_count: int = 0
     lanes: int = 1
 
 
@@ -155,7 +155,7 @@ def _checked(netlist: Netlist, certificate: Certificate, channels: int, inside: 
     graph = GraphCodes(certificate, forms, inside.lanes, words, prefix)
     netlist = split(netlist, {netlist.holder(graph.state_name(node)) or "" for node in graph.delays})
     control = find_control(netlist) if channels == 1 else find_channels(netlist, channels, prefix)
-    pipeline = Pipeline(netlist, control, graph, forms, certificate, inside.told)
+    pipeline = Pipeline(netlist, control, graph, forms, certificate, inside.flag_count)
     try:
         pipeline.check_states()
         _check_output(pipeline.buffered(), netlist, pipeline, graph, certificate, prefix)
@@ -192,7 +192,7 @@ def _check_output(
         require(pipeline.same(data, graph.seen(lane.output, ""), width), f"{what} must be {label}, not another value")
         for bit in range(_FLAG_BITS * number, _FLAG_BITS * (number + 1)):
             logic.net(FLAGS, bit, 1)  # of the sample whose beat it leaves with, also where nothing is said of its value
-        for flag in flags_of(graph, lane, certificate, pipeline.told, limits):
+        for flag in flags_of(graph, lane, certificate, pipeline.input_flags, limits):
             bit = _FLAG_BITS * number + flag.place
             why = f", as the ports and {label} say" if flag.name else ""
             require(

@@ -47,17 +47,17 @@ class UndecidedError(Exception):
 def cases(
     fixed: Case, evaluate: Callable[[Case], _Result], values: Callable[[str], Iterable[int]] = lambda name: (0, 1)
 ) -> Iterator[tuple[Case, _Result]]:
-    """Yield what is found in each case that the fixed control signals leave, as far as they count.
+    """Yield the result in each case that the fixed control signals leave, as far as they count.
 
     `values` are those that a signal can have.
     """
     try:
-        found = evaluate(fixed)
+        result = evaluate(fixed)
     except UndecidedError as undecided:
         for value in values(undecided.name):
             yield from cases({**fixed, undecided.name: value}, evaluate, values)
     else:
-        yield fixed, found
+        yield fixed, result
 
 
 def about(name: str, error: RejectedError) -> RejectedError:
@@ -72,13 +72,13 @@ class Buffer:
 
     Attributes
     ----------
-    held, full : str
+    valid, full : str
         Registers: whether it holds a sample, and whether it holds two.
     coming, ready : str
         Whether a sample comes while it is not full, and whether one may leave.
     """
 
-    held: str
+    valid: str
     full: str
     coming: str
     ready: str
@@ -110,8 +110,8 @@ class Control:
     @property
     def names(self) -> set[str]:
         """All control signals."""
-        found = {*self.valid, self.output.held, self.output.full, RESET, SOURCE, SINK}
-        return found if self.entrance is None else found | self.entrance.names
+        names = {*self.valid, self.output.valid, self.output.full, RESET, SOURCE, SINK}
+        return names if self.entrance is None else names | self.entrance.names
 
     @property
     def cuts(self) -> set[str]:
@@ -146,7 +146,7 @@ class Entrance:
     @property
     def names(self) -> set[str]:
         """All control signals among these."""
-        return {self.buffer.held, self.buffer.full, self.buffer.coming, self.buffer.ready, self.clearing}
+        return {self.buffer.valid, self.buffer.full, self.buffer.coming, self.buffer.ready, self.clearing}
 
 
 def find_control(netlist: Netlist) -> Control:
@@ -158,12 +158,12 @@ def find_control(netlist: Netlist) -> Control:
         If samples do not move as they must.
     """
     search = Search(netlist)
-    held = search.register(search.net("m_axis_tvalid", {}), "m_axis_tvalid")
+    valid = search.register(search.net("m_axis_tvalid", {}), "m_axis_tvalid")
     full = search.register(search.inverted(search.net("s_axis_tready", {})), "not s_axis_tready")
-    chain = search.chain(held, full)
+    chain = search.chain(valid, full)
     last = search.register(search.loaded(chain[0], {RESET: 1, full: 0, chain[0]: 0}), f"what {chain[0]} takes over")
     require(last == SOURCE, f"{chain[0]} must follow {SOURCE}, not {last}")
-    control = Control((SOURCE, *chain), Buffer(held, full, chain[-1], SINK))
+    control = Control((SOURCE, *chain), Buffer(valid, full, chain[-1], SINK))
     search.check_chain(control.valid, full)
     search.check_buffer(control.output)
     return control
@@ -198,12 +198,12 @@ class Search:
             raise about(name, error) from None
         return forms, forms.unsigned(logic.net(name) if loaded is None else loaded[1], self._netlist.widths[name])
 
-    def inverted(self, found: tuple[Forms, Form]) -> tuple[Forms, Form]:
+    def inverted(self, evaluated: tuple[Forms, Form]) -> tuple[Forms, Form]:
         """Return 1 less a value."""
-        forms, value = found
+        forms, value = evaluated
         return forms, plus(constant(1), value, -1)
 
-    def register(self, found: tuple[Forms, Form], what: str) -> str:
+    def register(self, evaluated: tuple[Forms, Form], what: str) -> str:
         """Return the register, or the source, that a value is.
 
         Raises
@@ -211,29 +211,31 @@ class Search:
         RejectedError
             If it is none.
         """
-        name = self.one_register(found)
+        name = self.one_register(evaluated)
         if name is None:
-            raise RejectedError(f"{what} must be one register, not logic of {len(found[0].keys(found[1]))} signals")
+            raise RejectedError(
+                f"{what} must be one register, not logic of {len(evaluated[0].keys(evaluated[1]))} signals"
+            )
         return name
 
-    def one_register(self, found: tuple[Forms, Form]) -> str | None:
+    def one_register(self, evaluated: tuple[Forms, Form]) -> str | None:
         """Return the register, or the source, that a value is; None if it is none."""
-        forms, value = found
+        forms, value = evaluated
         keys = forms.keys(value)
         name = next(iter(keys)) if len(keys) == 1 else None
         if not isinstance(name, str) or value != forms.variable(name, 0, 1):
             return None
         return name if name in self._netlist.registers or name == SOURCE else None
 
-    def chain(self, held: str, full: str) -> list[str]:
+    def chain(self, valid: str, full: str) -> list[str]:
         """Return the valid bits that are registers, from the source to the output buffer."""
-        found = [self.register(self.loaded(held, {RESET: 1, full: 0, held: 0}), f"what {held} takes over")]
+        chain = [self.register(self.loaded(valid, {RESET: 1, full: 0, valid: 0}), f"what {valid} takes over")]
         while True:
-            before = self.one_register(self.loaded(found[-1], {RESET: 1, full: 0, found[-1]: 0}))
+            before = self.one_register(self.loaded(chain[-1], {RESET: 1, full: 0, chain[-1]: 0}))
             if before is None or before not in self._netlist.registers:
-                return found[::-1]
-            require(before not in {*found, full, held}, f"{found[-1]} must not follow {before}, which follows it")
-            found.append(before)
+                return chain[::-1]
+            require(before not in {*chain, full, valid}, f"{chain[-1]} must not follow {before}, which follows it")
+            chain.append(before)
 
     def check_chain(self, valid: Sequence[str], full: str) -> None:
         """Check that valid bits follow each other in every case while the pipeline does not stand."""
@@ -245,14 +247,14 @@ class Search:
 
     def check_buffer(self, buffer: Buffer) -> None:
         """Check that a buffer is a queue of two in every case."""
-        for name in (buffer.held, buffer.full):
+        for name in (buffer.valid, buffer.full):
             self.expect_empty(name)
-        for held, full, ready, coming in product((0, 1), repeat=4):
-            if full and not held:
+        for valid, full, ready, coming in product((0, 1), repeat=4):
+            if full and not valid:
                 continue  # never: both checks below keep it so
-            case = {RESET: 1, buffer.held: held, buffer.full: full, buffer.ready: ready, buffer.coming: coming}
-            leaves = ready or not held
-            self.expect(buffer.held, case, (full or coming) if leaves else 1)
+            case = {RESET: 1, buffer.valid: valid, buffer.full: full, buffer.ready: ready, buffer.coming: coming}
+            leaves = ready or not valid
+            self.expect(buffer.valid, case, (full or coming) if leaves else 1)
             self.expect(buffer.full, case, 0 if leaves else (full or coming))
 
     def expect_empty(self, name: str) -> None:

@@ -32,11 +32,11 @@ class Dependence:
 
     def of(self, values: Iterable[Expression]) -> frozenset[str]:
         """Return what expressions depend on; of a memory, what its address does."""
-        found: set[str] = set()
+        sources: set[str] = set()
         for value in values:
             for name in _nets(value):
-                found |= self.of_net(name)
-        return frozenset(found)
+                sources |= self.of_net(name)
+        return frozenset(sources)
 
     def of_conditions(self, statements: Sequence[Statement]) -> frozenset[str]:
         """Return what it depends on whether statements load anything."""
@@ -48,21 +48,21 @@ class Dependence:
 
 
 def _conditions(statements: Sequence[Statement]) -> list[Expression]:
-    found: list[Expression] = []
+    conditions: list[Expression] = []
     for statement in statements:
         if isinstance(statement, Choice):
-            found += [statement.condition, *_conditions(statement.yes), *_conditions(statement.no)]
-    return found
+            conditions += [statement.condition, *_conditions(statement.yes), *_conditions(statement.no)]
+    return conditions
 
 
 def _values(statements: Sequence[Statement]) -> list[Expression]:
-    found: list[Expression] = []
+    values: list[Expression] = []
     for statement in statements:
         if isinstance(statement, Load):
-            found.append(statement.value)
+            values.append(statement.value)
         else:
-            found += [statement.condition, *_values(statement.yes), *_values(statement.no)]
-    return found
+            values += [statement.condition, *_values(statement.yes), *_values(statement.no)]
+    return values
 
 
 def _nets(value: Expression) -> list[str]:

@@ -101,8 +101,8 @@ class Evaluation:
         if key not in self._known:
             require(key not in self._open, f"{name} must not depend on itself within a clock")
             self._open.add(key)
-            found = self._net(*key)
-            self._known[key] = self._shortened(found, count, name in self._netlist.inlets)
+            word = self._net(*key)
+            self._known[key] = self._shortened(word, count, name in self._netlist.inlets)
             self._open.discard(key)
         return self._known[key]
 
@@ -114,13 +114,13 @@ class Evaluation:
         RejectedError
             If it depends on data whether anything is loaded, or words at two places are.
         """
-        found: tuple[Expression, Form] | None = None
+        load: tuple[Expression, Form] | None = None
         for statement in statements:
             loaded = self._executed(statement)
-            if found is not None and loaded is not None and found[0] != loaded[0]:
+            if load is not None and loaded is not None and load[0] != loaded[0]:
                 raise RejectedError("it must not be loaded at two places at a clock")
-            found = loaded or found
-        return found
+            load = loaded or load
+        return load
 
     def bit(self, value: Expression) -> Form:
         """Return whether an expression is not 0: a form that is 0 or 1."""
@@ -281,28 +281,28 @@ class Evaluation:
     def _any(self, value: Expression) -> Form:
         """Whether a bit is set."""
         parts = value.parts if isinstance(value, Joined) else (value,)
-        found: Form = {}
+        bit: Form = {}
         for part in parts:
             exact = self._exact(part, signed=False)
             one = exact if self._netlist.width(part) == 1 else self._forms.negative(plus({}, exact, -1))
-            found = self._forms.bit(plus(plus(found, one), self._forms.times(found, one), -1))
-            if found == constant(1):
+            bit = self._forms.bit(plus(plus(bit, one), self._forms.times(bit, one), -1))
+            if bit == constant(1):
                 break
-        return found
+        return bit
 
     def _all(self, value: Expression) -> Form:
         """Whether all bits are set."""
         parts = value.parts if isinstance(value, Joined) else (value,)
-        found = constant(1)
+        bit = constant(1)
         for part in parts:
             width = self._netlist.width(part)
             exact = self._exact(part, signed=False)
             other = self._forms.negative(plus(exact, constant((1 << width) - 1), -1))
             one = exact if width == 1 else plus(constant(1), other, -1)
-            found = self._forms.bit(self._forms.times(found, one))
-            if not found:
+            bit = self._forms.bit(self._forms.times(bit, one))
+            if not bit:
                 break
-        return found
+        return bit
 
     def _compared(self, value: Operator) -> Form:
         require(value.symbol in _ONE_BIT and len(value.operands) == 2, f"the operator {value.symbol} must be known")
@@ -310,7 +310,7 @@ class Evaluation:
         a, b = (self._exact(operand, signed=signed) for operand in value.operands)
         less, more = self._forms.negative(plus(a, b, -1)), self._forms.negative(plus(b, a, -1))
         one = constant(1)
-        found = {
+        outcome = {
             "<": less,
             ">": more,
             "<=": plus(one, more, -1),
@@ -318,7 +318,7 @@ class Evaluation:
             "!=": plus(less, more),
             "==": plus(one, plus(less, more), -1),
         }[value.symbol]
-        return self._forms.bit(found)
+        return self._forms.bit(outcome)
 
     def _chosen(self, select: Form, yes: Form, no: Form) -> Form:
         return plus(no, self._forms.times(select, plus(yes, no, -1)))

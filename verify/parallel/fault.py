@@ -22,8 +22,8 @@ def fault(netlist: Netlist, pipeline: Pipeline, graph: GraphCodes) -> RejectedEr
         own = re.compile(rf"{re.escape(graph.state_name(index))}(_passed\d+|_register)?")
         for name in sorted(filter(own.fullmatch, netlist.widths), key=lambda name: (len(name), name)):
             try:
-                found = pipeline.computed(name)
-                right = found is None or pipeline.same(found, graph.codes[index], netlist.widths[name])
+                code = pipeline.computed(name)
+                right = code is None or pipeline.same(code, graph.codes[index], netlist.widths[name])
             except RejectedError as error:
                 sentence = str(error)
                 named = node.label in sentence or "node " in sentence

@@ -59,7 +59,7 @@ def wear_limits(pipeline: Pipeline, netlist: Netlist, certificate: Certificate, 
 
 
 def flags_of(
-    graph: GraphCodes, lane: LanePorts, certificate: Certificate, told: Sequence[Form], limits: Limits | None
+    graph: GraphCodes, lane: LanePorts, certificate: Certificate, input_flags: Sequence[Form], limits: Limits | None
 ) -> Iterator[Flag]:
     """Yield the flags of a sample, as far as the certificate says what they are.
 
@@ -69,18 +69,18 @@ def flags_of(
     lane : LanePorts
         Of the sample.
     certificate : Certificate
-    told : sequence of Form
+    input_flags : sequence of Form
         Flags of the inputs that come with a sample.
     limits : Limits or None
         Those of wear.
     """
     item = None if certificate.about is None else certificate.about.item
     settling = {} if lane.settling is None else graph.forms.negative(graph.codes[lane.settling])
-    yield Flag(_AT_RAIL, "input_at_rail", told[0] if told else _at_rail(graph, lane, certificate))
+    yield Flag(_AT_RAIL, "input_at_rail", input_flags[0] if input_flags else _at_rail(graph, lane, certificate))
     yield Flag(_SATURATED, "output_saturated", _saturated(graph, lane))
     yield Flag(_SETTLING, "settling", settling)
-    if len(told) > 1:
-        yield Flag(_OUTSIDE, "outside_calibration", told[1])
+    if len(input_flags) > 1:
+        yield Flag(_OUTSIDE, "outside_calibration", input_flags[1])
     elif certificate.ideal.polynomial is None or (item is not None and not item.calibrated):
         yield Flag(_OUTSIDE, "", {})
     elif item is not None:

@@ -122,15 +122,15 @@ class Forms:
 
     def know(self, form: Form, low: int | Fraction, high: int | Fraction) -> None:
         """Take it for known that `form` lies in low..high; of a floor, its argument is known too."""
-        found = _primitive(form)
-        if found is None:
+        primitive = _primitive(form)
+        if primitive is None:
             return
-        ends = sorted(((low - found.offset) / found.scale, (high - found.offset) / found.scale))
-        before = self._known.get(found.key, (ends[0], ends[1]))
-        self._known[found.key] = max(ends[0], before[0]), min(ends[1], before[1])
+        ends = sorted(((low - primitive.offset) / primitive.scale, (high - primitive.offset) / primitive.scale))
+        before = self._known.get(primitive.key, (ends[0], ends[1]))
+        self._known[primitive.key] = max(ends[0], before[0]), min(ends[1], before[1])
         self._limits.clear()
-        if len(found.key) == 1:
-            ((monomial, _),) = found.key
+        if len(primitive.key) == 1:
+            ((monomial, _),) = primitive.key
             inside = self._atoms[monomial[0]].inside if len(monomial) == 1 else None
             if inside is not None:
                 step = Fraction(1, lcm(*(value.denominator for value in inside.values())))
@@ -151,9 +151,9 @@ class Forms:
             for atom in monomial:
                 ends = [end * limit for end in ends for limit in self._limits_of(atom)]
             low, high = low + min(ends), high + max(ends)
-        found = _primitive(form)
-        if found is not None and found.key in self._known:
-            ends = sorted(end * found.scale + found.offset for end in self._known[found.key])
+        primitive = _primitive(form)
+        if primitive is not None and primitive.key in self._known:
+            ends = sorted(end * primitive.scale + primitive.offset for end in self._known[primitive.key])
             low, high = max(low, ends[0]), min(high, ends[1])
         if self._always is not self:
             for known_low, known_high in self._limits_by_floors(form):
@@ -170,9 +170,9 @@ class Forms:
                 continue
             inside = self._atoms[monomial[0]].inside
             assert inside is not None
-            found = _primitive(plus(inside, others))
-            if found is not None and found.key in self._known:
-                ends = sorted(end * found.scale + found.offset for end in self._known[found.key])
+            primitive = _primitive(plus(inside, others))
+            if primitive is not None and primitive.key in self._known:
+                ends = sorted(end * primitive.scale + primitive.offset for end in self._known[primitive.key])
                 rest = form.get(ONE, 0)
                 low, high = sorted((factor * ends[0].__floor__() + rest, factor * ends[1].__floor__() + rest))
                 yield low, high
@@ -252,7 +252,7 @@ class Forms:
 
     def keys(self, form: Form) -> set[Hashable]:
         """Return the keys of all variables in a form."""
-        found: set[Hashable] = set()
+        keys: set[Hashable] = set()
         seen: set[int] = set()
         left = [form]
         while left:
@@ -260,10 +260,10 @@ class Forms:
                 seen.add(atom)
                 inside = self._atoms[atom].inside
                 if inside is None:
-                    found.add(self._atoms[atom].key)
+                    keys.add(self._atoms[atom].key)
                 else:
                     left.append(inside)
-        return found
+        return keys
 
     def _floors(self, form: Form, seen: set[int]) -> Iterator[Form]:
         for monomial in form:
@@ -279,10 +279,10 @@ class Forms:
         low, high = self.limits(form)
         if -offset <= low and high < size - offset:
             return form
-        found = plus(form, self.floor(shifted(plus(form, constant(offset)), -width)), -size)
+        remainder = plus(form, self.floor(shifted(plus(form, constant(offset)), -width)), -size)
         if self._always is self:
-            self.know(found, -offset, size - 1 - offset)
-        return found
+            self.know(remainder, -offset, size - 1 - offset)
+        return remainder
 
     def _unnested(self, form: Form) -> Form:
         """Use ``floor((floor(a) + j) / m) = floor((a + j) / m)`` for an integer j, if there is one such floor."""
@@ -345,9 +345,9 @@ class Forms:
     def _limits_of(self, atom: int) -> tuple[int, int]:
         if atom not in self._limits:
             low, high, inside, _ = self._atoms[atom]
-            found = self._known.get(frozenset({((atom,), 1)}))
-            if found is not None:
-                low, high = max(low, found[0].__ceil__()), min(high, found[1].__floor__())
+            limits = self._known.get(frozenset({((atom,), 1)}))
+            if limits is not None:
+                low, high = max(low, limits[0].__ceil__()), min(high, limits[1].__floor__())
             if inside is not None:
                 ends = self.limits(inside)
                 low, high = max(low, ends[0].__floor__()), min(high, ends[1].__floor__())

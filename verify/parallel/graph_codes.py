@@ -23,7 +23,7 @@ from sosmith.verify.certificate_file import Certificate, NodeEntry, Operation, S
 from sosmith.verify.graph import require
 from sosmith.verify.parallel.forms import Forms, shifted
 from sosmith.verify.parallel.lanes import LaneNode, in_lanes
-from sosmith.verify.program.normal_form import Form, Monomial, constant, plus
+from sosmith.verify.program.normal_form import ONE, Form, Monomial, constant, plus
 
 _Key = frozenset[tuple[Monomial, int | Fraction]]
 Origin = tuple[int, int]
@@ -198,18 +198,21 @@ class GraphCodes:
     def shortened(self, word: Form, width: int, at_inlet: bool = False) -> Form:
         """Return the variable whose code a word of `width` bits is; any other word as it is.
 
-        Those are what the next lane takes over, and, where a word enters an instance, what stages hand on.
+        Those are what the next lane takes over, and, where a word enters an instance, what stages hand on. A constant
+        stays: its few bits are also the lowest ones of a code that is a multiple of a power of two.
         """
+        if not word.keys() - {ONE}:
+            return word
         for codes, by_width in ((self._seams, self._seams_of), (self._kept, self._kept_of)):
             if not codes or (len(word) < 2 if codes is self._kept else not at_inlet):
                 continue
-            found = codes.get(frozenset(word.items()))
-            if found is None:
+            variable = codes.get(frozenset(word.items()))
+            if variable is None:
                 if width not in by_width:
                     by_width[width] = {_rest(code, width): short for code, short in codes.items()}
-                found = by_width[width].get(_rest(word.items(), width))
-            if found is not None:
-                return found
+                variable = by_width[width].get(_rest(word.items(), width))
+            if variable is not None:
+                return variable
         return word
 
     def seen(self, index: int, stage: str) -> Form:
@@ -225,10 +228,10 @@ class GraphCodes:
         It is the last in the order of the graph, of those that only one of them has, if there are such.
         """
         first, second = (self.forms.keys(code) & self._definitions.keys() for code in (a, b))
-        found = first ^ second or first
-        if not found:
+        candidates = first ^ second or first
+        if not candidates:
             return None
-        key = next(key for key in reversed(self._definitions) if key in found)
+        key = next(key for key in reversed(self._definitions) if key in candidates)
         meant = {key: self._definitions[key]}
         return self.forms.settled(a, meant), self.forms.settled(b, meant)
 
@@ -262,9 +265,9 @@ class GraphCodes:
         if entry.op is Operation.INPUT:
             return self.forms.variable((index, 0), entry.low, entry.high)
         if entry.op is Operation.DELAY:
-            found = self.past(self.origin(index))
-            assert found is not None
-            return found
+            past = self.past(self.origin(index))
+            assert past is not None
+            return past
         if entry.op is Operation.CONSTANT:
             return constant(entry.parameter)
         operands = [self.seen(k, node.stage) for k in node.operands]

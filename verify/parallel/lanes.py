@@ -49,21 +49,21 @@ def in_lanes(stage: StageEntry, lanes: int) -> tuple[list[LaneNode], list[int]]:
             LaneNode(node, node.operands, node.name, label(stage, index)) for index, node in enumerate(stage.nodes)
         ]
         return nodes, list(stage.outputs)
-    made: dict[tuple[int, int], int] = {}
+    numbers: dict[tuple[int, int], int] = {}
     for lane in range(lanes):
         for index, node in enumerate(stage.nodes):
             if node.op is not Operation.DELAY or lane == 0:
-                made[index, lane] = len(made)
+                numbers[index, lane] = len(numbers)
 
     def place(index: int, lane: int) -> int:
-        while (index, lane) not in made:  # a DELAY: in lane 0, all nodes are
+        while (index, lane) not in numbers:  # a DELAY: in lane 0, all nodes are
             (index,), lane = stage.nodes[index].operands, lane - 1
-        return made[index, lane]
+        return numbers[index, lane]
 
     delayed = {node.operands[0] for node in stage.nodes if node.op is Operation.DELAY}
     remembered = {place(k, lane) for k in delayed for lane in range(lanes)}
     nodes = []
-    for (index, lane), number in made.items():
+    for (index, lane), number in numbers.items():
         node = stage.nodes[index]
         before = lanes - 1 if node.op is Operation.DELAY else lane
         operands = tuple(place(k, before) for k in node.operands)

@@ -98,10 +98,10 @@ class Netlist:
         """Return the register that a net is, or whose bits it has below constant ones; None for others."""
         if name in self.registers:
             return name
-        found = [driver for driver in self.drivers.get(name, ()) if not isinstance(driver.value, Number)]
-        if len(found) == 1 and found[0].low == 0:
-            value = found[0].value
-            if isinstance(value, Bits) and value == Bits(value.name) and found[0].width == self.widths[value.name]:
+        drivers = [driver for driver in self.drivers.get(name, ()) if not isinstance(driver.value, Number)]
+        if len(drivers) == 1 and drivers[0].low == 0:
+            value = drivers[0].value
+            if isinstance(value, Bits) and value == Bits(value.name) and drivers[0].width == self.widths[value.name]:
                 return value.name if value.name in self.registers else None
         return None
 
@@ -170,7 +170,7 @@ class _Flattening:
             statements[name] = executed
             if isinstance(loaded, Bits) and loaded.width is not None:
                 fields.setdefault(loaded.name, []).append(loaded)
-        for name in module.held:
+        for name in module.contents:
             require(name in module.depths, f"{prefix}{name} must be a memory to be given words")
         for name, width in module.widths.items():
             known = prefix + name in netlist.widths or prefix + name in netlist.memories
@@ -186,13 +186,13 @@ class _Flattening:
                     prefix + name, width, module.registers[name], _prefixed_all(statements.pop(name), prefix)
                 )
         for name, depth_ in module.depths.items():
-            held = module.held.get(name, {})
-            given = len(held) == depth_ and sorted(held) == list(range(depth_))
+            content = module.contents.get(name, {})
+            given = len(content) == depth_ and sorted(content) == list(range(depth_))
             require(given, f"all {depth_} words of {prefix}{name} must be given")
             netlist.memories[prefix + name] = Memory(
                 prefix + name,
                 module.widths[name],
-                tuple(held[k] for k in range(depth_)),
+                tuple(content[k] for k in range(depth_)),
                 _prefixed_all(statements.pop(name, ()), prefix),
                 name in module.unchecked,
             )
@@ -293,13 +293,13 @@ class _Flattening:
 
 
 def _targets(statements: Sequence[Statement]) -> list[Bits | Word]:
-    found: list[Bits | Word] = []
+    targets: list[Bits | Word] = []
     for statement in statements:
         if isinstance(statement, Load):
-            found.append(statement.target)
+            targets.append(statement.target)
         else:
-            found += [*_targets(statement.yes), *_targets(statement.no)]
-    return found
+            targets += [*_targets(statement.yes), *_targets(statement.no)]
+    return targets
 
 
 def _shown(target: Bits | Word) -> str:
@@ -338,18 +338,18 @@ def _prefixed(value: Expression, prefix: str) -> Expression:
 
 
 def _prefixed_all(statements: Sequence[Statement], prefix: str) -> tuple[Statement, ...]:
-    found: list[Statement] = []
+    prefixed: list[Statement] = []
     for statement in statements:
         if isinstance(statement, Load):
             target = _prefixed(statement.target, prefix)
             assert isinstance(target, Bits | Word)
-            found.append(Load(target, _prefixed(statement.value, prefix)))
+            prefixed.append(Load(target, _prefixed(statement.value, prefix)))
         else:
-            found.append(
+            prefixed.append(
                 Choice(
                     _prefixed(statement.condition, prefix),
                     _prefixed_all(statement.yes, prefix),
                     _prefixed_all(statement.no, prefix),
                 )
             )
-    return tuple(found)
+    return tuple(prefixed)

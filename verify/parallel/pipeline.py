@@ -55,30 +55,30 @@ class _Field(NamedTuple):
     word: Form
 
 
-def _fields(graph: GraphCodes, certificate: Certificate, width: int, told: Sequence[Form]) -> list[_Field]:
-    """Return the fields of the input and what is beside them; each begins a byte. Above them are flags that are told.
+def _fields(graph: GraphCodes, certificate: Certificate, width: int, input_flags: Sequence[Form]) -> list[_Field]:
+    """Return the fields of the input and what is beside them; each begins a byte. Above them are flags of inputs.
 
     Raises
     ------
     RejectedError
         If they do not fill the input, which has `width` bits.
     """
-    found: list[_Field] = []
+    fields: list[_Field] = []
     offset = 0
     for lane in graph.lanes:
         for node, port in zip(lane.inputs, certificate.inputs, strict=True):
-            found.append(_Field(offset, port.bits, graph.forms.unsigned(graph.codes[node], port.bits)))
+            fields.append(_Field(offset, port.bits, graph.forms.unsigned(graph.codes[node], port.bits)))
             offset += port.bits
             beside = -offset % 8
             if beside:
                 padding = graph.forms.variable(("padding", node), 0, (1 << beside) - 1)
-                found.append(_Field(offset, beside, padding))
+                fields.append(_Field(offset, beside, padding))
             offset += beside
-    for flag in told:
-        found.append(_Field(offset, 1, flag))
+    for flag in input_flags:
+        fields.append(_Field(offset, 1, flag))
         offset += 1
     require(width == offset, f"the port {DATA} must have {offset} bits, not {width}")
-    return found
+    return fields
 
 
 class Pipeline:
@@ -95,12 +95,12 @@ class Pipeline:
         The atoms of `graph`.
     certificate : Certificate
         Where the fields of the input are read.
-    told : int
+    flag_count : int
         Number of flags that come with a sample above its fields.
 
     Attributes
     ----------
-    told : list of Form
+    input_flags : list of Form
         These flags.
     forms : Forms
         The atoms.
@@ -113,11 +113,11 @@ class Pipeline:
         graph: GraphCodes,
         forms: Forms,
         certificate: Certificate,
-        told: int = 0,
+        flag_count: int = 0,
     ) -> None:
         self._netlist, self._control, self._graph, self.forms = netlist, control, graph, forms
-        self.told = [forms.variable(("told", place), 0, 1) for place in range(told)]
-        self._fields = _fields(graph, certificate, netlist.widths[DATA], self.told)
+        self.input_flags = [forms.variable(("input flag", place), 0, 1) for place in range(flag_count)]
+        self._fields = _fields(graph, certificate, netlist.widths[DATA], self.input_flags)
         self._dependence = Dependence(netlist, control.cuts)
         self._numbers = itertools.count()
         self._behind: dict[str, int | None] = {}
@@ -146,8 +146,8 @@ class Pipeline:
     @property
     def registers(self) -> int:
         """Number of registers whose content is known."""
-        found = {*self._found, *self._second, *self.states, *self._counters}
-        return len({self._netlist.fields.get(name, name) for name in found})
+        names = {*self._found, *self._second, *self.states, *self._counters}
+        return len({self._netlist.fields.get(name, name) for name in names})
 
     @property
     def last(self) -> int:
@@ -167,20 +167,20 @@ class Pipeline:
                 return self._entering(name) if position == self._source else self._unknown(name, frame)
             require(name in self._netlist.registers, f"the port {name} must not be used here")
             if name in self.states:
-                found = self._state(self.states[name], position, case)
-                return self._unknown(name, frame) if found is None else found
+                state = self._state(self.states[name], position, case)
+                return self._unknown(name, frame) if state is None else state
             if name in self._counters:
                 counted = self._counters[name]
                 return counted.value if counted.behind == position else self._unknown(name, frame)
             known = position >= self._source and name not in self._apart and self.behind(name) == position - 1
-            return self.held(name) if known else self._unknown(name, frame)
+            return self.content_of(name) if known else self._unknown(name, frame)
 
         def word(name: str, address: Form) -> Form:
             if not self._netlist.memories[name].statements and address == self.channel:
                 return self.constant_word(name)
             unknown = self._unknown(name, frame)
-            found = None if self.memories is None else self.memories.word(name, address, position, unknown)
-            return unknown if found is None else found
+            state = None if self.memories is None else self.memories.word(name, address, position, unknown)
+            return unknown if state is None else state
 
         def fields(name: str, low: int, width: int) -> Form | None:
             return self._field(low, width) if name == DATA and position == self._source else None
@@ -202,7 +202,7 @@ class Pipeline:
             if name in known:
                 return known[name]
             inside = name in self._netlist.registers and name not in self._control.names | self._apart
-            return self.held(name) if inside and self.behind(name) == self._source else self._unknown(name, frame)
+            return self.content_of(name) if inside and self.behind(name) == self._source else self._unknown(name, frame)
 
         return self.logic(content, opened=opened)
 
@@ -220,7 +220,7 @@ class Pipeline:
             self._netlist, self.forms, content, self._graph.shortened, word=word, cuts=cuts, fields=fields
         )
 
-    def held(self, name: str) -> Form:
+    def content_of(self, name: str) -> Form:
         """Return what a register holds while there is a sample at its position.
 
         Raises
@@ -244,14 +244,14 @@ class Pipeline:
 
     def same(self, a: Form, b: Form, width: int) -> bool:
         """Whether two words are proven to be the same, if need be by opening what stages hand on."""
-        found: tuple[Form, Form] | None = self._graph.shortened(a, width), self._graph.shortened(b, width)
+        pair: tuple[Form, Form] | None = self._graph.shortened(a, width), self._graph.shortened(b, width)
         for _ in range(_MOST_OPENED):
-            if found is None or same_word(self.forms, *found, width):
+            if pair is None or same_word(self.forms, *pair, width):
                 break
-            found = self._graph.opened(*found)
+            pair = self._graph.opened(*pair)
         else:
             return False
-        return found is not None
+        return pair is not None
 
     # The output buffer.
 
@@ -272,14 +272,14 @@ class Pipeline:
         """Return what a register of a buffer behind a position holds of the sample that leaves it next."""
         fixed = {RESET: 1, buffer.full: 0, buffer.coming: 1}
         loaded = [
-            self._one_of(name, position, {**fixed, buffer.held: held, buffer.ready: ready})
-            for held, ready in ((0, 0), (0, 1), (1, 1))
+            self._one_of(name, position, {**fixed, buffer.valid: valid, buffer.ready: ready})
+            for valid, ready in ((0, 0), (0, 1), (1, 1))
         ]
         for other in loaded[1:]:
             self._require_same(name, loaded[0], other, "whether the buffer is empty or not")
         for full in (0, 1):
-            self._require_kept(name, position, {RESET: 1, buffer.held: 1, buffer.ready: 0, buffer.full: full})
-        case = {RESET: 1, buffer.full: 1, buffer.held: 1, buffer.ready: 1}
+            self._require_kept(name, position, {RESET: 1, buffer.valid: 1, buffer.ready: 0, buffer.full: full})
+        case = {RESET: 1, buffer.full: 1, buffer.valid: 1, buffer.ready: 1}
         seconds = self._seconds(buffer, position)
         for _, moved in cases(case, lambda each: self._loaded(name, seconds, each)):
             if moved is None:
@@ -298,7 +298,7 @@ class Pipeline:
                 if name not in self._netlist.registers or name in self.states or name in self._counters:
                     return self._unknown(name, frame)
                 if name not in self._second:
-                    stays = {RESET: 1, buffer.held: 1, buffer.ready: 0}
+                    stays = {RESET: 1, buffer.valid: 1, buffer.ready: 0}
                     self._second[name] = self._one_of(name, position, {**stays, buffer.full: 0, buffer.coming: 1})
                     self._require_kept(name, position, {**stays, buffer.full: 1})
                 return self._second[name]
@@ -317,20 +317,20 @@ class Pipeline:
         if behind < 0 and entrance is not None:
             return self._first_of_two(name, entrance.buffer, behind)
         require(behind < self.last, f"{name} must hold a word of a sample inside the pipeline")
-        found = self._one_of(name, behind, {RESET: 1, self._control.full: 0, valid[behind]: 1})
+        word = self._one_of(name, behind, {RESET: 1, self._control.full: 0, valid[behind]: 1})
         self._require_kept(name, behind, {RESET: 1, self._control.full: 1, valid[behind + 1]: 1})
-        return found
+        return word
 
     def _one_of(self, name: str, position: int, fixed: Case) -> Form:
         """Return what a register takes over from a position: the same in all cases that are left."""
-        found: list[Form] = []
+        words: list[Form] = []
         for loaded in self._all_taken(name, position, fixed):
             if loaded is None:
                 raise RejectedError(f"{name} must be loaded whenever a sample leaves position {position}")
-            found.append(loaded)
-        for other in found[1:]:
-            self._require_same(name, found[0], other, "whatever other positions hold")
-        return found[0]
+            words.append(loaded)
+        for other in words[1:]:
+            self._require_same(name, words[0], other, "whatever other positions hold")
+        return words[0]
 
     def _loaded(self, name: str, logic: Callable[[Case], Evaluation], case: Case) -> Form | None:
         """Return what a register takes over at the next clock; None if it keeps what it holds."""
@@ -353,14 +353,14 @@ class Pipeline:
         if name in self.states or name in self._counters:
             return None
         if name in self._netlist.registers:
-            return self.held(name)
+            return self.content_of(name)
         sources = self._positions_of(self._dependence.of_net(name))
         if len(sources) != 1:
             return None
         (position,) = sources
         fixed = {RESET: 1, self._control.full: 0, self._control.valid[position]: 1}
-        found = [word for _, word in cases(fixed, lambda case: self.at(position, case).net(name))]
-        return found[0]
+        words = [word for _, word in cases(fixed, lambda case: self.at(position, case).net(name))]
+        return words[0]
 
     def check_states(self) -> None:
         """Prove by induction that each state holds the code of its DELAY node.
@@ -414,7 +414,7 @@ class Pipeline:
         if not leaves:
             return None
         sources = self._positions_of(leaves) or {
-            held[leaf].behind for held in (self.states, self._counters) for leaf in leaves & held.keys()
+            contents[leaf].behind for contents in (self.states, self._counters) for leaf in leaves & contents.keys()
         }
         require(len(sources) == 1, f"{name} must take over a word of one sample, not of {len(sources)}")
         return sources.pop()
@@ -422,8 +422,8 @@ class Pipeline:
     def _positions_of(self, leaves: frozenset[str]) -> set[int]:
         """Return the positions whose samples registers and inputs hold, without states."""
         passed = leaves - self._control.names - self.states.keys() - self._counters.keys()
-        found = {self._source if leaf in {DATA, DEST} else self._position_of(leaf) for leaf in passed}
-        return {position for position in found if position is not None}
+        positions = {self._source if leaf in {DATA, DEST} else self._position_of(leaf) for leaf in passed}
+        return {position for position in positions if position is not None}
 
     def _position_of(self, name: str) -> int | None:
         """Return the position whose sample a register holds."""

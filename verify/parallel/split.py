@@ -40,8 +40,8 @@ def split(netlist: Netlist, kept: Set[str]) -> Netlist:
     Netlist
         Its `fields` say which registers are new.
     """
-    edges = _Edges(netlist, kept).found()
-    made = replace(
+    edges = _Edges(netlist, kept).cuts()
+    cut = replace(
         netlist,
         widths=dict(netlist.widths),
         drivers=dict(netlist.drivers),
@@ -49,14 +49,14 @@ def split(netlist: Netlist, kept: Set[str]) -> Netlist:
         fields=dict(netlist.fields),
     )
     for name, cuts in edges.items():
-        register = made.registers.pop(name)
+        register = cut.registers.pop(name)
         for low, high in pairwise((0, *sorted(cuts), register.width)):
             width = high - low
             first = None if register.first is None else register.first >> low & ((1 << width) - 1)
             statements = _sliced_all(netlist, register.statements, low, width)
             own = bits_name(name, low, width)
-            made.add_field(name, Register(own, width, first, retargeted(statements, own)), low)
-    return made
+            cut.add_field(name, Register(own, width, first, retargeted(statements, own)), low)
+    return cut
 
 
 def sliced(netlist: Netlist, value: Expression, low: int, width: int, followed: int = _FOLLOWED) -> Expression | None:
@@ -69,10 +69,10 @@ def sliced(netlist: Netlist, value: Expression, low: int, width: int, followed: 
         return Number(value.value >> low & ((1 << width) - 1), width)
     if isinstance(value, Bits):
         driver = _whole(netlist, value) if followed else None
-        found = None
+        inside = None
         if driver is not None and (isinstance(driver, Joined) or _is_choice(driver)):
-            found = sliced(netlist, driver, value.low + low, width, followed - 1)
-        return found or Bits(value.name, value.low + low, width)
+            inside = sliced(netlist, driver, value.low + low, width, followed - 1)
+        return inside or Bits(value.name, value.low + low, width)
     if isinstance(value, Joined):
         return _sliced_parts(netlist, value, low, width, followed)
     if _is_choice(value) and _alike(netlist, value):
@@ -83,7 +83,7 @@ def sliced(netlist: Netlist, value: Expression, low: int, width: int, followed: 
 
 
 def _sliced_parts(netlist: Netlist, value: Joined, low: int, width: int, followed: int) -> Expression | None:
-    found: list[Expression] = []
+    parts: list[Expression] = []
     at = 0
     for part in reversed(value.parts):
         own = netlist.width(part)
@@ -92,9 +92,9 @@ def _sliced_parts(netlist: Netlist, value: Joined, low: int, width: int, followe
             bits = sliced(netlist, part, first - at, last - first, followed)
             if bits is None and last - first < own:
                 return None
-            found.append(bits or part)
+            parts.append(bits or part)
         at += own
-    return found[0] if len(found) == 1 else Joined(tuple(reversed(found)))
+    return parts[0] if len(parts) == 1 else Joined(tuple(reversed(parts)))
 
 
 def _can_be_sliced(netlist: Netlist, value: Expression) -> bool:
@@ -125,16 +125,16 @@ def _whole(netlist: Netlist, value: Bits) -> Expression | None:
 
 
 def _sliced_all(netlist: Netlist, statements: Sequence[Statement], low: int, width: int) -> tuple[Statement, ...]:
-    made: list[Statement] = []
+    sliced_statements: list[Statement] = []
     for statement in statements:
         if isinstance(statement, Load):
             value = sliced(netlist, statement.value, low, width)
             assert value is not None  # `_Edges` has asked
-            made.append(replace(statement, value=value))
+            sliced_statements.append(replace(statement, value=value))
         else:
             yes, no = (_sliced_all(netlist, side, low, width) for side in (statement.yes, statement.no))
-            made.append(replace(statement, yes=yes, no=no))
-    return tuple(made)
+            sliced_statements.append(replace(statement, yes=yes, no=no))
+    return tuple(sliced_statements)
 
 
 class _Edges:
@@ -152,7 +152,7 @@ class _Edges:
         self._cuts: dict[str, frozenset[int]] = {}
         self._known: dict[str, frozenset[int]] = {}
 
-    def found(self) -> dict[str, frozenset[int]]:
+    def cuts(self) -> dict[str, frozenset[int]]:
         """Return the bits at which registers are to be cut, for those that are."""
         while True:
             self._known = {}

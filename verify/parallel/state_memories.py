@@ -57,7 +57,7 @@ class Registers(Protocol):
 
     def at(self, position: int, case: Case) -> Evaluation: ...
     def in_front(self, known: Mapping[str, Form], opened: str) -> Evaluation: ...
-    def held(self, name: str) -> Form: ...
+    def content_of(self, name: str) -> Form: ...
     def behind(self, name: str) -> int | None: ...
     def same(self, a: Form, b: Form, width: int) -> bool: ...
     def position_by_control(self, name: str, statements: Sequence[Statement]) -> int: ...
@@ -132,10 +132,10 @@ class StateMemories(ABC):
             self._registers.same(address, self.address(name), 64),
             f"{what} for the {self._whose} of the sample, not for another one",
         )
-        ahead, most = state.behind - position, self.distance(name) - 1
-        require(0 <= ahead <= most, f"{what} at most {most} positions before it is written, not {ahead}")
+        distance, most = state.behind - position, self.distance(name) - 1
+        require(0 <= distance <= most, f"{what} at most {most} positions before it is written, not {distance}")
         # Between 1 and `most` positions lie no two samples with one address: the word is not the one that is written.
-        collides = self._netlist.memories[name].unchecked and ahead == 0
+        collides = self._netlist.memories[name].unchecked and distance == 0
         require(not collides, f"{what} before the clock at which it is written, or not be marked with no_rw_check")
         return self.read(name, state, unknown)
 
@@ -148,9 +148,9 @@ class StateMemories(ABC):
             If one does not.
         """
         for name, state in self.states.items():
-            held, words = len(self._netlist.memories[name].first), self.words(name)
+            depth, words = len(self._netlist.memories[name].first), self.words(name)
             what = f"{name} must hold {self._graph.nodes[state.node].label}"
-            require(held == words, f"{what} of {words} {self._whose}s, not of {held}")
+            require(depth == words, f"{what} of {words} {self._whose}s, not of {depth}")
             try:
                 self.check_beginning(name, what)
                 self._check_taken(name, state, what)
@@ -184,7 +184,7 @@ class StateMemories(ABC):
             loaded = logic.loaded(memory.statements)
             return logic, None if loaded is None else loaded[1]
 
-        return [found for _, found in cases(fixed, evaluate)]
+        return [written for _, written in cases(fixed, evaluate)]
 
 
 def address_of(memory: Memory) -> Expression:

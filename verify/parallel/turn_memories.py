@@ -100,12 +100,12 @@ class TurnMemories(StateMemories):
 
     def _turn(self, name: str) -> str:
         """Return the register that a memory's address comes from: the first one back that depends on itself."""
-        found = self._one(self._dependence.of([address_of(self._netlist.memories[name])]), name)
+        register = self._one(self._dependence.of([address_of(self._netlist.memories[name])]), name)
         for _ in self._netlist.registers:
-            sources = self._dependence.of_loads(self._netlist.registers[found].statements) - self._control.names
-            if found in sources:
-                return found
-            found = self._one(sources, name)
+            sources = self._dependence.of_loads(self._netlist.registers[register].statements) - self._control.names
+            if register in sources:
+                return register
+            register = self._one(sources, name)
         raise RejectedError(f"the address of {name} must come from a register that counts, not from a ring of them")
 
     def _one(self, sources: frozenset[str], name: str) -> str:
@@ -132,8 +132,8 @@ class TurnMemories(StateMemories):
         behind = self._registers.position_by_control(name, self._netlist.registers[name].statements)
         full, valid = self._control.full, self._control.valid[behind]
         self._search.expect_empty(name)
-        for held in product(*values.values()):
-            case = {RESET: 1, **dict(zip(values, held, strict=True))}
+        for content in product(*values.values()):
+            case = {RESET: 1, **dict(zip(values, content, strict=True))}
             last = case[turn] == turns - 1
             after = (0 if last else case[turn] + 1) if name == turn else int(last or case[name])
             self._search.expect(name, {**case, full: 0, valid: 1}, after)

@@ -54,7 +54,7 @@ _SAMPLES = 32
 
 @dataclass(frozen=True)
 class ProgramVerdict:
-    """What the check of a program has found.
+    """The result of the check of a program.
 
     Attributes
     ----------
@@ -100,7 +100,7 @@ def check_program(
     Returns
     -------
     ProgramVerdict
-        What was found.
+        The result.
 
     Raises
     ------
@@ -113,12 +113,12 @@ def check_program(
     run = _proven(program, graph, certificate)
     ends = [(port.lowest, port.highest) for port in certificate.inputs]
     judged = tuple((max(low, a), min(high, b)) for (low, high), (a, b) in zip(ends, run.judged, strict=True))
-    for index, (port, found, wanted) in enumerate(zip(certificate.inputs, judged, calibrated or judged, strict=True)):
+    for index, (port, limits, wanted) in enumerate(zip(certificate.inputs, judged, calibrated or judged, strict=True)):
         last = run.judges.get(index)
         who = "the program" if last is None else program.named(last)
         require(
-            found == tuple(wanted),
-            f"{who} must judge {port.name} by the codes {wanted[0]}..{wanted[1]}, not {found[0]}..{found[1]}",
+            limits == tuple(wanted),
+            f"{who} must judge {port.name} by the codes {wanted[0]}..{wanted[1]}, not {limits[0]}..{limits[1]}",
         )
     return ProgramVerdict(len(program.instructions), run.values, len(run.states), judged, program, run.memory())
 
@@ -435,12 +435,12 @@ class _Run:
         acc = self._acc
         self._begin()
         top = acc.shift + self._bits
-        found = self._node(acc.total, top)
+        match = self._node(acc.total, top)
         self._group.ends.append(number)
-        if found is None:
+        if match is None:
             require(False, fault(self.program, self.graph, self._of, self._group))
             return
-        node, frac = found
+        node, frac = match
         value = scaled(self._of[node], frac)
         form = self._forms.floor(scaled(value, -acc.shift))
         limits = self.graph.nodes[node].limits

@@ -90,19 +90,19 @@ class Graph:
 
     def step(self, codes: Sequence[int], states: dict[int, int]) -> int:
         """Compute a sample from input codes, and the codes of the states; return the output and update the states."""
-        found: list[int] = []
+        values: list[int] = []
         supply = iter(codes)
         for index, node in enumerate(self.nodes):
             if node.entry.op is Operation.INPUT:
-                found.append(next(supply))
+                values.append(next(supply))
             elif node.entry.op is Operation.DELAY:
-                found.append(states[index])
+                values.append(states[index])
             else:
-                operands = [(found[i], self.nodes[i].entry.frac) for i in node.entry.operands]
-                found.append(_code(node.entry, operands))
+                operands = [(values[i], self.nodes[i].entry.frac) for i in node.entry.operands]
+                values.append(_code(node.entry, operands))
         for index in self.delays:
-            states[index] = found[self.nodes[index].entry.operands[0]]
-        return found[self.output]
+            states[index] = values[self.nodes[index].entry.operands[0]]
+        return values[self.output]
 
 
 def joined(certificate: Certificate) -> Graph:

@@ -85,10 +85,8 @@ class _Tokens:
         return True
 
     def expect(self, token: str) -> None:
-        found = self.next()
-        require(
-            found == token, f"logic must have {token!r} after what stands before it in {self._text!r}, not {found!r}"
-        )
+        read = self.next()
+        require(read == token, f"logic must have {token!r} after what stands before it in {self._text!r}, not {read!r}")
 
 
 def _slice(tokens: _Tokens, widths: Mapping[str, int]) -> tuple[str, int, int]:
@@ -179,9 +177,9 @@ def _extended(bits: Sequence[Bit], width: int) -> list[Bit]:
 
 
 def _chosen(select: Sequence[Bit], yes: Callable[[], list[Bit]], no: Callable[[], list[Bit]]) -> list[Bit]:
-    (found,) = _any(select)
-    if found in {0, 1}:
-        return yes() if found else no()
+    (condition,) = _any(select)
+    if condition in {0, 1}:
+        return yes() if condition else no()
     a, b = yes(), no()
     width = max(len(a), len(b))
     return [x if x == y else None for x, y in zip(_extended(a, width), _extended(b, width), strict=True)]

@@ -76,13 +76,13 @@ class Memory:
             require(plain and numbers and name in self.nodes, where)
             state = Kept(addresses, name, place["frac"]) in self.states
             require(place["state"] == state and (state or self._holds(name, addresses, place["frac"])), where)
-        found = {tuple(place["addresses"]) for place in places}
+        listed = {tuple(place["addresses"]) for place in places}
         for wanted in (*self.stored, *(state.addresses for state in self.states)):
             require(
-                wanted in found,
+                wanted in listed,
                 f"schedule.places of the manifest must have the words {', '.join(map(str, wanted))}",
             )
-        for address in sorted(self.taken - {address for addresses in found for address in addresses}):
+        for address in sorted(self.taken - {address for addresses in listed for address in addresses}):
             require(False, f"schedule.places of the manifest must have the words {address}")
         missing = [state.name for state in self.states if state.name not in names]
         require(not missing, f"schedule.places of the manifest must have {', '.join(missing)}")

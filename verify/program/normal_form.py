@@ -117,14 +117,14 @@ class Forms:
     def _nested(self, rest: Form) -> Form | None:
         """Return ``(m + r) / n`` for ``(m + floor(r)) / n``; None if there is not just one such floor."""
         n = lcm(*(Fraction(coefficient).denominator for coefficient in rest.values()))
-        found = [
+        floors = [
             monomial
             for monomial, coefficient in rest.items()
             if len(monomial) == 1 and monomial[0] in self._within and coefficient == Fraction(1, n)
         ]
-        if len(found) != 1 or n == 1:
+        if len(floors) != 1 or n == 1:
             return None
-        ((atom,),) = found
+        ((atom,),) = floors
         return plus(plus(rest, {(atom,): Fraction(-1, n)}), self._within[atom], Fraction(1, n))
 
     def extent(self, form: Form) -> tuple[int | Fraction, int | Fraction]:

@@ -72,23 +72,23 @@ def find_states(
             past.append(states[node])
         graph.step(codes, states)
         machine.step(codes)
-    found: list[State] = []
+    matched: list[State] = []
     floors: dict[int, int] = {}
     address = 0
     while True:
-        held = {state.node for state in found}
-        floors = _floors(graph, series, held, own_words=own_words)
-        left = [node for node in series if node not in held and node not in floors]
+        in_words = {state.node for state in matched}
+        floors = _floors(graph, series, in_words, own_words=own_words)
+        left = [node for node in series if node not in in_words and node not in floors]
         tried = (_matched(program, graph, words, address, node, series[node]) for node in left)
         state = next((state for state in tried if state is not None), None)
         state = state or _nearest(program, graph, words, address, {node: series[node] for node in left})
         if state is None:
             break
-        found.append(state)
+        matched.append(state)
         address += state.digits
-    free = sorted({*range(program.words - 1)} - {s.address + k for s in found for k in range(s.digits)})
-    found += [State(node, at, 1, 0) for node, at in zip(left, free, strict=False)]
-    return sorted(found, key=lambda state: state.address), floors
+    free = sorted({*range(program.words - 1)} - {s.address + k for s in matched for k in range(s.digits)})
+    matched += [State(node, at, 1, 0) for node, at in zip(left, free, strict=False)]
+    return sorted(matched, key=lambda state: state.address), floors
 
 
 def _matched(
@@ -113,7 +113,7 @@ def _nearest(
 
     A program that is wrong in a recursion by so little that its results are right is then rejected for what is wrong.
     """
-    found: list[tuple[Fraction, State]] = []
+    candidates: list[tuple[Fraction, State]] = []
     for count, past in _numbers(program, words, address):
         for node, codes in series.items():
             size = max(map(abs, codes), default=0)
@@ -121,8 +121,8 @@ def _nearest(
                 state = State(node, address, count, shift)
                 if _fits(program, graph, state):
                     apart = max(abs(a - (b << shift)) for a, b in zip(past, codes, strict=True))
-                    found.append((Fraction(apart, size << shift), state))
-    share, state = min(found, key=lambda pair: pair[0], default=(_NEARBY, State(-1, 0, 0, 0)))
+                    candidates.append((Fraction(apart, size << shift), state))
+    share, state = min(candidates, key=lambda pair: pair[0], default=(_NEARBY, State(-1, 0, 0, 0)))
     return state if share < _NEARBY else None
 
 
@@ -138,14 +138,14 @@ def _fits(program: ProgramText, graph: Graph, state: State) -> bool:
     return -limit <= entry.low << state.shift and entry.high << state.shift < limit
 
 
-def _floors(graph: Graph, series: Mapping[int, list[int]], held: set[int], *, own_words: bool) -> dict[int, int]:
+def _floors(graph: Graph, series: Mapping[int, list[int]], in_words: set[int], *, own_words: bool) -> dict[int, int]:
     """Find the states that are the floor of one of those in words, at every sample.
 
     Slow sections look alike in the samples of a run: a floor by the graph comes before what only looks like one.
     """
     floors = {}
-    for node in series.keys() - held:
-        for other in sorted(held, key=lambda other: (not _takes_floor(graph, node, other), other)):
+    for node in series.keys() - in_words:
+        for other in sorted(in_words, key=lambda other: (not _takes_floor(graph, node, other), other)):
             shift = graph.nodes[other].entry.frac - graph.nodes[node].entry.frac
             same = shift >= 0 and all(b >> shift == a for a, b in zip(series[node], series[other], strict=True))
             if same and (not own_words or _takes_floor(graph, node, other)):

@@ -177,14 +177,17 @@ def read_program(text: str, top: str | None = None) -> ProgramText:
     address_bits, odd = divmod(code_bits - _OPCODE_BITS - word_bits, 2)
     depth, words = len(slices[0][1]), 1 << max(address_bits, 0)
     require(
-        address_bits > 0 and not odd and depth % words == 0 and all(len(held) == depth for _, held, _ in slices),
+        address_bits > 0
+        and not odd
+        and depth % words == 0
+        and all(len(first_word) == depth for _, first_word, _ in slices),
         f"an instruction must have an opcode, two addresses and a constant as wide as a word, not {code_bits} bits "
         f"for {depth} words of {word_bits} bits",
     )
     for address in range(depth):
-        held = sum(content[address] << low for low, content, _ in slices)
+        first_word = sum(content[address] << low for low, content, _ in slices)
         first = int(address % words == words - 1)
-        require(held == first, f"word {address} must hold {first} before the first sample, not {held}")
+        require(first_word == first, f"word {address} must hold {first} before the first sample, not {first_word}")
     for number, code in enumerate(codes):
         opcode = code % (1 << _OPCODE_BITS)
         require(opcode < len(OPCODES), f"instruction {number} must have an opcode below {len(OPCODES)}, not {opcode}")
@@ -202,8 +205,8 @@ def read_program(text: str, top: str | None = None) -> ProgramText:
 
 def _results(widths: Mapping[str, int]) -> tuple[int, ...]:
     """Return the widths of the registers that hold a result: one that leaves as it is has the name of its port."""
-    found = tuple(widths[name] for name in sorted(widths, key=_number_of) if re.fullmatch(r"given\d+", name))
-    return found or tuple(width for name, width in widths.items() if name == _OUTPUT)
+    parts = tuple(widths[name] for name in sorted(widths, key=_number_of) if re.fullmatch(r"given\d+", name))
+    return parts or tuple(width for name, width in widths.items() if name == _OUTPUT)
 
 
 _OUTPUT = "m_axis_tdata"
@@ -211,7 +214,7 @@ _OUTPUT = "m_axis_tdata"
 
 def _held(module: Module, name: str) -> list[int]:
     """Return what the words of a memory hold before the first clock."""
-    return [module.held[name][address] for address in range(module.depths[name])]
+    return [module.contents[name][address] for address in range(module.depths[name])]
 
 
 def _number_of(name: str) -> tuple[int, str]:
@@ -277,6 +280,6 @@ def _moved(text: str, word_bits: int) -> list[_Write]:
 def _written(text: str, register: str) -> _Write:
     """Return what is written to a register or a memory; the condition of a write without an `else` does not count."""
     write = rf"^ *(?:if \((.*)\) )?{register} <= (.*);(?:\n *else {register} <= (.*);)?$"
-    found = re.findall(write, text, re.MULTILINE)
-    require(len(found) == 1, f"there must be one place where {register} is written, not {len(found)}")
-    return _Write(*found[0])
+    writes = re.findall(write, text, re.MULTILINE)
+    require(len(writes) == 1, f"there must be one place where {register} is written, not {len(writes)}")
+    return _Write(*writes[0])

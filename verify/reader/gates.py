@@ -33,11 +33,11 @@ class Gates:
         return self._literal(key, None)
 
     def _literal(self, key: Hashable, inputs: tuple[int, int] | None) -> int:
-        found = self._known.get(key)
-        if found is None:
-            found = self._known[key] = 2 * len(self._inputs)
+        literal = self._known.get(key)
+        if literal is None:
+            literal = self._known[key] = 2 * len(self._inputs)
             self._inputs.append(inputs)
-        return found
+        return literal
 
     def inputs(self, literal: int) -> tuple[int, int] | None:
         """Return the literals that the gate of a literal takes; None for a variable or constant."""
@@ -86,10 +86,10 @@ class Gates:
 
     def all_of(self, word: Sequence[int]) -> int:
         """Return whether all bits are 1."""
-        found = HIGH
+        conjunction = HIGH
         for bit in word:
-            found = self.both(found, bit)
-        return found
+            conjunction = self.both(conjunction, bit)
+        return conjunction
 
     def any_of(self, word: Sequence[int]) -> int:
         """Return whether a bit is 1."""
@@ -97,22 +97,22 @@ class Gates:
 
     def parity_of(self, word: Sequence[int]) -> int:
         """Return whether the number of ones is odd."""
-        found = LOW
+        parity = LOW
         for bit in word:
-            found = self.differ(found, bit)
-        return found
+            parity = self.differ(parity, bit)
+        return parity
 
     # Words; where there are two, they have one width.
 
     def sum_of(self, a: Word, b: Word, carry: int = LOW) -> Word:
         """Return a sum without its carry."""
-        found = []
+        total = []
         for one, other in zip(a, b, strict=True):
             low, high = sorted((one, other))
             half = self.differ(low, high)
-            found.append(self.differ(half, carry))
+            total.append(self.differ(half, carry))
             carry = self.chosen(half, carry, low)
-        return found
+        return total
 
     def difference_of(self, a: Word, b: Word) -> Word:
         """Return a difference without its borrow."""
@@ -135,12 +135,12 @@ class Gates:
 
     def less(self, a: Word, b: Word, *, signed: bool) -> int:
         """Return whether a word is less than another one."""
-        found = LOW
+        less = LOW
         if signed:  # as words without sign whose highest bits are inverted
             a, b = ([*word[:-1], word[-1] ^ 1] for word in (a, b))
         for one, other in zip(a, b, strict=True):
-            found = self.chosen(self.differ(one, other), other, found)
-        return found
+            less = self.chosen(self.differ(one, other), other, less)
+        return less
 
 
 def extended(word: Word, width: int, *, signed: bool) -> Word:

@@ -229,10 +229,10 @@ class Reader:
         require(
             value >> module.widths[name] == 0, f"the words of {name} must have {module.widths[name]} bits, not more"
         )
-        held = module.held.setdefault(name, {})
+        content = module.contents.setdefault(name, {})
         for address in addresses:
-            require(address not in held, f"word {address} of {name} must be given once, not twice")
-            held[address] = value
+            require(address not in content, f"word {address} of {name} must be given once, not twice")
+            content[address] = value
 
     def _instance(self) -> None:
         tokens = self._tokens
@@ -265,13 +265,13 @@ class Reader:
             self._line(indent)
             return (self._statement(indent + 2),)
         self._line(indent)
-        found = []
+        statements = []
         while tokens.peek() != "end":
-            found.append(self._statement(indent + 2))
+            statements.append(self._statement(indent + 2))
         tokens.expect("end")
         if tokens.peek() != "else":
             self._line(indent)
-        return tuple(found)
+        return tuple(statements)
 
     def _statement(self, indent: int) -> Statement:
         tokens = self._tokens
@@ -371,11 +371,11 @@ class Reader:
 
     def _number(self) -> Number:
         token = self._tokens.next()
-        found = _NUMBER.fullmatch(token)
-        if found is None:
+        match = _NUMBER.fullmatch(token)
+        if match is None:
             raise self._tokens.refused("a number with its width", token)
-        digits, base = next((found[k], base) for k, base in ((2, 16), (3, 10), (4, 2)) if found[k])
-        number = Number(int(digits, base), int(found[1]))
+        digits, base = next((match[k], base) for k, base in ((2, 16), (3, 10), (4, 2)) if match[k])
+        number = Number(int(digits, base), int(match[1]))
         require(number.width <= _MAX_WIDTH, f"a number must have at most {_MAX_WIDTH} bits, not {number.width}")
         require(number.value.bit_length() <= number.width, f"the number {token} must fit {number.width} bits")
         return number

@@ -57,13 +57,13 @@ def inlined(source: Source, top: str) -> Source:
 
 def _below(modules: Mapping[str, Module], names: set[str]) -> list[str]:
     """Return modules, and all that are in them."""
-    found: dict[str, None] = dict.fromkeys(sorted(names))
-    for name in (waiting := list(found)):
+    reached: dict[str, None] = dict.fromkeys(sorted(names))
+    for name in (waiting := list(reached)):
         for inside, _, _ in modules[name].instances:
-            if inside not in found:
-                found[inside] = None
+            if inside not in reached:
+                reached[inside] = None
                 waiting.append(inside)
-    return list(found)
+    return list(reached)
 
 
 def _joined(whole: Module, part: Module, instance: str, ports: Mapping[str, Expression]) -> Module:
@@ -89,18 +89,18 @@ def _joined(whole: Module, part: Module, instance: str, ports: Mapping[str, Expr
             inside[net] = name
         elif net not in inside:
             inside[net] = f"?{instance}{net}"
-    found = _renamed(whole, outside)
+    joined = _renamed(whole, outside)
     added = _renamed(part, inside)
     for port, value in ports.items():
         own, other = Bits(inside[port]), _named(value, outside)
         if own != other:
-            found.assigns.append((own, other) if part.ports[port] == "input" else (other, own))
-    for name in ("widths", "registers", "depths", "held"):
-        getattr(found, name).update(getattr(added, name))
-    found.unchecked |= added.unchecked
+            joined.assigns.append((own, other) if part.ports[port] == "input" else (other, own))
+    for name in ("widths", "registers", "depths", "contents"):
+        getattr(joined, name).update(getattr(added, name))
+    joined.unchecked |= added.unchecked
     for name in ("assigns", "clocked", "instances"):
-        getattr(found, name).extend(getattr(added, name))
-    return found
+        getattr(joined, name).extend(getattr(added, name))
+    return joined
 
 
 def _renamed(module: Module, names: Mapping[str, str]) -> Module:
@@ -115,7 +115,7 @@ def _renamed(module: Module, names: Mapping[str, str]) -> Module:
         registers={name(net): first for net, first in module.registers.items()},
         depths={name(net): depth for net, depth in module.depths.items()},
         unchecked={name(net) for net in module.unchecked},
-        held={name(net): dict(words) for net, words in module.held.items()},
+        contents={name(net): dict(words) for net, words in module.contents.items()},
         assigns=[(_named(target, names), _named(value, names)) for target, value in module.assigns],
         clocked=[(name(clock), _statements(statements, names)) for clock, statements in module.clocked],
         instances=[
@@ -139,16 +139,16 @@ def _named(value: Expression, names: Mapping[str, str]) -> Expression:
 
 
 def _statements(statements: Sequence[Statement], names: Mapping[str, str]) -> tuple[Statement, ...]:
-    found: list[Statement] = []
+    renamed: list[Statement] = []
     for one in statements:
         if isinstance(one, Load):
             target = _named(one.target, names)
             assert isinstance(target, Bits | Word)
-            found.append(Load(target, _named(one.value, names)))
+            renamed.append(Load(target, _named(one.value, names)))
         else:
             yes, no = _statements(one.yes, names), _statements(one.no, names)
-            found.append(Choice(_named(one.condition, names), yes, no))
-    return tuple(found)
+            renamed.append(Choice(_named(one.condition, names), yes, no))
+    return tuple(renamed)
 
 
 # The text.
@@ -171,7 +171,7 @@ def _items(module: Module) -> Iterator[str]:
                 yield "  (* no_rw_check = 32'd1 *)"
             yield f"  reg {ranged}{net} [{module.depths[net] - 1}:0];"
             yield "  initial begin"
-            yield from (f"    {net}[{k}] = {_number(Number(word, width))};" for k, word in module.held[net].items())
+            yield from (f"    {net}[{k}] = {_number(Number(word, width))};" for k, word in module.contents[net].items())
             yield "  end"
         elif net in module.registers:
             first = module.registers[net]

@@ -131,65 +131,68 @@ class _Reading:
 
     def logic(self) -> Logic:
         module = self._module
-        found = Logic(ports={name: port_of(kind, module.widths[name]) for name, kind in module.ports.items()})
-        found.clocks = {clock for clock, _ in module.clocked}
+        logic = Logic(ports={name: port_of(kind, module.widths[name]) for name, kind in module.ports.items()})
+        logic.clocks = {clock for clock, _ in module.clocked}
         for name, kind in module.ports.items():
             if kind == "output":
-                found.outputs[name] = tuple(self._whole(Bits(name)))
-        held = {name: self._whole(Bits(name)) for name in module.registers}
+                logic.outputs[name] = tuple(self._whole(Bits(name)))
+        following = {name: self._whole(Bits(name)) for name in module.registers}
         writes: dict[str, list[Write]] = {name: [] for name in module.depths}
         for _, statements in module.clocked:
-            own = {name: held[name] for name in self._loaded(statements)}
-            held |= self._executed(statements, HIGH, own, writes)
-        found.registers = {name: RegisterLogic(tuple(held[name]), first) for name, first in module.registers.items()}
+            own = {name: following[name] for name in self._loaded(statements)}
+            following |= self._executed(statements, HIGH, own, writes)
+        logic.registers = {
+            name: RegisterLogic(tuple(following[name]), first) for name, first in module.registers.items()
+        }
         for name, depth in module.depths.items():
-            first = tuple(module.held[name][place] for place in range(depth))
-            found.memories[name] = Stored(module.widths[name], first, tuple(writes[name]))
+            first = tuple(module.contents[name][place] for place in range(depth))
+            logic.memories[name] = Stored(module.widths[name], first, tuple(writes[name]))
         for kind, name, ports in module.instances:
-            found.instances[name] = kind
+            logic.instances[name] = kind
             for port, value in ports.items():
                 if self._directions[kind][port] == "input":
-                    found.given[f"{name}.{port}"] = tuple(self._whole(value))
-        return found
+                    logic.given[f"{name}.{port}"] = tuple(self._whole(value))
+        return logic
 
     def _loaded(self, statements: Sequence[Statement]) -> set[str]:
         """Return the registers that statements load."""
-        found: set[str] = set()
+        registers: set[str] = set()
         for statement in statements:
             if isinstance(statement, Choice):
-                found |= self._loaded((*statement.yes, *statement.no))
+                registers |= self._loaded((*statement.yes, *statement.no))
             elif isinstance(statement.target, Bits):
-                found.add(statement.target.name)
-        return found
+                registers.add(statement.target.name)
+        return registers
 
     def _executed(
-        self, statements: Sequence[Statement], when: int, held: dict[str, Literals], writes: dict[str, list[Write]]
+        self, statements: Sequence[Statement], when: int, following: dict[str, Literals], writes: dict[str, list[Write]]
     ) -> dict[str, Literals]:
         """Return what registers hold after statements that are executed if `when` is 1, and note what is written."""
         gates = self._gates
         for statement in statements:
             if isinstance(statement, Load):
-                held = self._load(statement, when, held, writes)
+                following = self._load(statement, when, following, writes)
                 continue
             condition = gates.any_of(self._whole(statement.condition))
-            yes = self._executed(statement.yes, gates.both(when, condition), held, writes)
-            no = self._executed(statement.no, gates.both(when, condition ^ 1), held, writes)
-            held = {
-                name: [gates.chosen(condition, a, b) for a, b in zip(yes[name], no[name], strict=True)] for name in held
+            yes = self._executed(statement.yes, gates.both(when, condition), following, writes)
+            no = self._executed(statement.no, gates.both(when, condition ^ 1), following, writes)
+            following = {
+                name: [gates.chosen(condition, a, b) for a, b in zip(yes[name], no[name], strict=True)]
+                for name in following
             }
-        return held
+        return following
 
     def _load(
-        self, load: Load, when: int, held: dict[str, Literals], writes: dict[str, list[Write]]
+        self, load: Load, when: int, following: dict[str, Literals], writes: dict[str, list[Write]]
     ) -> dict[str, Literals]:
         target, value = load.target, self._in_context(load.value, width_of(load.target, self._module))
         if isinstance(target, Word):
             writes[target.name].append(Write(when, shortest(self._whole(target.address)), tuple(value)))
-            return held
-        word = list(held[target.name])
+            return following
+        word = list(following[target.name])
         for bit, (_, place) in zip(value, self._places(target), strict=True):
             word[place] = bit
-        return {**held, target.name: word}
+        return {**following, target.name: word}
 
     # Nets.
 

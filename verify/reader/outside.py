@@ -88,27 +88,27 @@ class _Outside:
                 self._known |= {bit: gates.variable(("input", name, k)) for k, bit in enumerate(port["bits"])}
 
     def logic(self) -> Logic:
-        found = Logic(ports={name: port_of(port["direction"], len(port["bits"])) for name, port in self._ports.items()})
-        found.registers = self._held()
-        found.memories = {name.removeprefix("\\"): self._memory(name) for name in self._memories}
+        logic = Logic(ports={name: port_of(port["direction"], len(port["bits"])) for name, port in self._ports.items()})
+        logic.registers = self._held()
+        logic.memories = {name.removeprefix("\\"): self._memory(name) for name in self._memories}
         for name, port in self._ports.items():
             if port["direction"] == "output":
-                found.outputs[name] = tuple(self._word(port["bits"]))
+                logic.outputs[name] = tuple(self._word(port["bits"]))
         for name, cell in self._cells.items():
             if cell["type"] in self._modules:
-                found.instances[name] = cell["type"]
+                logic.instances[name] = cell["type"]
                 for port, direction in cell["port_directions"].items():
                     if direction == "input":
-                        found.given[f"{name}.{port}"] = tuple(self._word(cell["connections"][port]))
-        found.clocks = {self._clock(cell) for cell in self._cells.values() if cell["type"] in {"$dff", "$memwr_v2"}}
-        return found
+                        logic.given[f"{name}.{port}"] = tuple(self._word(cell["connections"][port]))
+        logic.clocks = {self._clock(cell) for cell in self._cells.values() if cell["type"] in {"$dff", "$memwr_v2"}}
+        return logic
 
     def _clock(self, cell: Cell) -> str:
         (bit,) = cell["connections"]["CLK"]
         require(_number(cell, "CLK_POLARITY") == 1, "registers of the second reader must take the rising edge")
-        found = [name for name, port in self._ports.items() if port["bits"] == [bit] and port["direction"] == "input"]
-        require(len(found) == 1, "the clock of the second reader must be an input")
-        return str(found[0])
+        clocks = [name for name, port in self._ports.items() if port["bits"] == [bit] and port["direction"] == "input"]
+        require(len(clocks) == 1, "the clock of the second reader must be an input")
+        return str(clocks[0])
 
     def _held(self) -> dict[str, RegisterLogic]:
         """Return the registers, whose bits are flip-flops and no other's.

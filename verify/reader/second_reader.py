@@ -45,7 +45,7 @@ def compare_readings(modules: Mapping[str, Module], netlist: str) -> Readings:
     )
     for name, logic in own.items():
         _compare(name, logic, other[name])
-    bits = sum(len(held.next) for logic in own.values() for held in logic.registers.values())
+    bits = sum(len(register.next) for logic in own.values() for register in logic.registers.values())
     words = sum(len(memory.first) for logic in own.values() for memory in logic.memories.values())
     return Readings(len(own), bits, words)
 

@@ -56,8 +56,8 @@ def read_source(text: str, top: str | None = None, *, unknowns: bool = True) -> 
     RejectedError
         If the text has anything that is not in the subset, or its modules are not put together in one way.
     """
-    found = _parsed(text, top, unknowns)
-    return Source(found.text, {name: module.copy() for name, module in found.modules.items()})
+    source = _parsed(text, top, unknowns)
+    return Source(source.text, {name: module.copy() for name, module in source.modules.items()})
 
 
 @lru_cache(maxsize=2)
@@ -118,11 +118,11 @@ def _check_size(modules: Mapping[str, Module], top: str) -> None:
         words[name] = sum(modules[name].depths.values()) + sum(words[module] for module in inside)
 
     count(top)
-    for found, most, what in (
+    for total, most, what in (
         (instances[top], _MAX_INSTANCES, "instances"),
         (words[top], MAX_WORDS, "words of memories"),
     ):
-        require(found <= most, f"{top} must have at most {most} {what}, not {found}")
+        require(total <= most, f"{top} must have at most {most} {what}, not {total}")
 
 
 def _check_tree(modules: Mapping[str, Module], top: str) -> None:
@@ -168,12 +168,12 @@ def _check_clocks(modules: Mapping[str, Module], top: str) -> None:
 
 def _looked_at(module: Module, clocks: Mapping[str, set[str]]) -> set[str]:
     """Return the nets that are in assignments and statements, or go to ports that are no clocks."""
-    found = set[str]()
+    nets = set[str]()
 
     def look(one: Expression | Statement) -> None:
         match one:
             case Bits():
-                found.add(one.name)
+                nets.add(one.name)
             case Word():
                 look(one.address)
             case Joined():
@@ -200,7 +200,7 @@ def _looked_at(module: Module, clocks: Mapping[str, set[str]]) -> set[str]:
         for port, given in ports.items():
             if port not in clocks[inside]:
                 look(given)
-    return found
+    return nets
 
 
 def _from_below(modules: Mapping[str, Module], top: str) -> list[str]:
@@ -271,8 +271,8 @@ def _check_nets(name: str, module: Module, modules: Mapping[str, Module]) -> Non
         missing = read.get(net, 0) & ~driven.get(net, 0)
         require(not missing, f"each bit of {net} in {name} that is read must be driven")
     for memory, depth in module.depths.items():
-        held = module.held.get(memory, {})
-        require(len(held) == depth, f"all {depth} words of {memory} must be given, not {len(held)}")
+        content = module.contents.get(memory, {})
+        require(len(content) == depth, f"all {depth} words of {memory} must be given, not {len(content)}")
 
 
 def _read(module: Module, modules: Mapping[str, Module]) -> dict[str, int]:

@@ -89,7 +89,7 @@ class Module:
         Nets that stay through synthesis.
     unchecked : set of str
         Memories that may read anything at the clock at which that word is written.
-    held : dict of str to dict of int to int
+    contents : dict of str to dict of int to int
         What the words of each memory hold before the first clock.
     assigns : list
         Targets and expressions.
@@ -105,7 +105,7 @@ class Module:
     depths: dict[str, int] = field(default_factory=dict)
     kept: set[str] = field(default_factory=set)
     unchecked: set[str] = field(default_factory=set)
-    held: dict[str, dict[int, int]] = field(default_factory=dict)
+    contents: dict[str, dict[int, int]] = field(default_factory=dict)
     assigns: list[tuple[Expression, Expression]] = field(default_factory=list)
     clocked: list[tuple[str, tuple[Statement, ...]]] = field(default_factory=list)
     instances: list[tuple[str, str, dict[str, Expression]]] = field(default_factory=list)
@@ -119,7 +119,7 @@ class Module:
             depths=dict(self.depths),
             kept=set(self.kept),
             unchecked=set(self.unchecked),
-            held={name: dict(words) for name, words in self.held.items()},
+            contents={name: dict(words) for name, words in self.contents.items()},
             assigns=list(self.assigns),
             clocked=list(self.clocked),
             instances=[(inside, name, dict(ports)) for inside, name, ports in self.instances],

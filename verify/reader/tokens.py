@@ -75,9 +75,9 @@ class Tokens:
 
     def take(self, token: str) -> bool:
         """Take the next token if it is this one, and say whether it was."""
-        found = self.peek() == token
-        self._at += found
-        return found
+        taken = self.peek() == token
+        self._at += taken
+        return taken
 
     def expect(self, *tokens: str) -> None:
         """Take these tokens.
@@ -88,9 +88,9 @@ class Tokens:
             If others are next.
         """
         for token in tokens:
-            found = self.next()
-            if found != token:
-                raise self.refused(token, found)
+            read = self.next()
+            if read != token:
+                raise self.refused(token, read)
 
     def name(self) -> str:
         """Take a name."""
@@ -120,10 +120,10 @@ class Tokens:
         """Attributes of what begins with the next token."""
         return self._marks.get(self._at, [])
 
-    def refused(self, wanted: str, found: str) -> RejectedError:
+    def refused(self, wanted: str, read: str) -> RejectedError:
         """Return the rejection of a token, the last one that was taken."""
         before = " ".join(self._tokens[max(self._at - 6, 0) : self._at - 1])
-        return RejectedError(f"the SystemVerilog must have {wanted} after {before!r}, not {found!r}")
+        return RejectedError(f"the SystemVerilog must have {wanted} after {before!r}, not {read!r}")
 
 
 def _lines(text: str) -> list[tuple[str, list[str]]]:
@@ -166,11 +166,11 @@ def _cut(line: str) -> list[str]:
         if line[at] == " ":
             at += 1
             continue
-        found = _TOKEN.match(line, at)
-        if found is None or line.startswith(("//", "/*", "(*"), at) or found.end() - at > _LONGEST:
+        match = _TOKEN.match(line, at)
+        if match is None or line.startswith(("//", "/*", "(*"), at) or match.end() - at > _LONGEST:
             raise RejectedError(f"the SystemVerilog must be made of its plain subset, not have {line[at : at + 20]!r}")
-        at = found.end()
+        at = match.end()
         whole = at == len(line) or not (re.match(r"[\w'$]", line[at]) and re.match(r"[\w$]", line[at - 1]))
         require(whole, f"the SystemVerilog must have blanks between words, not {line[max(at - 10, 0) : at + 10]!r}")
-        tokens.append(found[0])
+        tokens.append(match[0])
     return tokens

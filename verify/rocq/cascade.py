@@ -1,4 +1,4 @@
-"""The cascade of sections as forms: each node as a quotient of polynomials to the sources up to its own section.
+"""The cascade of sections as forms: each node as a quotient of polynomials to the inputs and roundings of its section.
 
 Nothing proven depends on this: Rocq checks each form against the graph.
 """
@@ -9,48 +9,55 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
-from sosmith.verify.certificate_file import Operation
+from flint import fmpz_poly
+
+from sosmith.verify.certificate_file import Operation, StageEntry
 from sosmith.verify.graph import inputs_of
 from sosmith.verify.rocq.flat import FlatGraph
 from sosmith.verify.rocq.linear import LinearStage, Source
-from sosmith.verify.rocq.polynomials import (
-    Polynomial,
-    added,
-    common_denominator,
-    integers,
-    number,
-    numbers,
-    product,
-    rows,
-)
+from sosmith.verify.rocq.polynomials import common_denominator, integers, number, numbers, rows
+from sosmith.verify.rocq.responses import divide, impulse, split
 
-Row = dict[Source, Polynomial]
-"""Numerators by source; the nodes of sources are counted in the whole graph."""
-
-_WRITTEN = {Operation.DELAY, Operation.FRACTION, Operation.CONSTANT}
+_WRITTEN = {Operation.DELAY, Operation.FRACTION, Operation.CONSTANT, Operation.INPUT}
 """Nodes whose forms are written out; Rocq derives the others from theirs."""
+
+Row = dict[int, fmpz_poly]
+"""Polynomials by the place of the source that each acts on."""
 
 
 @dataclass(frozen=True)
-class SectionForms:
-    """Forms of one section.
+class Section:
+    """A section, with its nodes counted in the whole graph.
 
     Attributes
     ----------
     under : list of int
-        The denominator of all its nodes: that of the sections up to this one, times a number.
-    factor : list of int
-        What the forms at its inputs are multiplied by.
+        The denominator of all its nodes, which begins with a power of two.
     forms : mapping from node to Row
-        Numerators, in integers.
+        Numerators of what it computes.
+    wires : list of int
+        Places of the sources that are its inputs.
     targets : list of int
         Nodes whose range needs a peak gain.
+    known : int
+        All nodes before this one have known ranges when those of this section are looked for.
     """
 
     under: list[int]
-    factor: list[int]
     forms: Mapping[int, Row]
+    wires: list[int]
     targets: list[int]
+    known: int
+
+
+@dataclass(frozen=True)
+class Rows:
+    """What Rocq's `rows_of` finds of a node: ``K code = row * sources``, within `rest`; and the plan that it follows."""
+
+    row: Row
+    rest: int
+    whole: int
+    plan: str
 
 
 @dataclass(frozen=True)
@@ -59,51 +66,68 @@ class Cascade:
 
     Attributes
     ----------
-    first, last : int
-        The first node of the sections, and the one behind them.
-    entries : list of int
-        The nodes before the sections that drive them.
+    graph : FlatGraph
+    last : int
+        The first node behind the sections.
     sources : list of Source
-    sections : list of SectionForms
+    sections : list of Section
     """
 
     graph: FlatGraph
-    first: int
     last: int
-    entries: list[int]
     sources: list[Source]
-    sections: list[SectionForms]
-
-    def row(self, form: Row) -> list[list[int]]:
-        """Return numerators in the order of the sources."""
-        return [[int(value) for value in form.get(source, [])] for source in self.sources]
+    sections: list[Section]
 
     def definitions(self) -> str:
-        """Write sources, factors and forms as terms of Rocq."""
+        """Write sources and forms as terms of Rocq."""
         written: list[str] = []
-        for entry in self.entries if self._placed()[0][0] else ():
-            alone: Row = {("node", entry, 0): [Fraction(1)]}
-            written.append(f"({entry}%nat, Form [1] {rows(self.row(alone))})")
-        factors: list[str] = []
-        for place, section in self._placed():
-            stage = self.graph.stages[place]
-            offset = self.graph.offsets[place]
-            factors += [f"({offset + at}%nat, {numbers(section.factor)})" for at in inputs_of(stage)]
-            for at, node in enumerate(stage.nodes):
-                if node.op in _WRITTEN or (node.op is Operation.INPUT and place == 0):
-                    form = rows(self.row(section.forms[offset + at]))
-                    written.append(f"({offset + at}%nat, Form {numbers(section.under)} {form})")
+        for section in self.sections:
+            for node, form in section.forms.items():
+                if self.graph.node(node).op in _WRITTEN:
+                    written.append(f"({node}%nat, Form {numbers(section.under)} {_row(form)})")
         return f"""\
+(* What drives the sections, and each node's code as a quotient to these, D * code = N1 * u1 + ...: a help, all checked. *)
 Definition sources : list source := [{"; ".join(map(_source, self.sources))}].
-Definition factors : list (nat * list Z) := [{"; ".join(factors)}].
 Definition written : list (nat * form) := [
    {(";" + chr(10) + "   ").join(written)}].
-Definition forms := Eval vm_compute in fill core sources factors written [] (firstn {self.last} core).
+Definition forms := Eval vm_compute in fill core sources written [] (firstn {self.last} core).
 """
 
-    def _placed(self) -> list[tuple[int, SectionForms]]:
-        places = [index for index, stage in enumerate(self.graph.stages) if stage.role == "section"]
-        return list(zip(places, self.sections, strict=True))
+    def rows(self, section: int, node: int, bits: int) -> Rows:
+        """Follow `rows_of`: the response of a node of a section, its first sample being ``2**bits``."""
+        at = self.sections[section]
+        exponent, tail = split(at.under)
+        first = impulse(exponent, tail, 1 << bits)
+        row = _times(at.forms[node], first.values)
+        rest = first.rest * self._size(node)
+        steps = []
+        for index in range(section, 0, -1):
+            before = self.sections[index - 1]
+            exponent, tail = split(before.under)
+            for place in self.sections[index].wires:
+                if not row.get(place):
+                    continue
+                wire = self.sources[place][1]
+                moved = divide(exponent, tail, [int(value) for value in row.pop(place).coeffs()])
+                steps.append(f"({place}%nat, {moved.samples}%N)")
+                for key, value in _times(before.forms[self.graph.fed_by(wire)], moved.values).items():
+                    row[key] = row.get(key, fmpz_poly()) + value
+                rest += moved.rest * self._size(wire)
+        plan = f"Plan {first.samples} (2 ^ {bits}) [{'; '.join(steps)}]"
+        return Rows(row, rest, 1 << bits + split(at.under)[0], plan)
+
+    def _size(self, node: int) -> int:
+        entry = self.graph.node(node)
+        return max(abs(entry.low), abs(entry.high))
+
+
+def _times(form: Row, values: list[int]) -> Row:
+    response = fmpz_poly(values)
+    return {key: over * response for key, over in form.items()}
+
+
+def _row(form: Row) -> str:
+    return rows([int(value) for value in form[k].coeffs()] if k in form else [] for k in range(max(form, default=-1) + 1))
 
 
 def _source(source: Source) -> str:
@@ -122,58 +146,44 @@ def cascade_of(graph: FlatGraph) -> Cascade:
         If a section is not linear.
     """
     places = [index for index, stage in enumerate(graph.stages) if stage.role == "section"]
-    first = places[0]
-    entries = graph.feeds[first] if first else inputs_of(graph.stages[0])
-    wires: list[Row] = [{("node", entry, 0): [Fraction(1)]} for entry in entries]
-    under: Polynomial = [Fraction(1)]
-    sources: dict[Source, None] = {("node", entry, 0): None for entry in entries}
-    sections = []
-    for place in places:
-        made, under, wires = _section(graph, place, under, wires)
-        sections.append(made)
-        for row in made.forms.values():
-            sources.update(dict.fromkeys(row))
-    return Cascade(
-        graph,
-        max(graph.offsets[first], max(entries) + 1),
-        graph.offsets[places[-1] + 1],
-        list(dict.fromkeys(entries)),
-        list(sources),
-        sections,
-    )
+    sources: list[Source] = []
+    sections = [_section(graph, place, sources) for place in places]
+    return Cascade(graph, graph.offsets[places[-1] + 1], sources, sections)
 
 
-def _section(
-    graph: FlatGraph, place: int, before: Polynomial, wires: list[Row]
-) -> tuple[SectionForms, Polynomial, list[Row]]:
+def used_inputs(stage: StageEntry) -> list[int]:
+    """Return the inputs that a section computes with, not those that only pass beside it."""
+    used = {operand for node in stage.nodes for operand in node.operands}
+    return [at for at in inputs_of(stage) if at in used]
+
+
+def _section(graph: FlatGraph, place: int, sources: list[Source]) -> Section:
     stage, offset = graph.stages[place], graph.offsets[place]
     model = LinearStage(stage)
-    arriving = {("node", at, 0): row for at, row in zip(inputs_of(stage), wires, strict=True)}
-    forms: dict[int, Row] = {}
-    for at in range(len(stage.nodes)):
-        row: Row = {}
-        for source in model.sources:
-            through = model.numerator(at, source)
-            if not through:
-                continue
-            if source in arriving:
-                parts = [(key, product(through, value)) for key, value in arriving[source].items()]
-            else:
-                kind, node, bits = source
-                parts = [((kind, offset + node, bits), product(through, before))]
-            for key, value in parts:
-                row[key] = added(row.get(key, []), value)
-        forms[offset + at] = row
+    inputs = used_inputs(stage)
+    beside = set(inputs_of(stage)) - set(inputs)
+    mine = {key: (key[0], offset + key[1], key[2]) for key in model.sources if key[1] not in beside or key[0] != "node"}
+    start = len(sources)
+    sources += mine.values()
+    found = {
+        node: {start + at: model.numerator(node, key) for at, key in enumerate(mine)}
+        for node in range(len(stage.nodes))
+        if node not in beside
+    }
     own = model.denominator
-    scale = common_denominator([own, *(value for row in forms.values() for value in row.values())])
-    whole = {node: {key: [value * scale for value in part] for key, part in row.items()} for node, row in forms.items()}
-    factor = [value * scale for value in own]
-    under = product(factor, before)
+    scale = common_denominator([own, *(value for row in found.values() for value in row.values())])
+    forms = {
+        offset + node: {key: fmpz_poly(integers(value, scale)) for key, value in row.items() if any(value)}
+        for node, row in found.items()
+    }
+    wires = [start + at for at, key in enumerate(mine) if key[0] == "node" and key[1] in inputs]
     targets = [
         offset + at
         for at, node in enumerate(stage.nodes)
         if node.op is Operation.BOUND
         and not node.low <= stage.nodes[node.operands[0]].low <= stage.nodes[node.operands[0]].high <= node.high
     ]
-    made = SectionForms(integers(under, 1), integers(factor, 1), whole, targets)
-    return made, under, [whole[offset + output] for output in stage.outputs]
+    return Section(integers(own, scale), forms, wires, targets, offset + max(inputs, default=-1) + 1)
+
+
+__all__ = ["Cascade", "Fraction", "Row", "Rows", "Section", "cascade_of", "used_inputs"]

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from sosmith.model.errors import ToolError
 from sosmith.verify.certificate_file import Certificate, Operation, StageEntry
-from sosmith.verify.rocq.bound import bound_claim, why_no_bound
+from sosmith.verify.rocq.bound import bound_claims, why_no_bound
 from sosmith.verify.rocq.cascade import cascade_of
 from sosmith.verify.rocq.claims import Claim, gain_claims
 from sosmith.verify.rocq.flat import flattened
-from sosmith.verify.rocq.kernel import LIBRARY, THEORIES, run_kernel, theory_texts
-from sosmith.verify.rocq.ranges import graph_definitions, range_claims
+from sosmith.verify.rocq.kernel import LIBRARY, THEORIES, ending, mark, run_kernel, theory_texts
+from sosmith.verify.rocq.ranges import graph_definitions, range_claims, tight_claim
+from sosmith.verify.rocq.start import start_of
 
 DATA = "Claims"
 """Name of the file with a certificate's own theorems."""
@@ -32,6 +33,9 @@ clean:
 .PHONY: all clean
 """
 
+GIVEN = ("the certificate's graph, exact filter and exact calibration: that these are the specified ones is not of it",)
+"""What the theorems are about, and do not question."""
+
 Progress = Callable[[str, int, int], None]
 
 
@@ -47,6 +51,8 @@ class RocqVerdict:
         What each theorem says, by its name.
     axioms : tuple of str
         What they rest on: at most the axioms of the standard library's real numbers.
+    given : tuple of str
+        What the theorems do not ask about: what is held against what.
     unchecked : tuple of str
         What of the certificate Rocq did not check.
     """
@@ -54,6 +60,7 @@ class RocqVerdict:
     version: str
     claims: dict[str, str]
     axioms: tuple[str, ...]
+    given: tuple[str, ...]
     unchecked: tuple[str, ...]
 
 
@@ -65,7 +72,7 @@ def rocq_texts(certificate: Certificate) -> dict[str, str]:
     RejectedError
         If the certificate's claims cannot be written as theorems.
     """
-    return _texts(*theorems(certificate)[:2])
+    return _texts(theorems(certificate))
 
 
 def check_in_rocq(
@@ -90,64 +97,95 @@ def check_in_rocq(
         If `coqc` is missing or fails.
     """
     progress("theorems", 0, 0)
-    definitions, claims, unchecked = theorems(certificate)
+    made = theorems(certificate)
     with TemporaryDirectory() as name:
         folder = Path(name)
         try:
-            for file, text in _texts(definitions, claims).items():
+            for file, text in _texts(made).items():
                 (folder / file).write_text(text, encoding="utf-8")
         except OSError as error:
             raise ToolError(f"{folder}: the theories must be written there, which failed: {error.strerror}") from None
-        accepted = run_kernel(folder, claims, DATA, seconds, lambda done, total: progress("Rocq", done, total))
-    words = {claim.name: claim.words for claim in claims}
-    return RocqVerdict(accepted.version, words, accepted.axioms, unchecked)
+        accepted = run_kernel(folder, made.claims, DATA, seconds, lambda done, total: progress("Rocq", done, total))
+    words = {claim.name: claim.words for claim in made.claims}
+    return RocqVerdict(accepted.version, words, accepted.axioms, GIVEN, made.unchecked)
 
 
 def head(theories: Sequence[str] = THEORIES) -> str:
     """Return how a file of theorems begins that requires these theories."""
     return f"""\
 (* Written from a certificate: its claims as theorems. The theories beside it say what they mean. *)
-Require Import ZArith Reals List. Import ListNotations.
+Require Import ZArith Reals List Lra. Import ListNotations.
 From {LIBRARY} Require Import {" ".join(theories)}.
 Open Scope Z_scope.
 """
 
 
-def theorems(certificate: Certificate) -> tuple[str, list[Claim], tuple[str, ...]]:
-    """Return definitions, all theorems in their order, and what none of them is about."""
+@dataclass(frozen=True)
+class Theorems:
+    """What is written of a certificate.
+
+    Attributes
+    ----------
+    definitions : str
+        What the theorems are about, as text of Rocq.
+    claims : list of Claim
+        In their order.
+    unchecked : tuple of str
+        What of the certificate none of them is about.
+    """
+
+    definitions: str
+    claims: list[Claim]
+    unchecked: tuple[str, ...]
+
+
+def theorems(certificate: Certificate) -> Theorems:
+    """Write all theorems of a certificate.
+
+    Raises
+    ------
+    RejectedError
+        If its claims cannot be written as theorems.
+    """
     claims = list(gain_claims(certificate))
+    unchecked = list(_beside(certificate))
     why = _why_no_ranges(certificate.stages)
     if why is not None:
-        return "", claims, (f"ranges: {why}", "error bound: no ranges are proven")
+        return Theorems("", claims, (f"ranges: {why}", "error bound: no ranges are proven", *unchecked))
     graph = flattened(certificate)
     cascade = cascade_of(graph) if certificate.claims.sections else None
-    claims += range_claims(graph, cascade)
-    unchecked = [
-        "parts of the error budget, each on its own",
-        "the ideal filter: its coefficients are those of the certificate",
-    ]
+    start = start_of(graph)
+    claims.append(tight_claim())
+    claims += range_claims(graph, cascade, start)
     why = why_no_bound(certificate)
     if why is not None or cascade is None:
-        unchecked = [f"error bound: {why}", *unchecked[1:]]
+        unchecked.insert(0, f"error bound: {why}")
     else:
-        claims.append(bound_claim(certificate, cascade))
+        claims += bound_claims(certificate, cascade, start)
+    return Theorems(graph_definitions(graph), claims, tuple(unchecked))
+
+
+def _beside(certificate: Certificate) -> Iterator[str]:
+    """Name the claims that no theorem is about."""
+    if certificate.claims.settling is not None:
+        yield "how soon the filter has settled"
+    if certificate.claims.online is not None:
+        yield "the units of sections in on-line arithmetic"
     if certificate.decimation is not None:
-        unchecked.append("decimator and what is before it")
-    return graph_definitions(graph), claims, tuple(unchecked)
+        yield "decimator and what is before it"
 
 
 def _why_no_ranges(stages: Sequence[StageEntry]) -> str | None:
     """Why theorems cannot be written for the ranges of these stages; None if they can."""
     for stage in stages:
-        if stage.role == "start":
-            return "a filter that starts from its first sample"
-        for node in stage.nodes if stage.role != "section" else ():
+        for node in stage.nodes if stage.role not in {"section", "start"} else ():
             of = stage.nodes[node.operands[0]] if node.op is Operation.BOUND else node
             if of.low < node.low or of.high > node.high:
                 return f"{stage.name} limits a range by something else than peak gains"
     return None
 
 
-def _texts(definitions: str, claims: list[Claim]) -> dict[str, str]:
-    parts = [f"(* {claim.words}. *)\n{claim.text}Print Assumptions {claim.name}.\n" for claim in claims]
-    return theory_texts() | {f"{DATA}.v": "\n".join([head(), definitions, *parts]), "Makefile": _MAKEFILE}
+def _texts(made: Theorems) -> dict[str, str]:
+    parts = [f"(* {claim.words}. *)\n{claim.text}{mark(claim)}" for claim in made.claims]
+    text = "\n".join([head(), made.definitions, *parts, ending(made.claims)])
+    return theory_texts() | {f"{DATA}.v": text, "Makefile": _MAKEFILE}

@@ -6,14 +6,16 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
+from flint import fmpz_poly
+
 from sosmith.verify.certificate_file import Certificate, Operation, StageEntry
 from sosmith.verify.graph import require
 from sosmith.verify.rocq.linear import LinearStage
 from sosmith.verify.rocq.polynomials import common_denominator, integers, number, numbers, rows
-from sosmith.verify.rocq.witness import Witness, norm, witness
+from sosmith.verify.rocq.responses import impulse, split
 
-_MORE_BITS = (0, 48, 128)
-"""Precision beyond what mostly decides a claim, tried in this order."""
+_BITS = (88, 104, 136, 232)
+"""Precision of the first sample of a response, tried in this order."""
 
 
 @dataclass(frozen=True)
@@ -81,22 +83,23 @@ def _in_values(section: StageEntry, model: LinearStage, node: int, source: int) 
 def _gain(name: str, words: str, model: LinearStage, over: Sequence[Sequence[Fraction]], claimed: Fraction) -> Claim:
     scale = common_denominator([model.denominator, *over])
     under, numerators = integers(model.denominator, scale), [integers(one, scale) for one in over]
-    chosen = _decided(under, numerators, claimed)
     text = f"""\
 Theorem {name} : gain_at_most {numbers(under)} {rows(numerators)} {number(claimed.numerator)} {claimed.denominator}.
 Proof.
-  apply (gain _ (impulse {numbers(under)} {chosen.term}) ({chosen.whole})).
+  apply (claimed_gain _ _ ({_decided(under, numerators, claimed)})).
   vm_cast_no_check (eq_refl true).
 Qed.
 """
     return Claim(name, f"{words} at most {float(claimed):.9g}", text)
 
 
-def _decided(under: Sequence[int], over: Sequence[Sequence[int]], claimed: Fraction) -> Witness:
+def _decided(under: Sequence[int], over: Sequence[Sequence[int]], claimed: Fraction) -> str:
     """Return a witness that proves a claim, or that with the highest precision."""
-    for extra in _MORE_BITS:
-        chosen = witness(under, extra=extra)
-        left = chosen.whole - chosen.rest
-        if left > 0 and sum(norm(chosen, one) for one in over) <= claimed * left:
+    exponent, tail = split(under)
+    for bits in _BITS:
+        made = impulse(exponent, tail, 1 << bits)
+        response = fmpz_poly(made.values)
+        total = sum(int(sum(map(abs, (fmpz_poly(list(one)) * response).coeffs()))) for one in over)
+        if total <= claimed * ((1 << bits + exponent) - made.rest):
             break
-    return chosen
+    return f"Witness {made.samples} {exponent} {numbers(tail)} 1 1 (2 ^ {bits})"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -21,22 +22,33 @@ class FlatGraph:
         Place of the first node of each stage, and behind them the number of all nodes.
     feeds : list of list of int
         For each stage but the first one, the nodes that its inputs take, in order.
+    ports : list of pairs of int
+        Ranges of the inputs of the first stage.
     """
 
     stages: Sequence[StageEntry]
     offsets: list[int]
     feeds: list[list[int]]
+    ports: list[tuple[int, int]]
 
     @property
     def size(self) -> int:
         """Number of nodes."""
         return self.offsets[-1]
 
-    @property
-    def ports(self) -> list[tuple[int, int]]:
-        """Ranges of the inputs of the first stage."""
-        first = self.stages[0]
-        return [(first.nodes[i].low, first.nodes[i].high) for i in inputs_of(first)]
+    def node(self, index: int) -> NodeEntry:
+        """Return a node by its place in the whole graph."""
+        stage, at = self._at(index)
+        return self.stages[stage].nodes[at]
+
+    def fed_by(self, index: int) -> int:
+        """Return the node that an input of a later stage takes."""
+        stage, at = self._at(index)
+        return self.feeds[stage][inputs_of(self.stages[stage]).index(at)]
+
+    def _at(self, index: int) -> tuple[int, int]:
+        stage = bisect_right(self.offsets, index) - 1
+        return stage, index - self.offsets[stage]
 
     def term(self) -> str:
         """Write it as a list of nodes."""
@@ -59,7 +71,7 @@ def flattened(certificate: Certificate) -> FlatGraph:
     Raises
     ------
     RejectedError
-        If a stage has not as many inputs as the one before it has outputs.
+        If a stage has not as many inputs as the one before it has outputs, or the first one as there are.
     """
     offsets: list[int] = [0]
     feeds: list[list[int]] = [[]]
@@ -71,7 +83,19 @@ def flattened(certificate: Certificate) -> FlatGraph:
             require(count == len(taken), f"{stage.name} must have {len(taken)} inputs, not {count}")
             feeds.append(taken)
         offsets.append(offsets[-1] + len(stage.nodes))
-    return FlatGraph(certificate.stages, offsets, feeds)
+    return FlatGraph(certificate.stages, offsets, feeds, _ports(certificate))
+
+
+def _ports(certificate: Certificate) -> list[tuple[int, int]]:
+    """Return the ranges of the inputs: of the certificate's own, or of what a decimator hands on."""
+    first = certificate.stages[0]
+    entries = [first.nodes[index] for index in inputs_of(first)]
+    if certificate.decimation is not None:
+        return [(entry.low, entry.high) for entry in entries]
+    require(
+        len(entries) == len(certificate.inputs), f"{first.name} must have {len(certificate.inputs)} inputs, not {len(entries)}"
+    )
+    return [(port.lowest, port.highest) for port in certificate.inputs]
 
 
 _NAMES = {

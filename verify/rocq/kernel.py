@@ -17,7 +17,20 @@ from sosmith.model.errors import ToolError
 from sosmith.verify.graph import RejectedError
 from sosmith.verify.rocq.claims import Claim
 
-THEORIES = ("Streams", "PeakGain", "Graph", "Ranges", "Linear", "Bound")
+THEORIES = (
+    "Definitions",
+    "Streams",
+    "Responses",
+    "Gains",
+    "Graph",
+    "Ranges",
+    "Linear",
+    "Cascade",
+    "Start",
+    "Calibration",
+    "Exact",
+    "Bound",
+)
 """The general theories, in the order in which they are compiled."""
 
 LIBRARY = "Sosmith"
@@ -72,13 +85,13 @@ def run_kernel(
     ----------
     folder : Path
     claims : sequence of Claim
-        The theorems in `name`.v, in order, each followed by the command that prints its axioms.
+        The theorems in `name`.v, in order, each followed by `mark`; behind all of them what prints their axioms.
     seconds : float
         Time that all of it may take, in s; 0 for any.
     progress : callable
         Called with the number of theorems accepted so far, and of all.
     theories : sequence of str
-        Those that `name`.v requires, in the order in which they are compiled.
+        Those that are compiled before it, in this order; none if all that it requires are.
 
     Raises
     ------
@@ -87,25 +100,43 @@ def run_kernel(
     ToolError
         If `coqc` is missing, or does not compile a theory.
     """
-    compiler = shutil.which("coqc")
-    if compiler is None:
-        raise ToolError(_MISSING)
+    compiler = _compiler()
     end = time.monotonic() + seconds if seconds else None
     shown = subprocess.run([compiler, "--print-version"], capture_output=True, text=True, check=False).stdout.split()
-    for theory in theories:
-        said, status = _compile(compiler, folder, f"{theory}.v", end)
-        if status:
-            raise ToolError(f"coqc must compile the theory {theory}.v, and says: {_brief(said)}")
+    compile_theories(folder, theories, end)
     said, status = _compile(compiler, folder, f"{name}.v", end, lambda text: progress(_count(text), len(claims)))
-    blocks = _blocks(said)
-    if status or len(blocks) != len(claims):
-        refused = claims[min(len(blocks), len(claims) - 1)]
+    accepted, printed = _count(said), _HEADS.split(said)[1:]
+    if status or accepted != len(claims) or not printed:
+        refused = claims[min(accepted, len(claims) - 1)]
         raise RejectedError(f"Rocq must accept {refused.name} ({refused.words}), and says: {_brief(said)}")
-    axioms = sorted({axiom for block in blocks for axiom in block})
+    axioms = sorted({axiom for block in printed for axiom in _AXIOM.findall(block)})
     others = [axiom for axiom in axioms if axiom not in STANDARD]
     if others:
         raise RejectedError(f"the theorems must rest on the axioms of the real numbers alone, not on {others[0]}")
     return Accepted(shown[0] if shown else "", tuple(axioms))
+
+
+def compile_theories(folder: Path, theories: Sequence[str] = THEORIES, end: float | None = None) -> None:
+    """Compile theories in a folder that holds them, until the monotonic time `end`.
+
+    Raises
+    ------
+    RejectedError
+        If it takes longer.
+    ToolError
+        If `coqc` is missing, or does not compile one.
+    """
+    for theory in theories:
+        said, status = _compile(_compiler(), folder, f"{theory}.v", end)
+        if status:
+            raise ToolError(f"coqc must compile the theory {theory}.v, and says: {_brief(said)}")
+
+
+def _compiler() -> str:
+    found = shutil.which("coqc")
+    if found is None:
+        raise ToolError(_MISSING)
+    return found
 
 
 def _compile(
@@ -140,20 +171,26 @@ def _compile(
     return text, process.returncode
 
 
-_CLOSED = "Closed under the global context"
+ACCEPTED = "accepted by the kernel:"
+"""What is printed behind each theorem, before its name."""
+
+_HEADS = re.compile("^(?:Axioms:|Closed under the global context)$", re.MULTILINE)
 _AXIOM = re.compile(r"^([A-Za-z_][\w.']*)(?: :|$)", re.MULTILINE)
 
 
+def mark(claim: Claim) -> str:
+    """Write what tells behind a theorem that it was accepted: nothing that fails is followed by anything."""
+    return f'Goal True. idtac "{ACCEPTED} {claim.name}". Abort.\n'
+
+
+def ending(claims: Sequence[Claim]) -> str:
+    """Write what prints the axioms that all theorems rest on."""
+    together = ", ".join(claim.name for claim in claims)
+    return f"(* The axioms that all of this rests on. *)\nDefinition all_claims := ({together}).\nPrint Assumptions all_claims.\n"
+
+
 def _count(said: str) -> int:
-    return len(re.findall(f"^(?:Axioms:|{_CLOSED})$", said, re.MULTILINE))
-
-
-def _blocks(said: str) -> list[list[str]]:
-    """Return the axioms of each theorem that was accepted."""
-    parts = re.split(f"^(Axioms:|{_CLOSED})$", said.partition("\nFile ")[0], flags=re.MULTILINE)
-    return [
-        _AXIOM.findall(text) if head == "Axioms:" else [] for head, text in zip(parts[1::2], parts[2::2], strict=True)
-    ]
+    return len(re.findall(f"^{ACCEPTED}", said, re.MULTILINE))
 
 
 def _brief(said: str) -> str:

@@ -3,22 +3,79 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from functools import reduce
+from dataclasses import dataclass
 
 from flint import fmpz_poly
 
-from sosmith.verify.graph import RejectedError
-from sosmith.verify.rocq.cascade import Cascade, SectionForms
+from sosmith.verify.rocq.cascade import Cascade, Row, Rows
 from sosmith.verify.rocq.claims import Claim
 from sosmith.verify.rocq.flat import FlatGraph
 from sosmith.verify.rocq.linear import Source
-from sosmith.verify.rocq.polynomials import number, numbers
-from sosmith.verify.rocq.witness import Witness, largest, witness
+from sosmith.verify.rocq.polynomials import number
+from sosmith.verify.rocq.start import StartNodes
 
-_MORE_BITS = (-48, 0, 64)
-"""Precision beside what mostly decides a claim of a gain, tried in this order."""
+_FEWER_BITS = (28, 20, 12, 4, -8, -40)
+"""By how much the response is less precise than the range of a node: first shorter ones, tried in this order."""
 
 Range = tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Windows:
+    """Ranges of the sources: of what enters the sections, two between which the true one lies.
+
+    Attributes
+    ----------
+    cascade : Cascade
+    entry : int or None
+        The place of the source that has two; None if there is none.
+    span : int
+    """
+
+    cascade: Cascade
+    entry: int | None
+    span: int
+
+    def of(self, place: int, *, second: bool) -> Range:
+        """Return the range of a source."""
+        if place == self.entry:
+            return (-self.span, 0) if second else (0, self.span)
+        return reach(self.cascade.graph, self.cascade.sources[place])
+
+    def most(self, row: Row) -> int:
+        """Largest sum that a row can make, at any time; as Rocq's `most_of`."""
+        return max(self._most(row, second=second) for second in ((False, True) if self.entry is not None else (False,)))
+
+    def _most(self, row: Row, *, second: bool) -> int:
+        total: list[int] = []
+        for place, over in row.items():
+            low, high = self.of(place, second=second)
+            for at, value in enumerate(over.coeffs()):
+                top = int(value) * (high if value > 0 else low)
+                if at < len(total):
+                    total[at] += top
+                else:
+                    total.append(top)
+        largest = summed = 0
+        for at, value in enumerate(total):
+            summed += value
+            largest = max(summed, largest) if at else summed
+        return largest
+
+
+def reach(graph: FlatGraph, source: Source) -> Range:
+    """Return the range of a source."""
+    kind, node, bits = source
+    most = (1 << bits) - 1
+    if kind == "node":
+        entry = graph.node(node)
+        return entry.low, entry.high
+    return (0, most) if kind == "floor" else (-most, most)
+
+
+def negative(row: Row) -> Row:
+    """Return a row with the other sign."""
+    return {place: -over for place, over in row.items()}
 
 
 def graph_definitions(graph: FlatGraph) -> str:
@@ -34,133 +91,160 @@ Proof. vm_cast_no_check (eq_refl true). Qed.
 """
 
 
-def range_claims(graph: FlatGraph, cascade: Cascade | None) -> Iterator[Claim]:
-    """Write the theorems: before the sections, those that need peak gains section by section, and of all nodes."""
+def tight_claim() -> Claim:
+    """Write that no range is wider than what its operands give."""
+    text = "Lemma ranges_are_tight_ : ranges_are_tight core ports = true.\nProof. vm_cast_no_check (eq_refl true). Qed.\n"
+    return Claim("ranges_are_tight_", "no range is wider than what its operands give", text)
+
+
+def range_claims(
+    graph: FlatGraph, cascade: Cascade | None, start: StartNodes | None
+) -> Iterator[Claim]:
+    """Write the theorems: before the sections, section by section, and of all nodes."""
     if cascade is None:
-        yield Claim("every_code_in_range", f"ranges of all {graph.size} nodes", _all(graph, [], []))
+        yield Claim("every_code_in_range", f"ranges of all {graph.size} nodes", _all(graph.size, None))
         return
-    yield Claim("ranges_before", f"ranges of the {cascade.first} nodes before the sections", _before(cascade))
-    names, targets = [], []
+    known = cascade.sections[0].known
+    if start is not None:
+        words = f"ranges of the {start.sample + 1} nodes up to the start"
+        yield Claim("ranges_before_start", words, _through("ranges_before_start", start.sample + 1))
+    text = _definitions(cascade, start) + (
+        _through("ranges_before", known) if start is None else _start(start, known)
+    ) + _window(cascade, start)
+    yield Claim("ranges_before", f"ranges of the {known} nodes before the sections", text)
+    windows = windows_of(cascade, start)
+    before = "ranges_before"
     for index, section in enumerate(cascade.sections):
-        if section.targets:
-            name = f"ranges_of_section_{index}"
-            names.append(name)
-            targets.append(section.targets)
-            words = f"section {index}: ranges of {len(section.targets)} nodes by their peak gains"
-            yield Claim(name, words, _section(name, cascade, section))
-    yield Claim("every_code_in_range", f"ranges of all {graph.size} nodes", _all(graph, names, targets))
+        name, last = f"ranges_of_section_{index}", index + 1 == len(cascade.sections)
+        through = graph.size if last else cascade.sections[index + 1].known
+        words = f"section {index}: ranges of {len(section.targets)} nodes by peak gains, of all nodes before {through}"
+        yield Claim(name, words, _section(name, before, windows, index, through))
+        before = name
+    yield Claim("every_code_in_range", f"ranges of all {graph.size} nodes", _all(graph.size, before))
 
 
-def _before(cascade: Cascade) -> str:
+def windows_of(cascade: Cascade, start: StartNodes | None) -> Windows:
+    """Return the ranges of the sources."""
+    if start is None:
+        return Windows(cascade, None, 0)
+    (entry,) = cascade.sections[0].wires
+    return Windows(cascade, entry, start.span)
+
+
+def _through(name: str, known: int) -> str:
     return f"""\
-Theorem ranges_before : forall x, inputs_within ports x ->
-  forall n i, (i < {cascade.first})%nat -> in_range core x i n.
+Theorem {name} : forall x, inputs_within ports x -> forall n i, (i < {known})%nat -> in_range core x i n.
 Proof.
-  intros x X. apply (ranges {cascade.first} core ports [] x core_is_ordered); try exact X; try (intros i n []).
+  intros x X. apply (ranges {known} core ports [] x core_is_ordered); try exact X; try (intros i n []).
   - vm_cast_no_check (eq_refl true).
   - vm_cast_no_check (eq_refl true).
 Qed.
+"""
+
+
+def _start(start: StartNodes, known: int) -> str:
+    return f"""\
+Theorem ranges_before : forall x, inputs_within ports x -> forall n i, (i < {known})%nat -> in_range core x i n.
+Proof.
+  intros x X. apply (ranges_further {start.sample + 1} {known} core ports [change begin; held begin] x core_is_ordered).
+  - vm_cast_no_check (eq_refl true).
+  - vm_cast_no_check (eq_refl true).
+  - exact X.
+  - exact (ranges_before_start x X).
+  - apply (start_ranges core x begin core_is_ordered start_fits_core). intros n.
+    exact (ranges_before_start x X n {start.sample} (le_n _)).
+Qed.
+"""
+
+
+def _definitions(cascade: Cascade, start: StartNodes | None) -> str:
+    first = cascade.sections[0].wires
+    wire = cascade.sources[first[0]][1]
+    begin = "" if start is None else f"""\
+Definition begin : start := {start.term}.
+Lemma start_fits_core : start_fits core begin = true.
+Proof. vm_cast_no_check (eq_refl true). Qed.
+Definition start_is : starts core begin = true := start_fits_starts _ _ start_fits_core.
+"""
+    window = "None" if start is None else f"windows_of core begin {wire}"
+    return f"""\
 {cascade.definitions()}\
 Lemma sections_are_closed : closed {cascade.last} core = true.
 Proof. vm_cast_no_check (eq_refl true). Qed.
-Lemma forms_fit : every (fits_node core sources factors forms) 0 (firstn {cascade.last} core) = true.
+Lemma forms_fit : every (fits_node core sources forms) 0 (firstn {cascade.last} core) = true.
 Proof. vm_cast_no_check (eq_refl true). Qed.
-Lemma sources_are_known : forallb (known_source core {cascade.first}) sources = true.
-Proof. vm_cast_no_check (eq_refl true). Qed.
+{begin}Definition window : windows := {window}.
 """
 
 
-def _section(name: str, cascade: Cascade, section: SectionForms) -> str:
-    chosen = _decided(cascade, section)
-    under = numbers(section.under)
+def _window(cascade: Cascade, start: StartNodes | None) -> str:
+    statement = "Lemma window_is : forall x, inputs_within ports x -> window_holds core x window.\n"
+    if start is None:
+        return f"{statement}Proof. intros x X. exact I. Qed.\n"
+    wire = cascade.sources[cascade.sections[0].wires[0]][1]
     return f"""\
-Theorem {name} : forall x, inputs_within ports x ->
-  forall t n, In t {numbers(section.targets)}%nat -> in_range core x t n.
+{statement}\
 Proof.
-  intros x X. apply (ranges_of_targets core x sources factors forms {cascade.first} {cascade.last}
-    {under} (impulse {under} {chosen.term}) ({chosen.whole}) _
-    core_is_ordered sections_are_closed forms_fit sources_are_known); [|exact (ranges_before x X)].
-  vm_cast_no_check (eq_refl true).
+  intros x X. apply (start_windows core x begin {wire} core_is_ordered start_is).
+  - intros n. exact (ranges_before_start x X n {start.sample} (le_n _)).
+  - intros n. apply (wire_code core x {wire} {start.change} n core_is_ordered). vm_cast_no_check (eq_refl true).
 Qed.
 """
 
 
-def _all(graph: FlatGraph, names: Sequence[str], targets: Sequence[Sequence[int]]) -> str:
-    given = " ++ ".join(f"{numbers(some)}%nat" for some in targets) or "[]"
-    cases = reduce(
-        lambda rest, name: (
-            f"(fun H => match in_app_or _ _ _ H with or_introl H => {name} x X i n H | or_intror H => {rest} H end)"
-        ),
-        reversed(names[:-1]),
-        f"(fun H => {names[-1]} x X i n H)" if names else "(fun H => match H with end)",
-    )
+def _section(name: str, before: str, windows: Windows, index: int, through: int) -> str:
+    cascade = windows.cascade
+    section = cascade.sections[index]
+    plans = "; ".join(f"({target}%nat, {_decided(windows, index, target).plan})" for target in section.targets)
     return f"""\
+Definition plans_{index} : list (nat * plan) := [{plans}].
+Theorem {name} : forall x, inputs_within ports x -> forall n i, (i < {through})%nat -> in_range core x i n.
+Proof.
+  intros x X. apply (ranges_further {section.known} {through} core ports (map fst plans_{index}) x core_is_ordered).
+  - vm_cast_no_check (eq_refl true).
+  - vm_cast_no_check (eq_refl true).
+  - exact X.
+  - exact ({before} x X).
+  - apply (targets_in_range core x sources forms {cascade.last} {section.known} window plans_{index} core_is_ordered
+      sections_are_closed forms_fit); [|exact (window_is x X)|exact ({before} x X)].
+    vm_cast_no_check (eq_refl true).
+Qed.
+"""
+
+
+def _all(size: int, before: str | None) -> str:
+    statement = f"""\
 Theorem every_code_in_range : forall x, inputs_within ports x ->
   forall n i, (i < length core)%nat -> in_range core x i n.
+"""
+    if before is not None:
+        return f"{statement}Proof. exact {before}. Qed.\n"
+    return f"""\
+{statement}\
 Proof.
-  intros x X. apply (ranges (length core) core ports ({given}) x core_is_ordered); try exact X.
+  intros x X. apply (ranges {size} core ports [] x core_is_ordered); try exact X; try (intros i n []).
   - vm_cast_no_check (eq_refl true).
   - vm_cast_no_check (eq_refl true).
-  - intros i n. exact {cases}.
 Qed.
 """
 
 
-def _decided(cascade: Cascade, section: SectionForms) -> Witness:
-    """Return a witness that proves the ranges of all targets, or that with the highest precision."""
-    for extra in _MORE_BITS:
-        chosen = witness(section.under, extra=extra)
-        if all(_fits(cascade, section, target, chosen) for target in section.targets):
+def _decided(windows: Windows, index: int, target: int) -> Rows:
+    """Return a plan that proves the range of a target, or that with the highest precision."""
+    entry = windows.cascade.graph.node(target)
+    size = max(abs(entry.low), abs(entry.high)).bit_length()
+    for fewer in _FEWER_BITS:
+        made = windows.cascade.rows(index, target, max(size + 16 - fewer, 8))
+        if _fits(windows, made, (entry.low, entry.high)):
             break
-    return chosen
+    return made
 
 
-def _fits(cascade: Cascade, section: SectionForms, target: int, chosen: Witness) -> bool:
-    forms = section.forms[target].items()
-    driven = [(reach(cascade.graph, source), [int(value) for value in over]) for source, over in forms]
-    return fits(driven, chosen, node_at(cascade.graph, target))
+def _fits(windows: Windows, made: Rows, within: Range) -> bool:
+    return (
+        windows.most(made.row) + made.rest <= made.whole * within[1]
+        and windows.most(negative(made.row)) + made.rest <= -made.whole * within[0]
+    )
 
 
-def fits(driven: Sequence[tuple[Range, Sequence[int]]], chosen: Witness, within: Range, times: int = 1) -> bool:
-    """Whether `range_fits` of the theories holds.
-
-    Parameters
-    ----------
-    driven : sequence of pairs
-        Range and numerator of each source.
-    chosen : Witness
-    within : tuple of int
-        Where the sum must stay, `times` which it is taken.
-    """
-    h = fmpz_poly(chosen.values)
-    left = chosen.whole - chosen.rest
-    if left <= 0:
-        return False
-    responses = [(ends, [int(value) for value in (h * fmpz_poly(list(over))).coeffs()]) for ends, over in driven]
-    up = largest(_summed([[max(g * low, g * high) for g in response] for (low, high), response in responses]))
-    down = largest(_summed([[max(-g * low, -g * high) for g in response] for (low, high), response in responses]))
-    more, whole = chosen.rest * max(up, down), chosen.whole * left
-    return times * (up * left + more) <= within[1] * whole and times * (down * left + more) <= -within[0] * whole
-
-
-def _summed(lists: Sequence[Sequence[int]]) -> list[int]:
-    size = max(map(len, lists), default=0)
-    return [sum(one[k] for one in lists if k < len(one)) for k in range(size)]
-
-
-def node_at(graph: FlatGraph, node: int) -> Range:
-    """Return the range of a node by its place in the whole graph."""
-    for stage, offset in zip(reversed(graph.stages), reversed(graph.offsets[:-1]), strict=True):
-        if node >= offset:
-            entry = stage.nodes[node - offset]
-            return entry.low, entry.high
-    raise RejectedError(f"the graph must have a node {node}")
-
-
-def reach(graph: FlatGraph, source: Source) -> Range:
-    """Return the range of a source."""
-    kind, node, bits = source
-    most = (1 << bits) - 1
-    if kind == "node":
-        return node_at(graph, node)
-    return (0, most) if kind == "floor" else (-most, most)
+__all__ = ["Range", "Sequence", "Windows", "fmpz_poly", "graph_definitions", "negative", "range_claims", "reach", "windows_of"]

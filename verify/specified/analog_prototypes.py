@@ -181,8 +181,8 @@ def _bessel(order: int, _pass: Fraction | None, _stop: Fraction | None) -> Analo
 
 def _roots(polynomial: fmpz_poly) -> list[acb]:
     """Roots of a polynomial without multiple ones; those that are real have no imaginary part."""
-    found: Any = polynomial.complex_roots()  # pairs of root and multiplicity, which FLINT's types do not say
-    return [root for root, _ in found]
+    pairs: Any = polynomial.complex_roots()  # pairs of root and multiplicity, which FLINT's types do not say
+    return [root for root, _ in pairs]
 
 
 def _half_power(polynomial: fmpz_poly) -> arb:

@@ -97,15 +97,15 @@ def check_fit(content: bytes, polynomial: Sequence[Sequence[Fraction]]) -> Refit
     RejectedError
         If the file cannot be read, determines no polynomial, or another one.
     """
-    found = fitted(content)
-    for i, (row, wanted) in enumerate(zip_longest(polynomial, found.polynomial, fillvalue=())):
+    refit = fitted(content)
+    for i, (row, wanted) in enumerate(zip_longest(polynomial, refit.polynomial, fillvalue=())):
         for j, (value, right) in enumerate(zip_longest(row, wanted)):
             require(
                 value == right,
                 f"coefficient [{i}][{j}] of the calibration must be {_said(right)}, as fitted to the measurements, "
                 f"not {_said(value)}",
             )
-    return found
+    return refit
 
 
 def _said(value: Fraction | None) -> str:

@@ -45,10 +45,10 @@ def exact_sections(stated: StatedFilter) -> tuple[SectionEntry, ...]:
     ((Fraction(1, 1),), (Fraction(1, 1), Fraction(1, 2)))
     """
     table = stated.table
-    made = _rounded_rows(table.rows) if table.rows else _derived(stated)
+    sections = _rounded_rows(table.rows) if table.rows else _derived(stated)
     if stated.correction:
-        made = [*made, ((1 + stated.correction, -stated.correction), _ONE)]
-    return tuple(SectionEntry(numerator=over, denominator=under) for over, under in made)
+        sections = [*sections, ((1 + stated.correction, -stated.correction), _ONE)]
+    return tuple(SectionEntry(numerator=over, denominator=under) for over, under in sections)
 
 
 _Section = tuple[tuple[Fraction, ...], tuple[Fraction, ...]]
@@ -73,12 +73,12 @@ def _derived(stated: StatedFilter) -> list[_Section]:
 
 
 def _rounded(stated: StatedFilter) -> list[_Section]:
-    found = stated.factors()
-    bits = _SPARE_BITS + sum(map(_spread, found.poles))
-    first = tuple(_nearest(value, bits) for value in found.first)
+    factored = stated.factors()
+    bits = _SPARE_BITS + sum(map(_spread, factored.poles))
+    first = tuple(_nearest(value, bits) for value in factored.first)
     over, under = (
         sorted(_shortened([1, *(_nearest(tap, bits) for tap in taps)]) for taps in factors)
-        for factors in (found.zeros, found.poles)
+        for factors in (factored.zeros, factored.poles)
     )
     return [(_shortened(first), _ONE), *zip_longest(over, under, fillvalue=_ONE)]
 

@@ -123,9 +123,9 @@ def read_filter_table(table: Mapping[str, object], sample_rate: Fraction) -> Fil
     )
 
 
-def _require(condition: bool, key: str, expected: str, found: object) -> None:
+def _require(condition: bool, key: str, expected: str, stated: object) -> None:
     if not condition:
-        raise SpecificationError(f"filter.{key} must be {expected}, not {found}")
+        raise SpecificationError(f"filter.{key} must be {expected}, not {stated}")
 
 
 def _require_only(table: Mapping[str, object], keys: Sequence[str], where: str) -> None:

@@ -28,7 +28,7 @@ def doubles_in(content: bytes, largest: int) -> dict[str, list[list[Fraction]]]:
         If it is damaged, or a variable has more than `largest` bytes.
     """
     require(content[124:128] == b"\x00\x01IM", "filter.sos_file must be a MAT file up to version 7, not another one")
-    found: dict[str, list[list[Fraction]]] = {}
+    matrices: dict[str, list[list[Fraction]]] = {}
     for part in _parts(content, 128):
         kind, data = part
         if kind == 15:
@@ -37,12 +37,12 @@ def doubles_in(content: bytes, largest: int) -> dict[str, list[list[Fraction]]]:
             raise ValueError(kind)
         (_, flags), (_, sizes), (_, name), *numbers = _parts(data, 0)
         plain = name.decode("ascii").lower()
-        require(plain not in found, f"filter.sos_file must have {plain} once, not twice")
+        require(plain not in matrices, f"filter.sos_file must have {plain} once, not twice")
         is_real = struct.unpack_from("<H", flags)[0] == _DOUBLES
         require(is_real or plain not in _WANTED, f"filter.sos_file must have real doubles in {plain}, not others")
         if plain in _WANTED:
-            found[plain] = _matrix(sizes, *numbers[0])
-    return found
+            matrices[plain] = _matrix(sizes, *numbers[0])
+    return matrices
 
 
 def _parts(data: bytes, at: int) -> Iterator[tuple[int, bytes]]:

@@ -49,10 +49,10 @@ def sections_in(path: Path) -> tuple[tuple[Fraction, ...], ...]:
     for k, factor in enumerate(scale):
         row = rows[min(k, len(rows) - 1)]
         row[:3] = [b * factor for b in row[:3]]
-    made = [[value / row[3] for value in row] for row in rows]
-    if not _stable(made):
-        made = [[*row[:4], -row[4], -row[5]] for row in made]
-    return tuple(map(tuple, made))
+    sections = [[value / row[3] for value in row] for row in rows]
+    if not _stable(sections):
+        sections = [[*row[:4], -row[4], -row[5]] for row in sections]
+    return tuple(map(tuple, sections))
 
 
 def taps_in(path: Path) -> tuple[Fraction, ...]:
@@ -93,9 +93,9 @@ def _content(suffix: str, content: bytes) -> tuple[_Rows, list[Fraction]]:
             warnings.simplefilter("ignore")
             return _rows(numpy.lib.format.read_array(BytesIO(content), allow_pickle=False)), []
     if suffix == ".mat":
-        held = doubles_in(content, _MAX_BYTES)
-        scale = held.get("g", held.get("scalevalues"))
-        return held["sos"], list(chain.from_iterable(scale or []))
+        matrices = doubles_in(content, _MAX_BYTES)
+        scale = matrices.get("g", matrices.get("scalevalues"))
+        return matrices["sos"], list(chain.from_iterable(scale or []))
     text = content.decode("utf-8-sig")
     lines = [re.split("[#%]", line)[0].strip(" \t,;") for line in text.splitlines()]
     cells = [re.split(r"[\s,;]+", line) for line in lines if line]

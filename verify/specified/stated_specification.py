@@ -102,9 +102,9 @@ def _checked(certificate: Certificate, tree: Mapping[str, Any], margin: Fraction
     if core == "filter" and calibration is not None:  # the filter alone takes what the calibration would give it
         inputs = [output.model_copy(update={"name": f"{output.name}_in"})]
     _equal("the number of inputs", len(certificate.inputs), len(inputs))
-    for found, stated in zip((*certificate.inputs, certificate.output), (*inputs, output), strict=True):
+    for proven, stated in zip((*certificate.inputs, certificate.output), (*inputs, output), strict=True):
         for key in PortEntry.model_fields:
-            _equal(f"{key} of {stated.name}", getattr(found, key), getattr(stated, key))
+            _equal(f"{key} of {stated.name}", getattr(proven, key), getattr(stated, key))
     allowed = tree["output"].get("max_error", "faithful")
     _equal("max_error", certificate.max_error, output.lsb if allowed == "faithful" else _number(allowed))
     fitted = False
@@ -161,18 +161,18 @@ def _filter_distance(
     return apart
 
 
-def _check_losses(found: Sequence[SectionEntry], table: FilterTable) -> None:
+def _check_losses(proven: Sequence[SectionEntry], table: FilterTable) -> None:
     """Check that a filter is an FIR filter that keeps to edges and losses."""
     require(
-        len(found) == 1 and len(found[0].denominator) == 1 and keeps_to_losses(found[0].numerator, table),
+        len(proven) == 1 and len(proven[0].denominator) == 1 and keeps_to_losses(proven[0].numerator, table),
         "the filter must keep to the edges and losses of the specification with symmetric taps",
     )
 
 
-def _check_digits(found: Sequence[SectionEntry], exact: Sequence[SectionEntry]) -> None:
+def _check_digits(proven: Sequence[SectionEntry], exact: Sequence[SectionEntry]) -> None:
     """Check that the exact filter has the very digits that follow from the words, so that it is no other one."""
-    require(len(found) == len(exact), f"the exact filter must have {len(exact)} sections, not {len(found)}")
-    for k, (section, wanted) in enumerate(zip(found, exact, strict=True)):
+    require(len(proven) == len(exact), f"the exact filter must have {len(exact)} sections, not {len(proven)}")
+    for k, (section, wanted) in enumerate(zip(proven, exact, strict=True)):
         for name in SectionEntry.model_fields:
             require(
                 getattr(section, name) == getattr(wanted, name),
@@ -180,8 +180,8 @@ def _check_digits(found: Sequence[SectionEntry], exact: Sequence[SectionEntry]) 
             )
 
 
-def _check_polynomial(found: Sequence[Sequence[Fraction]], stated: Sequence[Sequence[Any]]) -> None:
-    for i, (row, words) in enumerate(zip_longest(found, stated, fillvalue=())):
+def _check_polynomial(proven: Sequence[Sequence[Fraction]], stated: Sequence[Sequence[Any]]) -> None:
+    for i, (row, words) in enumerate(zip_longest(proven, stated, fillvalue=())):
         for j, (value, word) in enumerate(zip_longest(row, words, fillvalue=0)):
             _equal(f"coefficient [{i}][{j}] of the calibration", value, _number(word))
 
@@ -205,5 +205,5 @@ def _number(word: Any) -> Fraction:
     return Fraction(word)
 
 
-def _equal(what: str, found: object, stated: object) -> None:
-    require(found == stated, f"{what} must be {stated} as specified, not {found}")
+def _equal(what: str, proven: object, stated: object) -> None:
+    require(proven == stated, f"{what} must be {stated} as specified, not {proven}")

@@ -53,7 +53,7 @@ _SPLIT = ("left", "shifted", "moved", "operand", "data", "factor", "product")
 
 @dataclass(frozen=True)
 class UnitVerdict:
-    """What the check of a unit has found.
+    """The result of the check of a unit.
 
     Attributes
     ----------
@@ -116,7 +116,7 @@ def _existing(netlist: Netlist, channels: int) -> list[str]:
     """Return the nets that say whether the channel on offer exists."""
     if channels == 1:
         return []
-    dependence, found = Dependence(netlist, set()), []
+    dependence, nets = Dependence(netlist, set()), []
     for name in netlist.drivers:
         if netlist.widths[name] != 1 or dependence.of_net(name) != {DEST}:
             continue
@@ -129,8 +129,8 @@ def _existing(netlist: Netlist, channels: int) -> list[str]:
 
         value = Evaluation(netlist, forms, content).net(name)
         if same_word(forms, value, forms.negative(plus(dest, constant(channels), -1)), 1):
-            found.append(name)
-    return found
+            nets.append(name)
+    return nets
 
 
 class _Cases:

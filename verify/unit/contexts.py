@@ -67,7 +67,7 @@ class Contexts:
         self,
         forms: Forms,
         values: Values,
-        held: Mapping[str, Form],
+        contents: Mapping[str, Form],
         opened: str | None = None,
         fields: Sequence[tuple[int, int, Form]] = (),
         deep: bool = False,
@@ -81,7 +81,7 @@ class Contexts:
         widths = self._netlist.widths
 
         def content(name: str) -> Form:
-            return held[name] if name in held else forms.variable(name, 0, (1 << widths[name]) - 1)
+            return contents[name] if name in contents else forms.variable(name, 0, (1 << widths[name]) - 1)
 
         def part(name: str, low: int, width: int) -> Form | None:
             if name == DATA:
@@ -90,7 +90,7 @@ class Contexts:
                         return forms.floor(shifted(whole, offset - low))
                 bits = (forms.variable((DATA, low + k), 0, 1) for k in range(width))
                 return _sum((bit, k) for k, bit in enumerate(bits))
-            if name in held or not self._is_control(name):
+            if name in contents or not self._is_control(name):
                 return None
             value, mask = self._ternary.bits(name, low, width, values)
             if mask == (1 << width) - 1:
@@ -113,14 +113,14 @@ class Contexts:
         """
         if name in self._netlist.registers:
             return [Part(name, 0, self._netlist.widths[name])]
-        found = [
+        parts = [
             Part(driver.value.name, driver.low, driver.width)
             for driver in self._netlist.drivers.get(name, ())
             if isinstance(driver.value, Bits) and driver.value.name in self._netlist.fields
         ]
-        if not found or sum(part.width for part in found) != self._netlist.widths[name]:
+        if not parts or sum(part.width for part in parts) != self._netlist.widths[name]:
             raise RejectedError(f"the unit must have a register {name}")
-        return found
+        return parts
 
     def loads(self, name: str) -> list[Expression]:
         """Return all expressions that decide what a word is after a clock."""
@@ -184,13 +184,13 @@ def _sum(parts: Iterable[tuple[Form, int]]) -> Form:
 
 
 def _loads(statements: Sequence[Statement]) -> list[Expression]:
-    found: list[Expression] = []
+    values: list[Expression] = []
     for statement in statements:
         if isinstance(statement, Choice):
-            found += [statement.condition, *_loads(statement.yes), *_loads(statement.no)]
+            values += [statement.condition, *_loads(statement.yes), *_loads(statement.no)]
         else:
-            found.append(statement.value)
-    return found
+            values.append(statement.value)
+    return values
 
 
 def _bits(value: Expression) -> list[Bits]:

@@ -148,14 +148,14 @@ def read_ports(netlist: Netlist, memory: str) -> list[Read]:
     RejectedError
         If it is used otherwise.
     """
-    found: list[Read] = []
+    ports: list[Read] = []
     for register in netlist.registers.values():
         match register.statements:
             case (Load(Bits(_), Word(name, address)),) if name == memory:
-                found.append(Read(register.name, None, address))
+                ports.append(Read(register.name, None, address))
             case (Choice(enable, (Load(Bits(_), Word(name, address)),), ()),) if name == memory:
-                found.append(Read(register.name, enable, address))
-    return found
+                ports.append(Read(register.name, enable, address))
+    return ports
 
 
 class Control:
@@ -208,16 +208,16 @@ class Control:
 
     def _closure(self, values: Sequence[Expression], names: Sequence[str]) -> list[str]:
         """Return the registers that values and registers depend on, at whatever clock."""
-        found: set[str] = set()
+        registers: set[str] = set()
         waiting = [*self._dependence.of(values), *names]
         while waiting:
             name = waiting.pop()
             register = self._netlist.registers.get(name)
-            if name not in found and register is not None:
-                found.add(name)
+            if name not in registers and register is not None:
+                registers.add(name)
                 waiting += self._dependence.of_conditions(register.statements)
                 waiting += self._dependence.of_loads(register.statements)
-        return sorted(found)
+        return sorted(registers)
 
     def is_control(self, name: str) -> bool:
         """Whether a net is known in every state, unless it has bits that no state says."""
@@ -239,8 +239,8 @@ class Control:
         blank = dict.fromkeys((RESET, SOURCE, SINK), UNKNOWN) | dict.fromkeys(self._netlist.registers, UNKNOWN)
         blank |= dict.fromkeys(self.cuts, UNKNOWN) | {RESET: known(0, 1)}
         values = dict(blank)
-        held = {name: self.ternary.after(name, values) for name in names}
-        for name, (value, mask) in held.items():
+        contents = {name: self.ternary.after(name, values) for name in names}
+        for name, (value, mask) in contents.items():
             first = self._netlist.registers[name].first
             right = not mask or (first is not None and first & mask == value)
             require(right, f"{name} must be before the first clock what it is after a reset, not {first}")
@@ -249,22 +249,22 @@ class Control:
         clocks = 0
         while clocks < 2 * depth + 4:
             clocks += 1
-            values = {**blank, **held, RESET: known(1, 1)}
+            values = {**blank, **contents, RESET: known(1, 1)}
             for name in (READY, VALID, *self.valid):
                 require(self.ternary.net(name, values) == (0, 1), f"{name} must be 0 while words are cleared")
             clears = [self._clear(k, values, written[k]) for k in range(len(self.words))]
             if not any(clears):
                 break
             require(all(clears), "all parts of a word must be cleared at a clock")
-            held = {name: self.ternary.after(name, values) for name in names}
+            contents = {name: self.ternary.after(name, values) for name in names}
         for k, name in enumerate(self.words):
             low = int(name.removeprefix("words"))
             width = self._netlist.memories[name].width
             for address in range(depth):
                 wanted = int(address % self._program.words == self._program.words - 1) >> low & ((1 << width) - 1)
-                found = written[k].get(address)
-                require(found == wanted, f"{name}[{address}] must be {wanted} after a reset, not {found}")
-        return {name: held[name] for name in self.registers}, clocks - 1
+                content = written[k].get(address)
+                require(content == wanted, f"{name}[{address}] must be {wanted} after a reset, not {content}")
+        return {name: contents[name] for name in self.registers}, clocks - 1
 
     def _clear(self, number: int, values: Values, written: dict[int, int]) -> bool:
         """Note what is written to a memory at a clock; return whether anything is."""
@@ -296,8 +296,8 @@ class Control:
         RejectedError
             If a register is not what the machine says.
         """
-        held, clocks = self.cleared()
-        first = Node(tuple(held[name] for name in self.registers), Machine((None,) * self._stages.last))
+        contents, clocks = self.cleared()
+        first = Node(tuple(contents[name] for name in self.registers), Machine((None,) * self._stages.last))
         numbers = {first: 0}
         self.nodes.append(first)
         self._check(first)
@@ -314,26 +314,26 @@ class Control:
 
     def _check(self, node: Node) -> None:
         """Check the valid bits, and the instructions that are there."""
-        held = dict(zip(self.registers, node.registers, strict=True))
+        contents = dict(zip(self.registers, node.registers, strict=True))
         where = f"at instruction {node.machine.position}"
         for valid, code, number in zip(self.valid, self.codes, node.machine.pipe, strict=True):
             wanted = int(number is not None)
-            require(held[valid] == (wanted, 1), f"{valid} must be {wanted} {where}")
+            require(contents[valid] == (wanted, 1), f"{valid} must be {wanted} {where}")
             if number is not None:
-                right = held[code] == known(self._program.codes[number], self._program.code_bits)
+                right = contents[code] == known(self._program.codes[number], self._program.code_bits)
                 require(right, f"{code} must be {self._program.named(number)} {where}")
 
     def _clocks(self, node: Node) -> Iterator[tuple[Values, Event, Node]]:
         """Yield all that can happen in a state: the nets, what happens, and the state after it."""
         machine = node.machine
         bit = {0: (0, 1), 1: (1, 1), None: UNKNOWN}
-        held = dict(zip(self.registers, node.registers, strict=True))
+        contents = dict(zip(self.registers, node.registers, strict=True))
         for offered in (1,) if machine.begun or machine.refused else (0, 1):
             for exists in self._existing(machine, offered=bool(offered)):
                 for ready in (0, 1) if machine.waiting else (None,):
                     for done in (0, 1) if self._is_busy(machine) else (None,):
                         values: Values = dict.fromkeys(self._netlist.registers, UNKNOWN)
-                        values |= held
+                        values |= contents
                         values |= {RESET: (1, 1), SOURCE: bit[offered], SINK: bit[ready]}
                         values |= dict.fromkeys(self._decisions, bit[exists])
                         if DONE in self.cuts:
@@ -414,21 +414,21 @@ class Control:
             wanted = int(writer is not None)
             require(self._value(write.enable, values) == (wanted, 1), f"{name} must be written {wanted} times {where}")
             if writer is not None:
-                found = self._address(write.address, values)
-                require(found == writer.target, f"{name} must be written at {writer.target} {where}, not {found}")
+                address = self._address(write.address, values)
+                require(address == writer.target, f"{name} must be written at {writer.target} {where}, not {address}")
             enabled = (1, 1) if read.enable is None else self._value(read.enable, values)
             require(
                 enabled == (1, 1) if advance else enabled == (0, 1),
                 f"{name} must be read just when the pipeline moves, {where}",
             )
             if reader is not None:
-                found = self._address(read.address, values)
-                require(found == reader.address, f"{name} must be read at {reader.address} {where}, not {found}")
+                address = self._address(read.address, values)
+                require(address == reader.address, f"{name} must be read at {reader.address} {where}, not {address}")
 
     def _address(self, value: Expression, values: Values) -> int | None:
         """Return the address within the words of a channel; None if it is unknown."""
-        found, mask = self._value(value, values)
-        return found & self._mask if mask & self._mask == self._mask else None
+        address, mask = self._value(value, values)
+        return address & self._mask if mask & self._mask == self._mask else None
 
     def _check_sample(self, machine: Machine, event: Event, *, exists: bool, fetches: bool) -> None:
         """Check that each sample is begun, read, accepted and answered once, in this order."""
@@ -467,14 +467,14 @@ def is_inside(machine: Machine) -> bool:
 
 def _words(netlist: Netlist) -> list[str]:
     """Return the memories that words are cut into, the lowest bits first."""
-    found = [name for name in netlist.memories if name.startswith("words") and name[5:].isdecimal()]
-    require(bool(found), "the unit must have words")
-    return sorted(found, key=lambda name: int(name[5:]))
+    names = [name for name in netlist.memories if name.startswith("words") and name[5:].isdecimal()]
+    require(bool(names), "the unit must have words")
+    return sorted(names, key=lambda name: int(name[5:]))
 
 
-def _only(found: Sequence[Read], memory: str) -> Read:
-    require(len(found) == 1, f"{memory} must be read at one place, not at {len(found)}")
-    return found[0]
+def _only(ports: Sequence[Read], memory: str) -> Read:
+    require(len(ports) == 1, f"{memory} must be read at one place, not at {len(ports)}")
+    return ports[0]
 
 
 def _growing(nodes: Sequence[Node]) -> Iterator[tuple[int, Node]]:

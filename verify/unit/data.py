@@ -99,8 +99,8 @@ class Data:
         for name, port in zip(self._control.words, self._control.reads, strict=True):
             low, width = int(name[5:]), self._netlist.memories[name].width
             read = plus(read, forms.variable(port.register, 0, (1 << width) - 1), 1 << low)
-        found = self._contexts.logic(forms, {}, {}, opened=READ).net(READ)
-        require(same_word(forms, found, read, self._word), f"{READ} must be the word read, not another value")
+        word = self._contexts.logic(forms, {}, {}, opened=READ).net(READ)
+        require(same_word(forms, word, read, self._word), f"{READ} must be the word read, not another value")
 
     # Kinds.
 
@@ -157,8 +157,8 @@ class Data:
             forms = Forms()
             now = self._signed(forms, name, width)
             logic = self._contexts.logic(forms, values, {**self._held(forms), name: now})
-            found = self._contexts.after(name, logic, forms, now)
-            right = same_word(forms, found, wanted(forms, kind, now), width)
+            content = self._contexts.after(name, logic, forms, now)
+            right = same_word(forms, content, wanted(forms, kind, now), width)
             require(right, f"{name} must be {_shown(kind)} after a clock, not another value")
 
         return Subject(name, self._contexts.loads(name), kind, check)
@@ -195,16 +195,16 @@ class Data:
             return ("take", reading.constant % (1 << NUMBER_BITS)) if reading.opcode == "take" else "move"
 
         def product(forms: Forms, kind: Kind, now: Form) -> Form:
-            held = self._held(forms)
-            return forms.times(held["data"], held["factor"])
+            contents = self._held(forms)
+            return forms.times(contents["data"], contents["factor"])
 
         def check_added(kind: Kind, values: Values) -> None:
             for carried in (0, 1):
                 forms = Forms()
-                total, held = self._accumulator(forms, carried)
-                found = self._contexts.logic(forms, values, {**self._held(forms), **held}, opened=ADDED).net(ADDED)
+                total, contents = self._accumulator(forms, carried)
+                added = self._contexts.logic(forms, values, {**self._held(forms), **contents}, opened=ADDED).net(ADDED)
                 wanted = plus(total, self._signed(forms, "product", 2 * self._word))
-                self._require_added(forms, found, wanted)
+                self._require_added(forms, added, wanted)
 
         return [
             self._register("data", always, lambda forms, kind, now: self._signed(forms, READ, self._word)),
@@ -222,8 +222,8 @@ class Data:
         """Return what drives a cut net."""
         return [driver.value for driver in self._netlist.drivers[name]]
 
-    def _require_added(self, forms: Forms, found: Form, wanted: Form) -> None:
-        right = same_word(forms, found, wanted, self._width)
+    def _require_added(self, forms: Forms, added: Form, wanted: Form) -> None:
+        right = same_word(forms, added, wanted, self._width)
         require(right, f"{ADDED} must be the sum before and the product, not another value")
 
     def _moved(self, forms: Forms, kind: Kind) -> Form:
@@ -244,9 +244,9 @@ class Data:
         split = self._netlist.widths[_LOW]
         low = forms.variable(_LOW, 0, (1 << split) - 1)
         high = self._signed(forms, _HIGH, self._width - split)
-        held = {_LOW: low, _HIGH: high, _CARRIED: constant(carried)}
+        contents = {_LOW: low, _HIGH: high, _CARRIED: constant(carried)}
         above = forms.floor(shifted(high, -self._bits)) if carried else high
-        return plus(low, above, 1 << split), held
+        return plus(low, above, 1 << split), contents
 
     def _total(self) -> Subject:
         contexts, split = self._contexts, self._netlist.widths.get(_LOW, 0)
@@ -261,14 +261,14 @@ class Data:
             )
             high = forms.signed(high, self._width - split)
             later = forms.floor(shifted(high, -self._bits))
-            found = plus(
+            accumulated = plus(
                 forms.unsigned(low, split),
                 plus(high, forms.times(forms.unsigned(carried, 1), plus(later, high, -1))),
                 1 << split,
             )
             added = self._signed(forms, ADDED, self._width)
             wanted = {} if kind == "clear" else forms.floor(shifted(added, -self._bits)) if kind == "carry" else added
-            right = same_word(forms, found, wanted, self._width)
+            right = same_word(forms, accumulated, wanted, self._width)
             require(right, f"{_LOW} and {_HIGH} must {kind} what is added up, not another value")
 
         return Subject("total", [v for name in names for v in contexts.loads(name)], self._kind_of_total, check)
@@ -281,16 +281,18 @@ class Data:
 
         def check(kind: Kind, values: Values) -> None:
             forms = Forms()
-            held = self._held(forms)
+            contents = self._held(forms)
             early = kind == "move" or isinstance(kind, tuple)
             if not early:
-                held["moved"] = {}  # nothing is moved while something is stored
-            found = self._contexts.logic(forms, values, held).word(port.data)
-            moved = self._moved(forms, kind) if self._is_serial else held["moved"]
-            word = moved if early else held[ADDED]
+                contents["moved"] = {}  # nothing is moved while something is stored
+            word_written = self._contexts.logic(forms, values, contents).word(port.data)
+            moved = self._moved(forms, kind) if self._is_serial else contents["moved"]
+            word = moved if early else contents[ADDED]
             whole = forms.unsigned(word, self._bits if kind == "store" else self._word)
             wanted = forms.unsigned(forms.floor(shifted(whole, -low)), width)
-            require(same_word(forms, found, wanted, width), f"{name} must be given {_shown(kind)}, not another value")
+            require(
+                same_word(forms, word_written, wanted, width), f"{name} must be given {_shown(kind)}, not another value"
+            )
 
         if self._program.channels > 1:
             for address in (port.address, read.address):
@@ -301,8 +303,8 @@ class Data:
         """Check that the upper bits of an address are the channel, whatever the lower ones."""
         forms = Forms()
         bits = self._program.words.bit_length() - 1
-        found = self._contexts.logic(forms, {}, {}, deep=True).word(address)
-        upper = forms.floor(shifted(forms.unsigned(found, self._netlist.width(address)), -bits))
+        whole = self._contexts.logic(forms, {}, {}, deep=True).word(address)
+        upper = forms.floor(shifted(forms.unsigned(whole, self._netlist.width(address)), -bits))
         right = same_word(forms, upper, self._channel_form(forms), self._netlist.widths["channel"])
         require(right, f"{memory} must be used for the channel of the sample, not for another one")
 
@@ -317,8 +319,8 @@ class Data:
             forms = Forms()
             now, dest = self._channel_form(forms), forms.variable(DEST, 0, (1 << self._netlist.widths[DEST]) - 1)
             logic = self._contexts.logic(forms, values, {DEST: dest, "channel": now})
-            found = self._contexts.after("channel", logic, forms, now)
-            right = same_word(forms, found, dest if kind == "begin" else now, width)
+            content = self._contexts.after("channel", logic, forms, now)
+            right = same_word(forms, content, dest if kind == "begin" else now, width)
             require(right, f"channel must be that of the sample in work, not another one, to {kind}")
 
         def kind_of(machine: Machine, event: Event) -> Kind:
@@ -368,13 +370,13 @@ class Data:
         forms = Forms()
         half = forms.variable("half", low, high)
         left = plus(plus(half, half), constant(odd))
-        total, held = self._accumulator(forms, carried)
+        total, contents = self._accumulator(forms, carried)
         factor = self._signed(forms, "shifted", 2 * self._word)
-        held |= {"left": left, "shifted": factor}
-        logic = self._contexts.logic(forms, {}, held, opened=ADDED)
+        contents |= {"left": left, "shifted": factor}
+        logic = self._contexts.logic(forms, {}, contents, opened=ADDED)
         wanted = plus(total, factor, -odd if low == high == -1 else odd)
         self._require_added(forms, logic.net(ADDED), wanted)
-        done = self._contexts.logic(forms, {}, held, opened=DONE).net(DONE)
+        done = self._contexts.logic(forms, {}, contents, opened=DONE).net(DONE)
         last = low == high == 0 or (low == high == -1 and odd)
         require(
             forms.unsigned(done, 1) == constant(int(last)),

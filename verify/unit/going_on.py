@@ -97,8 +97,8 @@ def pace(control: Control, clearing: int, digits: Callable[[int], int]) -> Pace:
 def _most(places: Iterable[_Place], ways: Callable[[_Place], Iterable[tuple[int, _Place | None]]]) -> int:
     """Return the most clocks that it takes from any of the places to its end; 0 without places."""
     starts = list(places)
-    found = _longest(starts, ways)
-    return max((found[place] for place in starts), default=0)
+    longest = _longest(starts, ways)
+    return max((longest[place] for place in starts), default=0)
 
 
 def _longest(
@@ -111,16 +111,16 @@ def _longest(
     RejectedError
         If a place leads to itself, or to nowhere.
     """
-    found: dict[_Place, int] = {}
+    longest: dict[_Place, int] = {}
     opened: set[_Place] = set()
     waiting = list(places)
     while waiting:
         place = waiting[-1]
-        if place in found:
+        if place in longest:
             waiting.pop()
             continue
         steps = list(ways(place))
-        missing = [after for _, after in steps if after is not None and after not in found]
+        missing = [after for _, after in steps if after is not None and after not in longest]
         if missing:
             standing = opened.intersection(missing) or place in opened
             require(not standing, "a sample must be taken and its result leave within some number of clocks")
@@ -128,7 +128,7 @@ def _longest(
             waiting += missing
             continue
         require(bool(steps), "a sample must be taken and its result leave within some number of clocks")
-        found[place] = max(clocks + (0 if after is None else found[after]) for clocks, after in steps)
+        longest[place] = max(clocks + (0 if after is None else longest[after]) for clocks, after in steps)
         opened.discard(place)
         waiting.pop()
-    return found
+    return longest

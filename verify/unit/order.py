@@ -79,9 +79,11 @@ def _after(ages: _Ages, machine: Machine, event: Event, output: Output, judging:
     sample, judges = apart(machine), output.judges(machine, event)
     now = ages
     if judges == "outside":
-        turn = judging.index(machine.pipe[-1] or 0)
-        require((ages.outside, ages.judged) == (sample, turn), "outside must be judged after its sample has been taken")
-        now = now._replace(judged=turn + 1)
+        position = judging.index(machine.pipe[-1] or 0)
+        require(
+            (ages.outside, ages.judged) == (sample, position), "outside must be judged after its sample has been taken"
+        )
+        now = now._replace(judged=position + 1)
     elif judges is not None:
         now = now._replace(settling=sample)
     if event.ends and output.copies:

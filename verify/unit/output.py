@@ -123,8 +123,8 @@ class Output:
             now = forms.variable(name, 0, (1 << width) - 1)
             added = _signed(forms, ADDED, self._program.accumulator_bits)
             logic = self._contexts.logic(forms, values, {name: now, ADDED: added})
-            found = self._contexts.after(name, logic, forms, now)
-            right = same_word(forms, found, added if kind == "added" else now, width)
+            content = self._contexts.after(name, logic, forms, now)
+            right = same_word(forms, content, added if kind == "added" else now, width)
             require(right, f"{name} must be {kind} after a clock, not another value")
 
         def kind(machine: Machine, event: Event) -> Kind:
@@ -139,12 +139,12 @@ class Output:
         def check(kind: Kind, values: Values) -> None:
             forms = Forms()
             now = forms.variable(name, 0, (1 << width) - 1)
-            held = {name: now, ADDED: _signed(forms, ADDED, self._program.accumulator_bits)}
+            contents = {name: now, ADDED: _signed(forms, ADDED, self._program.accumulator_bits)}
             others = [other for other in (_RAIL, _OUTSIDE, _SETTLING) if other != name and self._has(other)]
-            held = {other: self._held(forms, other) for other in others} | held
-            logic = self._contexts.logic(forms, values, held, fields=self._fields(forms))
-            found = self._contexts.after(name, logic, forms, now)
-            right = same_word(forms, found, self._wanted(forms, name, kind, now, held[ADDED]), width)
+            contents = {other: self._held(forms, other) for other in others} | contents
+            logic = self._contexts.logic(forms, values, contents, fields=self._fields(forms))
+            content = self._contexts.after(name, logic, forms, now)
+            right = same_word(forms, content, self._wanted(forms, name, kind, now, contents[ADDED]), width)
             require(right, f"{name} must be {kind} after a clock, not another value")
 
         return Subject(name, self._contexts.loads(name), kind, check)
@@ -174,12 +174,12 @@ class Output:
 
     def _fields(self, forms: Forms) -> list[tuple[int, int, Form]]:
         """Return the fields of the input: where each begins, how wide it is, and its word."""
-        found: list[tuple[int, int, Form]] = []
+        fields: list[tuple[int, int, Form]] = []
         offset = 0
         for number, port in enumerate(self._certificate.inputs):
-            found.append((offset, port.bits, forms.unsigned(self._code(forms, number), port.bits)))
+            fields.append((offset, port.bits, forms.unsigned(self._code(forms, number), port.bits)))
             offset += -(-port.bits // 8) * 8
-        return found
+        return fields
 
     def _at_rail(self, forms: Forms) -> Form:
         """Whether an input has its lowest or its highest code."""
@@ -224,18 +224,18 @@ class Output:
         """Check that the channel of a result is that of the sample in work."""
         forms = Forms()
         channel = unknown(forms, Slice("channel", 0, self._netlist.widths["channel"]))
-        found = self._contexts.logic(forms, {}, {}, deep=True).net(OUTPUT_DEST)
-        right = same_word(forms, found, channel, self._netlist.widths[OUTPUT_DEST])
+        dest = self._contexts.logic(forms, {}, {}, deep=True).net(OUTPUT_DEST)
+        right = same_word(forms, dest, channel, self._netlist.widths[OUTPUT_DEST])
         require(right, f"{OUTPUT_DEST} must be the channel of the sample, not another value")
 
     def _parts(self, forms: Forms, result: Form) -> dict[str, Form]:
         """Return what the registers of a result hold: its digits."""
         digit = self._program.digit_bits
-        held: dict[str, Form] = {}
+        contents: dict[str, Form] = {}
         for k, width in enumerate(self._program.results):
             name = f"given{k}" if self._has(f"given{k}") else OUTPUT
-            held[name] = forms.unsigned(forms.floor(shifted(result, -digit * k)), width)
-        return held
+            contents[name] = forms.unsigned(forms.floor(shifted(result, -digit * k)), width)
+        return contents
 
     def _flags(self, forms: Forms) -> dict[str, Form]:
         """Return what the registers hold that the flags of a result are in."""
@@ -279,8 +279,8 @@ class Output:
             return constant(wear[0][0]), constant(wear[0][1])
         output, name = self._certificate.output, self._limit_register()
         word = forms.variable(name, 0, (1 << (2 * output.bits)) - 1)
-        found = [forms.floor(shifted(word, -output.bits * k)) for k in range(2)]
-        sides = [forms.signed(f, output.bits) if output.signed else forms.unsigned(f, output.bits) for f in found]
+        limits = [forms.floor(shifted(word, -output.bits * k)) for k in range(2)]
+        sides = [forms.signed(f, output.bits) if output.signed else forms.unsigned(f, output.bits) for f in limits]
         return sides[0], sides[1]
 
     def _limit_register(self) -> str:
@@ -299,10 +299,10 @@ class Output:
         ports = read_ports(self._netlist, memory.name)
         require(len(ports) == 1 and ports[0].enable is None, "wear_limits must be read at every clock")
         forms = Forms()
-        found = self._contexts.logic(forms, {}, {}, deep=True).word(ports[0].address)
+        address = self._contexts.logic(forms, {}, {}, deep=True).word(ports[0].address)
         width = self._netlist.widths["channel"]
         channel = unknown(forms, Slice("channel", 0, width))
-        right = self._netlist.width(ports[0].address) == width and same_word(forms, found, channel, width)
+        right = self._netlist.width(ports[0].address) == width and same_word(forms, address, channel, width)
         require(right, "wear_limits must be read for the channel of the sample")
 
 

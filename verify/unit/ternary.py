@@ -56,17 +56,17 @@ class Ternary:
         RejectedError
             If it depends on itself.
         """
-        found = values.get(name)
-        if found is None:
+        trits = values.get(name)
+        if trits is None:
             if name not in self._nets:
                 self._nets[name] = self._of_net(name)
             require(name not in self._open, f"{name} must not depend on itself within a clock")
             self._open.add(name)
             try:
-                found = values[name] = self._nets[name](values)
+                trits = values[name] = self._nets[name](values)
             finally:
                 self._open.discard(name)
-        return found
+        return trits
 
     def bits(self, name: str, low: int, width: int, values: Values) -> Trits:
         """Return bits of a net."""
@@ -153,8 +153,8 @@ class Ternary:
         def computed(values: Values) -> Trits:
             (x, p), (y, q) = a(values), b(values)
             if p == full and q == full:
-                found = x + y if symbol == "+" else x - y if symbol == "-" else x * y
-                return found & full, full
+                result = x + y if symbol == "+" else x - y if symbol == "-" else x * y
+                return result & full, full
             if symbol == "*" and ((p == full and not x) or (q == full and not y)):
                 return 0, full
             return UNKNOWN
@@ -208,13 +208,13 @@ class Ternary:
         words = self._words.get(value.name)
         if words is None:
             return lambda values: UNKNOWN
-        width, held = self._netlist.memories[value.name].width, words
+        width, contents = self._netlist.memories[value.name].width, words
         full = (1 << self._netlist.width(value.address)) - 1
         address = self._extended(value.address, 0)
 
         def read(values: Values) -> Trits:
             at, mask = address(values)
-            return known(held[at], width) if mask == full and at < len(held) else UNKNOWN
+            return known(contents[at], width) if mask == full and at < len(contents) else UNKNOWN
 
         return read
 
@@ -267,33 +267,33 @@ class Ternary:
         width = self._netlist.width(value)
         word, full = self._extended(value, width), (1 << width) - 1
 
-        def found(values: Values) -> Trits:
+        def any_bit(values: Values) -> Trits:
             own, mask = word(values)
             return (1, 1) if own else (0, int(mask == full))
 
-        return found
+        return any_bit
 
     def _all(self, value: Expression) -> _Function:
         """Whether all bits are set."""
         width = self._netlist.width(value)
         word, full = self._extended(value, width), (1 << width) - 1
 
-        def found(values: Values) -> Trits:
+        def all_bits(values: Values) -> Trits:
             own, mask = word(values)
             return (0, 1) if ~own & mask else (1, 1) if mask == full else (0, 0)
 
-        return found
+        return all_bits
 
     def _odd(self, value: Expression) -> _Function:
         """Whether an odd number of bits is set."""
         width = self._netlist.width(value)
         word, full = self._extended(value, width), (1 << width) - 1
 
-        def found(values: Values) -> Trits:
+        def parity(values: Values) -> Trits:
             own, mask = word(values)
             return (own.bit_count() & 1, 1) if mask == full else (0, 0)
 
-        return found
+        return parity
 
     def _compared(self, value: Operator) -> _Function:
         signed = all(is_signed(operand) for operand in value.operands)
@@ -311,7 +311,7 @@ class Ternary:
         if symbol not in {"==", "!=", "<", ">", "<=", ">="}:
             raise RejectedError(f"the operator {symbol} must be known")
 
-        def found(values: Values) -> Trits:
+        def compared(values: Values) -> Trits:
             (x, p), (y, q) = a(values), b(values)
             if symbol in {"==", "!="} and (x ^ y) & p & q:
                 return int(symbol == "!="), 1
@@ -322,17 +322,17 @@ class Ternary:
             right = {"==": x == y, "!=": x != y, "<": x < y, ">": x > y, "<=": x <= y, ">=": x >= y}[symbol]
             return int(right), 1
 
-        return found
+        return compared
 
 
 def _cut(word: _Function, low: int, width: int) -> _Function:
     cut = (1 << width) - 1
 
-    def found(values: Values) -> Trits:
+    def cut_bits(values: Values) -> Trits:
         own, mask = word(values)
         return own >> low & cut, mask >> low & cut
 
-    return found
+    return cut_bits
 
 
 def _extension(word: _Function, own: int, width: int, *, signed: bool) -> _Function:
@@ -351,7 +351,7 @@ def _extension(word: _Function, own: int, width: int, *, signed: bool) -> _Funct
 
 
 def _chosen(condition: _Function, yes: _Function, no: _Function) -> _Function:
-    def found(values: Values) -> Trits:
+    def chosen(values: Values) -> Trits:
         select, certain = condition(values)
         if certain:
             return yes(values) if select else no(values)
@@ -359,4 +359,4 @@ def _chosen(condition: _Function, yes: _Function, no: _Function) -> _Function:
         mask = p & q & ~(x ^ y)
         return x & mask, mask
 
-    return found
+    return chosen

@@ -37,13 +37,13 @@ _DECIBELS = 1e-6
 class Decibels(Figure):
     """A gain, whose double is in dB."""
 
-    def holds(self, found: object) -> bool:
+    def holds(self, stated: object) -> bool:
         """Whether a number in a manifest is this gain in dB."""
-        if not isinstance(found, float) or not -inf < found < inf:
+        if not isinstance(stated, float) or not -inf < stated < inf:
             return False
         least = self.value - _CLAIM_GRID
         lowest = 20 * log10(least) if least > 0 else -inf
-        return lowest - _DECIBELS <= found <= 20 * log10(self.value) + _DECIBELS
+        return lowest - _DECIBELS <= stated <= 20 * log10(self.value) + _DECIBELS
 
     def __str__(self) -> str:
         return f"{20 * log10(self.value):.9g}"
@@ -96,8 +96,8 @@ def _is_bit(node: NodeEntry) -> bool:
 
 def formats_of(certificate: Certificate) -> list[dict[str, Any]]:
     """Return the formats of all nodes that have a name, in the order of the datapath."""
-    ahead = None if certificate.decimation is None else certificate.decimation.calibration
-    parts = [] if ahead is None else [(ahead.stages, ahead.output)]
+    calibration = None if certificate.decimation is None else certificate.decimation.calibration
+    parts = [] if calibration is None else [(calibration.stages, calibration.output)]
     parts.append((certificate.stages, certificate.output))
     variables = {port.name for port in certificate.inputs}
     return [
@@ -194,7 +194,7 @@ def decimation_of(certificate: Certificate, item: ItemEntry, entry: DecimationEn
         codes = node.low, node.high
     low, high = codes or (port.lowest, port.highest)
     amplitude = port.lsb * (high - low) / 2
-    found: dict[str, Any] = {
+    facts: dict[str, Any] = {
         "factor": entry.factor,
         "stages": entry.stages,
         "width": entry.width,
@@ -206,7 +206,7 @@ def decimation_of(certificate: Certificate, item: ItemEntry, entry: DecimationEn
     }
     if entry.bands:
         largest = max(band.gain for band in entry.bands)
-        found |= {
+        facts |= {
             "aliasing": [
                 {
                     "low": Figure(k * lower - edge, above=_GRID, below=_GRID),
@@ -223,7 +223,7 @@ def decimation_of(certificate: Certificate, item: ItemEntry, entry: DecimationEn
             "largest_db": Decibels(largest),
             "largest": Figure(largest * amplitude, _GRID * amplitude),
         }
-    return found
+    return facts
 
 
 def _ahead(certificate: Certificate, item: ItemEntry, entry: DecimationEntry) -> dict[str, Any] | None:

@@ -65,7 +65,7 @@ class Stated:
 
 @dataclass(frozen=True)
 class Judgement:
-    """What was found of a certificate, and how much of what was asked for is proven."""
+    """The result of the checks of a certificate, and how much of what was asked for is proven."""
 
     verdict: Verdict
     agreement: Agreement | None
@@ -156,9 +156,9 @@ def _held_against(
     agreement = replace(agreement, not_compared=not_compared(tree))
     if item is not None:
         check_stated(certificate, item, tree, refit)
-    found = core_of(certificate)
+    proven_core = core_of(certificate)
     if stated.core is not None:
-        require(found == stated.core, f"the core must be {stated.core}, as asked for, not {found}")
+        require(proven_core == stated.core, f"the core must be {stated.core}, as asked for, not {proven_core}")
     return agreement, stated.core or whole_core(tree)
 
 

@@ -18,11 +18,11 @@ class Figure:
     below: Fraction = Fraction(0)
     above: Fraction = Fraction(0)
 
-    def holds(self, found: object) -> bool:
+    def holds(self, stated: object) -> bool:
         """Whether a number in a manifest is this one."""
-        if isinstance(found, bool) or not isinstance(found, int | float) or not -inf < found < inf:
+        if isinstance(stated, bool) or not isinstance(stated, int | float) or not -inf < stated < inf:
             return False
-        off, unsure = Fraction(found) - self.value, abs(self.value) * _ROUNDING
+        off, unsure = Fraction(stated) - self.value, abs(self.value) * _ROUNDING
         return -self.below - unsure <= off <= self.above + unsure
 
     def __str__(self) -> str:

@@ -84,10 +84,10 @@ def about_of(certificate: Certificate) -> AboutEntry:
     about = certificate.about
     if about is None:
         raise RejectedError("the certificate must say which specification and files it is about, and does not")
-    found = sha256(about.specification.encode())
+    digest = sha256(about.specification.encode())
     require(
-        found == about.sha256,
-        f"the SHA-256 of the specification in the certificate must be {found}, not {about.sha256}",
+        digest == about.sha256,
+        f"the SHA-256 of the specification in the certificate must be {digest}, not {about.sha256}",
     )
     return about
 
@@ -102,13 +102,13 @@ def check_files(about: AboutEntry, directory: Path) -> dict[str, bytes]:
     RejectedError
         If a file is missing or was changed.
     """
-    found = {}
+    contents = {}
     for entry in about.files:
         require(Path(entry.name).name == entry.name, f"{entry.name!r} must be the name of a file without a folder")
         path = directory / entry.name
-        found[entry.name] = content_of(path)
-        _compare(str(path), entry.sha256, found[entry.name])
-    return found
+        contents[entry.name] = content_of(path)
+        _compare(str(path), entry.sha256, contents[entry.name])
+    return contents
 
 
 def check_text(about: AboutEntry, text: str) -> None:
@@ -201,8 +201,8 @@ def content_of(path: Path) -> bytes:
 
 
 def _compare(what: str, stated: str, content: bytes) -> None:
-    found = sha256(content)
-    require(found == stated, f"{what} must have the SHA-256 {stated} of the certificate, not {found}")
+    digest = sha256(content)
+    require(digest == stated, f"{what} must have the SHA-256 {stated} of the certificate, not {digest}")
 
 
 def sha256(content: bytes) -> str:

@@ -136,8 +136,8 @@ def check_stated(certificate: Certificate, item: ItemEntry, tree: Mapping[str, A
     if architecture != "auto":
         stated["architecture"] = architecture
     for key, value in stated.items():
-        found = getattr(item, key)
-        require(found == value, f"{key} of the item must be {value}, as specified, not {found}")
+        own = getattr(item, key)
+        require(own == value, f"{key} of the item must be {value}, as specified, not {own}")
 
 
 def _wear_codes(table: Mapping[str, Any], output: PortEntry) -> tuple[tuple[int, int], ...]:
@@ -181,11 +181,11 @@ _COMPARED = {
 
 def not_compared(tree: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the keys of a specification that nothing is held against, but for those that leave the choice open."""
-    found = [key for key in tree if key not in _COMPARED[""]]
+    keys = [key for key in tree if key not in _COMPARED[""]]
     for name in ("calibration", "hardware"):
         table = table_of(tree, name)
-        found += [f"{name}.{key}" for key in table if key not in _COMPARED[name] and table[key] != "auto"]
-    return tuple(found)
+        keys += [f"{name}.{key}" for key in table if key not in _COMPARED[name] and table[key] != "auto"]
+    return tuple(keys)
 
 
 def whole_core(tree: Mapping[str, Any]) -> str:
@@ -222,5 +222,5 @@ def check_ports(top: Module, item: ItemEntry) -> None:
     for name in sorted({*wanted, *ports}):
         require(name in wanted, f"the port {name} must not be there")
         require(name in ports, f"the port {name} must be there")
-        said, found = (f"{direction} of {width} bits" for direction, width in (wanted[name], ports[name]))
-        require(said == found, f"the port {name} must be an {said}, not an {found}")
+        said, read = (f"{direction} of {width} bits" for direction, width in (wanted[name], ports[name]))
+        require(said == read, f"the port {name} must be an {said}, not an {read}")

@@ -54,39 +54,39 @@ class Manifest:
     tree: Mapping[str, Any]
     open: list[str] = field(default_factory=list)
 
-    def hold_clocks(self, found: HardwareVerdict | UnitVerdict | None) -> None:
+    def hold_clocks(self, verdict: HardwareVerdict | UnitVerdict | None) -> None:
         """Hold the clocks against those that are proven of a pipeline, which takes a sample at each, or of a unit."""
-        if found is None:
+        if verdict is None:
             self.open += _CLOCKS
             return
         clocks: tuple[int, int, int]
-        if isinstance(found, UnitVerdict):
-            clocks = found.progress.cleared + found.pace.opening, found.pace.latency, found.pace.interval
+        if isinstance(verdict, UnitVerdict):
+            clocks = verdict.progress.cleared + verdict.pace.opening, verdict.pace.latency, verdict.pace.interval
         else:
-            clocks = found.clearing, found.latency, 1
+            clocks = verdict.clearing, verdict.latency, 1
         for key, value in zip(_CLOCKS, clocks, strict=True):
             _compare(key, self.tree[key], value)
 
-    def hold_program(self, found: ProgramVerdict | None) -> None:
+    def hold_program(self, verdict: ProgramVerdict | None) -> None:
         """Hold the schedule against the program of the hardware and what its words hold; None if it was not read."""
         schedule = self.tree["schedule"]
         if schedule is None:
             return
-        if found is None:
+        if verdict is None:
             self.open.append("schedule")
             return
-        program = found.program
+        program = verdict.program
         wanted = {
             "digit_bits": program.digit_bits,
             "accumulator_bits": program.accumulator_bits,
-            "states": found.memory.kept,
+            "states": verdict.memory.kept,
             "words": program.words,
             "instructions": [[each.opcode, each.address, each.constant, each.target] for each in program.instructions],
         }
         places = schedule["places"]
         _compare("schedule", {**schedule, "places": []}, wanted | {"places": []})
         try:
-            found.memory.check(places)
+            verdict.memory.check(places)
         except _NO_MANIFEST:
             raise RejectedError("schedule.places in the manifest must be places of words") from None
 
@@ -215,58 +215,58 @@ def _check_realization(tree: Mapping[str, Any], sections: Sequence[Sequence[Recu
             is_realized_as(name, sections),
             f"realization in the manifest must be that of the sections in the certificate, not {_cut(name)}",
         )
-    ahead = isinstance(name, str) and name.startswith("look_ahead_")
-    if sections and asked is not None and not ahead:
+    looks_ahead = isinstance(name, str) and name.startswith("look_ahead_")
+    if sections and asked is not None and not looks_ahead:
         _compare("realization", name, asked)
-    _compare("pipeline", tree.get("pipeline"), "look-ahead" if ahead else None)
+    _compare("pipeline", tree.get("pipeline"), "look-ahead" if looks_ahead else None)
 
 
 def _check_decimation(manifest: Manifest, certificate: Certificate, item: ItemEntry) -> None:
-    found, entry = manifest.tree["decimation"], certificate.decimation
+    facts, entry = manifest.tree["decimation"], certificate.decimation
     require(
-        (found is not None) == (entry is not None),
+        (facts is not None) == (entry is not None),
         f"the manifest must{'' if entry else ' not'} have a decimation, as in the certificate",
     )
-    if found is None or entry is None:
+    if facts is None or entry is None:
         return
     about = certificate.about
     assert about is not None
     wanted = decimation_of(certificate, item, entry, Fraction(words_of(about.specification).get("sample_rate", 0)))
     for key, value in wanted.items():
         if key == "calibration":
-            _check_ahead(manifest, found.get("calibration"), value)
+            _check_ahead(manifest, facts.get("calibration"), value)
         else:
-            _compare(f"decimation.{key}", found[key], value)
-    manifest.open += [f"decimation.{key}" for key in found if key not in wanted]
+            _compare(f"decimation.{key}", facts[key], value)
+    manifest.open += [f"decimation.{key}" for key in facts if key not in wanted]
 
 
-def _check_ahead(manifest: Manifest, found: Mapping[str, Any] | None, wanted: Mapping[str, Any] | None) -> None:
-    if found is None or wanted is None:
-        _compare("decimation.calibration", found, wanted)
+def _check_ahead(manifest: Manifest, facts: Mapping[str, Any] | None, wanted: Mapping[str, Any] | None) -> None:
+    if facts is None or wanted is None:
+        _compare("decimation.calibration", facts, wanted)
         return
     for key, value in wanted.items():
-        _compare(f"decimation.calibration.{key}", found[key], value)
-    manifest.open += [f"decimation.calibration.{key}" for key in found if key not in wanted]
+        _compare(f"decimation.calibration.{key}", facts[key], value)
+    manifest.open += [f"decimation.calibration.{key}" for key in facts if key not in wanted]
 
 
 def _check_reload(manifest: Manifest, certificate: Certificate, item: ItemEntry) -> None:
-    found = manifest.tree["reload"]
+    facts = manifest.tree["reload"]
     require(
-        (found is not None) == item.reload,
+        (facts is not None) == item.reload,
         f"reload in the manifest must be {'there' if item.reload else 'None'}, as in the certificate, "
-        f"not {_cut(found)}",
+        f"not {_cut(facts)}",
     )
-    if found is not None:
-        _compare("reload.registers", found["registers"], [f"{certificate.name}_registers.h", f"{certificate.name}.rdl"])
-        manifest.open += [f"reload.{key}" for key in found if key != "registers"]
+    if facts is not None:
+        _compare("reload.registers", facts["registers"], [f"{certificate.name}_registers.h", f"{certificate.name}.rdl"])
+        manifest.open += [f"reload.{key}" for key in facts if key != "registers"]
 
 
 def _stream_of(stream: StreamEntry, ports: tuple[PortEntry, ...], item: ItemEntry, *, flags: bool) -> dict[str, Any]:
-    made: dict[str, Any] = {} if not stream.dest_width else {"tdest": {"width": stream.dest_width}}
-    made["width"] = stream.width
+    stream_facts: dict[str, Any] = {} if not stream.dest_width else {"tdest": {"width": stream.dest_width}}
+    stream_facts["width"] = stream.width
     if item.samples > 1:
-        made |= {"samples": item.samples, "sample_width": stream.width // item.samples}
-    made["fields"] = [
+        stream_facts |= {"samples": item.samples, "sample_width": stream.width // item.samples}
+    stream_facts["fields"] = [
         {
             "name": each.name,
             "offset": each.offset,
@@ -279,32 +279,34 @@ def _stream_of(stream: StreamEntry, ports: tuple[PortEntry, ...], item: ItemEntr
         for each, port in zip(stream.fields, ports, strict=True)
     ]
     if flags:
-        made["tuser"] = {"width": stream.user_width, "flags": dict(item.flags)}
-    return made
+        stream_facts["tuser"] = {"width": stream.user_width, "flags": dict(item.flags)}
+    return stream_facts
 
 
-def _compare(what: str, found: Any, wanted: Any) -> None:
+def _compare(what: str, stated: Any, wanted: Any) -> None:
     """Compare trees of JSON, whose numbers may be figures."""
-    if isinstance(wanted, dict) and isinstance(found, dict):
-        for key in (*wanted, *found):
+    if isinstance(wanted, dict) and isinstance(stated, dict):
+        for key in (*wanted, *stated):
             require(
-                key in found and key in wanted,
+                key in stated and key in wanted,
                 f"{what} in the manifest must {'have' if key in wanted else 'not have'} {_cut(key)}",
             )
-            _compare(f"{what}.{key}", found[key], wanted[key])
-    elif isinstance(wanted, list) and isinstance(found, list):
-        require(len(found) == len(wanted), f"{what} in the manifest must have {len(wanted)} entries, not {len(found)}")
-        for index, (one, other) in enumerate(zip(found, wanted, strict=True)):
+            _compare(f"{what}.{key}", stated[key], wanted[key])
+    elif isinstance(wanted, list) and isinstance(stated, list):
+        require(
+            len(stated) == len(wanted), f"{what} in the manifest must have {len(wanted)} entries, not {len(stated)}"
+        )
+        for index, (one, other) in enumerate(zip(stated, wanted, strict=True)):
             _compare(f"{what}[{index}]", one, other)
     else:
         right = wanted.holds if isinstance(wanted, Figure) else _same(wanted)
         require(
-            right(found), f"{what} in the manifest must be {_cut(wanted)}, as in the certificate, not {_cut(found)}"
+            right(stated), f"{what} in the manifest must be {_cut(wanted)}, as in the certificate, not {_cut(stated)}"
         )
 
 
 def _same(wanted: Any) -> Callable[[Any], bool]:
-    return lambda found: type(found) is type(wanted) and found == wanted
+    return lambda stated: type(stated) is type(wanted) and stated == wanted
 
 
 def _cut(value: object) -> str:

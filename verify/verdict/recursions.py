@@ -166,10 +166,10 @@ def is_realized_as(name: object, sections: Sequence[Sequence[Recursion]]) -> boo
 
 def _is(name: str, part: Recursion) -> bool:
     nodes = part.stage.nodes
-    found = _LOOK_AHEAD.fullmatch(name)
-    if found is not None:
+    match = _LOOK_AHEAD.fullmatch(name)
+    if match is not None:
         powers = {k for k, value in enumerate(part.transfer.denominator.coeffs()) if value}
-        return not part.is_direct and powers <= {0, int(found[1]), 2 * int(found[1])}
+        return not part.is_direct and powers <= {0, int(match[1]), 2 * int(match[1])}
     if name in _FEEDBACK and part.loop:
         most, weights = _FEEDBACK[name], part.error_feedback or (0, 0)
         return part.is_direct and all(abs(weight) <= limit for weight, limit in zip(weights, most, strict=True))

@@ -50,7 +50,7 @@ def limit_cycles_of(part: Recursion, output: PortEntry) -> dict[str, Any]:
 
 def _weights(matrix: Sequence[Sequence[Fraction]]) -> tuple[Fraction, ...] | None:
     """Return the first D that proves that all states of a loop die away; None if none does."""
-    return next((found for found in _candidates(matrix) if _falls(found, matrix)), None)
+    return next((weights for weights in _candidates(matrix) if _falls(weights, matrix)), None)
 
 
 def _candidates(matrix: Sequence[Sequence[Fraction]]) -> Iterator[tuple[Fraction, ...]]:

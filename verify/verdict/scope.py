@@ -39,7 +39,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Proofs:
-    """What was found of the hardware; each is None if it was not tried or is not there."""
+    """The results for the hardware; each is None if it was not tried or is not there."""
 
     program: ProgramVerdict | None = None
     hardware: HardwareVerdict | None = None
@@ -67,11 +67,11 @@ def scope_of(
     item : ItemEntry or None
         What it is about; None if it does not say.
     agreement : Agreement or None
-        What was found of the specification; None if none was given.
+        The agreement with the specification; None if none was given.
     core : str or None
         The core that was asked for with the specification; None without one.
     proofs : Proofs or None
-        What was found of the files; None if none were given.
+        The results for the files; None if none were given.
     """
     parts = {"arithmetic": Part(State.PROVEN, "the error bound and all ranges follow from the certificate's graphs")}
     parts |= _specified(certificate, item, agreement, core)
@@ -117,8 +117,8 @@ def _hardware(item: ItemEntry | None, proofs: Proofs | None, *, is_decimated: bo
     }
     parts["manifest"] = _manifest(item, proofs)
     kinds = [proofs.program, proofs.hardware, proofs.calibration]
-    programs = [found for found in kinds if isinstance(found, ProgramVerdict)]
-    pipelines = [found for found in kinds if isinstance(found, HardwareVerdict)]
+    programs = [verdict for verdict in kinds if isinstance(verdict, ProgramVerdict)]
+    pipelines = [verdict for verdict in kinds if isinstance(verdict, HardwareVerdict)]
     if not programs and not pipelines:
         why = _why_not(item)
         parts |= {name: Part(State.NOT_READ, why) for name in ("hardware", "program", "unit", "flags", "liveness")}
@@ -135,10 +135,10 @@ def _liveness(proofs: Proofs, *, is_decimated: bool) -> Part:
     """Whether a sample is always taken, and its result always leaves."""
     if is_decimated:
         return Part(State.NOT_READ, "when a decimator takes a sample and hands its result on is not proven")
-    found = proofs.hardware or proofs.unit
-    if found is None:
+    verdict = proofs.hardware or proofs.unit
+    if verdict is None:
         return Part(State.NOT_READ, "that a sample is ever taken and its result ever leaves, and when, is not proven")
-    return Part(State.PROVEN, str(found.progress))
+    return Part(State.PROVEN, str(verdict.progress))
 
 
 _REGISTERS = Part(State.PROVEN, "its registers hold the graph's nodes for all inputs, stalls and resets")
@@ -172,16 +172,16 @@ def _c_model(proofs: Proofs) -> Part:
 
 
 def _rtlil(proofs: Proofs) -> Part:
-    found = proofs.rtlil
-    if found is None:
+    verdict = proofs.rtlil
+    if verdict is None:
         return Part(State.NOT_READ, "its text is held by its SHA-256 alone")
-    if found.open:
-        more = f" and {len(found.open) - 3} more" if len(found.open) > 3 else ""
-        return Part(State.PARTIAL, f"not shown to be as in the SystemVerilog: {', '.join(found.open[:3])}{more}")
-    modules = f"{found.modules} module{'s' * (found.modules > 1)}"
+    if verdict.open:
+        more = f" and {len(verdict.open) - 3} more" if len(verdict.open) > 3 else ""
+        return Part(State.PARTIAL, f"not shown to be as in the SystemVerilog: {', '.join(verdict.open[:3])}{more}")
+    modules = f"{verdict.modules} module{'s' * (verdict.modules > 1)}"
     return Part(
         State.PROVEN,
-        f"the {found.register_bits} bits of registers, the memories and the outputs of its {modules} "
+        f"the {verdict.register_bits} bits of registers, the memories and the outputs of its {modules} "
         "do what they do in the SystemVerilog",
     )
 

@@ -68,12 +68,12 @@ def plain_names(text: str) -> str:
         name_once(word, f"{memory}_read")
     for escaped in dict.fromkeys(ESCAPED.findall(text)):
         name_once(escaped, naming.name(escaped))
-    text = _WORD.sub(lambda found: names.get(found[0], found[0]), text)
-    return ESCAPED.sub(lambda found: names[found[1]], text)
+    text = _WORD.sub(lambda match: names.get(match[0], match[0]), text)
+    return ESCAPED.sub(lambda match: names[match[1]], text)
 
 
 class _Naming:
-    """What is found of the nets of a module."""
+    """What is known of the nets of a module."""
 
     def __init__(self, text: str) -> None:
         self._roles = _roles(text)
@@ -114,10 +114,10 @@ class _Naming:
         """Return what a net is for, or computes of nets with names; None if that takes too many words."""
         if escaped not in self._known:
             self._known[escaped] = None  # of nets that depend on each other, bit by bit
-            found = self._roles.get(escaped)
-            if found is None and depth < _DEEPEST and escaped in self._values:
-                found = self._computed(self._values[escaped], depth + 1)
-            self._known[escaped] = found if found and len(found) <= _LONGEST and not found[0].isdigit() else None
+            name = self._roles.get(escaped)
+            if name is None and depth < _DEEPEST and escaped in self._values:
+                name = self._computed(self._values[escaped], depth + 1)
+            self._known[escaped] = name if name and len(name) <= _LONGEST and not name[0].isdigit() else None
         return self._known[escaped]
 
     def _computed(self, value: str, depth: int) -> str | None:
@@ -170,19 +170,19 @@ def _is_single(word: str) -> bool:
 
 def _made_up(target: str) -> str | None:
     """Return the made-up name that a whole net has; None if it is none, or has another one."""
-    found = ESCAPED.fullmatch(target if target.endswith(" ") else f"{target} ")
-    return found[1] if found and _MADE_UP.fullmatch(found[1]) else None
+    match = ESCAPED.fullmatch(target if target.endswith(" ") else f"{target} ")
+    return match[1] if match and _MADE_UP.fullmatch(match[1]) else None
 
 
 def _roles(text: str) -> dict[str, str]:
     """Return what nets with made-up names are for: what loads registers, what they load, and what is a part of what."""
-    found: dict[str, str] = {}
+    roles: dict[str, str] = {}
 
     def note(net: str, holder: str, role: str) -> None:
         made_up, other = _made_up(net), _made_up(holder)
-        named = _plain(holder) if other is None else found.get(other)
+        named = _plain(holder) if other is None else roles.get(other)
         if made_up is not None and named is not None:
-            found.setdefault(made_up, f"{named}_{role}")
+            roles.setdefault(made_up, f"{named}_{role}")
 
     for target, value in _ASSIGN.findall(text):
         part = _PART.fullmatch(target.strip("{} ").split(", ")[-1])
@@ -198,14 +198,14 @@ def _roles(text: str) -> dict[str, str]:
     for port in _PORT.finditer(text):
         made_up = _made_up(port["net"])
         if made_up is not None:
-            found.setdefault(made_up, port["port"])
+            roles.setdefault(made_up, port["port"])
     for load in _LOAD.finditer(text):
-        held = load["value"]
-        role = "load" if not _NUMBER.fullmatch(held) else "set" if re.search(r"'[hdb].*[1-9a-f]", held) else "reset"
+        loaded = load["value"]
+        role = "load" if not _NUMBER.fullmatch(loaded) else "set" if re.search(r"'[hdb].*[1-9a-f]", loaded) else "reset"
         note(load["condition"], load["register"], role)
     for load in _VALUE.finditer(text):
         note(load["value"], load["register"], "next")
-    return found
+    return roles
 
 
 def _plain(name: str) -> str:

@@ -57,9 +57,9 @@ def _with_first_names(module: str) -> str:
     widths = {wire["name"]: int(wire["width"]) for wire in _WIRE.finditer(module)}
     unkept = {wire["name"] for wire in _UNKEPT.finditer(module)}
     seconds: dict[str, list[str]] = {}
-    for found in _SECOND.finditer(module):
-        name, net = found["name"], found["net"]
-        if name in unkept and widths[name] == widths[net] == int(found["high"]) + 1:
+    for match in _SECOND.finditer(module):
+        name, net = match["name"], match["net"]
+        if name in unkept and widths[name] == widths[net] == int(match["high"]) + 1:
             seconds.setdefault(net, []).append(name)
     better = {}
     for net, names in seconds.items():
@@ -68,13 +68,13 @@ def _with_first_names(module: str) -> str:
             better[net] = others[0]
     left = {name for names in seconds.values() for name in names}
     for lines in (_UNKEPT, _SECOND):
-        module = lines.sub(lambda found: "" if found["name"] in left else found[0], module)
-    return re.sub(r"(?<=\\)\S+", lambda found: better.get(found[0], found[0]), module) if better else module
+        module = lines.sub(lambda match: "" if match["name"] in left else match[0], module)
+    return re.sub(r"(?<=\\)\S+", lambda match: better.get(match[0], match[0]), module) if better else module
 
 
 def with_kept_names(text: str) -> str:
     """Let synthesis keep the wires in an RTLIL text that have names: those that are no ports and no registers."""
-    return _PLAIN.sub(lambda found: found[0] if found["said"] else f"  attribute \\keep 1\n{found['wire']}", text)
+    return _PLAIN.sub(lambda match: match[0] if match["said"] else f"  attribute \\keep 1\n{match['wire']}", text)
 
 
 def with_named_ports(text: str) -> str:
@@ -130,7 +130,7 @@ def _named(ports: Iterator[re.Match[str]], widths: dict[str, int], taken: set[st
 
 def _passed_on(module: str, taken: set[str]) -> dict[str, str]:
     """Return names for ports that are those of modules inside, which no net with a name lies between."""
-    inside = {found["wire"]: found["net"] for found in _INSIDE.finditer(module)}
+    inside = {match["wire"]: match["net"] for match in _INSIDE.finditer(module)}
     names: dict[str, str] = {}
     for port in _OUT.finditer(module):
         name = inside.get(port["wire"], "$")
@@ -140,5 +140,5 @@ def _passed_on(module: str, taken: set[str]) -> dict[str, str]:
     return names
 
 
-def _renamed(names: dict[str, str], found: re.Match[str]) -> str:
-    return names.get(found[0], found[0])
+def _renamed(names: dict[str, str], match: re.Match[str]) -> str:
+    return names.get(match[0], match[0])

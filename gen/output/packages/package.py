@@ -37,7 +37,7 @@ def package(
     design : CoreDesign
         The core.
     directory : Path
-        Folder of the package, made if missing.
+        Folder of the package, created if missing.
     progress : callable
         Called with the name of each step.
     vlnv : Vlnv or None

@@ -70,12 +70,12 @@ def _diagram(facts: PackageFacts) -> dict[str, Any]:
         ends = [f"{lane} to {lane + lanes - 1}" for lane in (0, lanes)]
         inputs, outputs = ([f"{what} {numbers}" for numbers in ends] for what in ("samples", "results"))
         text = f"{lanes} results {latency} clocks after their samples, a beat of {lanes} samples {rate}"
-    found = facts.core.decimation
-    if found is not None:
-        waves, inputs = _HELD if found.held else _DECIMATED, ["sample 0", f"sample {found.factor}"]
-        text = f"a result at most {latency} clocks after its sample, which is one of {found.factor}"
-        text += f"; each result leaves {found.factor} times" * found.held
-        outputs = [f"{result}, {found.factor} times" for result in outputs] if found.held else outputs
+    decimation = facts.core.decimation
+    if decimation is not None:
+        waves, inputs = _HELD if decimation.held else _DECIMATED, ["sample 0", f"sample {decimation.factor}"]
+        text = f"a result at most {latency} clocks after its sample, which is one of {decimation.factor}"
+        text += f"; each result leaves {decimation.factor} times" * decimation.held
+        outputs = [f"{result}, {decimation.factor} times" for result in outputs] if decimation.held else outputs
     labels = {"s_axis_tdata": inputs, "m_axis_tdata": outputs}
     return {
         "signal": [

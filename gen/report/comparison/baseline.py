@@ -116,17 +116,17 @@ class Judgement:
     @property
     def reasons(self) -> list[str]:
         """Why the candidate did not pass, one sentence each."""
-        found = list(self.shortfalls)
+        sentences = list(self.shortfalls)
         for one in self.judged:
             if one.verdict == "worse":
                 change = f" ({one.change})" if one.change else ""
-                found.append(
+                sentences.append(
                     f"{one.title}: {one.cells[1]} instead of {one.cells[0]}{change}, {one.tolerance.text()} allowed."
                 )
         for reason in dict.fromkeys(one.reason for one in self.judged if one.reason):
             titles = ", ".join(one.title for one in self.judged if one.reason == reason)
-            found.append(f"Not comparable: {titles}. {reason}")
-        return found
+            sentences.append(f"Not comparable: {titles}. {reason}")
+        return sentences
 
 
 def read_tolerances(text: str) -> dict[str, Tolerance]:
@@ -137,14 +137,14 @@ def read_tolerances(text: str) -> dict[str, Tolerance]:
     SpecificationError
         If a name is unknown or comes twice, or a number is missing, negative or not finite.
     """
-    found: dict[str, Tolerance] = {}
+    tolerances: dict[str, Tolerance] = {}
     for part in text.split(","):
         name, _, amount = (piece.strip() for piece in part.partition("="))
         if name not in FIGURES:
             raise SpecificationError(
                 f"a tolerance must be of {', '.join(FIGURES)}, not of {name or 'nothing'}{did_you_mean(name, FIGURES)}"
             )
-        if name in found:
+        if name in tolerances:
             raise SpecificationError(f"a tolerance must be given once, not twice as for {name}")
         if not re.fullmatch(r"(\d+\.?\d*|\.\d+)(e[+-]?\d+)?%?", amount, re.IGNORECASE):
             raise SpecificationError(f"a tolerance must be a number such as 5% or 0, not {name}={amount}")
@@ -152,8 +152,8 @@ def read_tolerances(text: str) -> dict[str, Tolerance]:
         number = float(amount.removesuffix("%"))
         if not math.isfinite(number):
             raise SpecificationError(f"a tolerance must be a number such as 5% or 0, not {name}={amount}")
-        found[name] = Tolerance(number / 100 if relative else number, relative)
-    return found
+        tolerances[name] = Tolerance(number / 100 if relative else number, relative)
+    return tolerances
 
 
 def judge(
@@ -185,9 +185,11 @@ def judge(
 def _shortfalls(candidate: Report) -> tuple[str, ...]:
     if candidate["passed"] and candidate["bit_exact"]:
         return ()
-    found = fact(candidate, "shortfalls")
-    told = isinstance(found, list) and found and all(isinstance(each, str) and each.isprintable() for each in found)
-    return tuple(found) if told else ("It falls short of its own specification.",)
+    stated = fact(candidate, "shortfalls")
+    readable = (
+        isinstance(stated, list) and stated and all(isinstance(each, str) and each.isprintable() for each in stated)
+    )
+    return tuple(stated) if readable else ("It falls short of its own specification.",)
 
 
 def _judged(baseline: Report, candidate: Report, name: str, allowed: Tolerance) -> Judged:

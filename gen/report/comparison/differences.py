@@ -75,8 +75,8 @@ def alike(reports: Sequence[Report]) -> list[tuple[str, str]]:
         "simulator": "simulator",
         "sosmith": "sosmith_version",
     }
-    found = {title: {_text(fact(report, key)) for report in reports} for title, key in titles.items()}
-    return [(title, next(iter(texts))) for title, texts in found.items() if len(texts) == 1 and texts != {UNKNOWN}]
+    values = {title: {_text(fact(report, key)) for report in reports} for title, key in titles.items()}
+    return [(title, next(iter(texts))) for title, texts in values.items() if len(texts) == 1 and texts != {UNKNOWN}]
 
 
 def _specification(reports: Sequence[Report]) -> list[Difference]:
@@ -93,14 +93,14 @@ def _specification(reports: Sequence[Report]) -> list[Difference]:
 
 def flat_keys(tree: Mapping[str, Any], depth: int = _DEPTH) -> dict[str, str]:
     """Keys with dots, and their values as text."""
-    found: dict[str, str] = {}
+    flat: dict[str, str] = {}
     for name, value in tree.items():
         key = json.dumps(name)[1:-1]
         if isinstance(value, Mapping) and depth > 1:
-            found |= {f"{key}.{inner}": text for inner, text in flat_keys(value, depth - 1).items()}
+            flat |= {f"{key}.{inner}": text for inner, text in flat_keys(value, depth - 1).items()}
         else:
-            found[key] = _text(value)
-    return found
+            flat[key] = _text(value)
+    return flat
 
 
 def _facts(reports: Sequence[Report], group: str, titles: Mapping[str, str]) -> list[Difference]:

@@ -66,7 +66,7 @@ def _table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
 
 def _escaped(text: str) -> str:
     """Text that GitHub shows as it is."""
-    return re.sub(r"([\\`*_{}\[\]()#+!|~<>&@-])", lambda found: _entity(found[0]), text)
+    return re.sub(r"([\\`*_{}\[\]()#+!|~<>&@-])", lambda match: _entity(match[0]), text)
 
 
 def _entity(sign: str) -> str:

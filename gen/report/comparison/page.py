@@ -36,11 +36,11 @@ class Group(NamedTuple):
 def groups(reports: Sequence[Report]) -> list[Group]:
     """Rows of a comparison by group, without the names and without empty groups."""
     rows, reasons = compare(reports), vars(fairness(reports))
-    found = [
+    all_groups = [
         Group(title, [row for row in rows if row.group == key and row.key != "name"], reasons.get(key, ""))
         for key, title in TITLES.items()
     ]
-    return [group for group in found if group.rows]
+    return [group for group in all_groups if group.rows]
 
 
 def comparison_page(reports: Sequence[Report], judgements: Sequence[Judgement] = ()) -> str:

@@ -115,13 +115,13 @@ def _refuse_constant(name: str) -> float:
 def _problem(content: Any) -> str:
     """Say, to follow "JSON", what keeps `content` from being a report; empty if nothing does."""
     for keys, types in _REQUIRED.items():
-        found = _wrong(content, keys, types, required=True)
-        if found:
-            return found
+        problem = _wrong(content, keys, types, required=True)
+        if problem:
+            return problem
     for keys, types in _KNOWN.items():
-        found = _wrong(content, keys, types, required=False)
-        if found:
-            return found
+        problem = _wrong(content, keys, types, required=False)
+        if problem:
+            return problem
     for name, version in (fact(content, "tools") or {}).items():
         if not isinstance(version, str) or not (name + version).isprintable():
             return f"with {shortened(version)} as tools.{shortened(name)}"

@@ -27,7 +27,7 @@ def comparison_json(reports: Sequence[Report], judgements: Sequence[Judgement] =
     """
     names = column_names(reports, baseline=bool(judgements))
     choice = choose(reports, names)
-    made: dict[str, Any] = {
+    tree: dict[str, Any] = {
         "names": names,
         "differences": [
             {"group": one.group, "title": one.title, "cells": list(one.cells)} for one in differences(reports)
@@ -46,12 +46,12 @@ def comparison_json(reports: Sequence[Report], judgements: Sequence[Judgement] =
         "choice": {"taken": choice.taken, "reason": choice.reason, "beaten": list(choice.beaten)},
     }
     if judgements:
-        made["baseline"] = {
+        tree["baseline"] = {
             "name": names[0],
             "passed": all(one.passed for one in judgements),
             "candidates": [_candidate(one) for one in judgements],
         }
-    return made
+    return tree
 
 
 def _candidate(judgement: Judgement) -> dict[str, Any]:

@@ -46,7 +46,7 @@ def read_array_file(path: Path) -> Content:
     Raises
     ------
     SpecificationError
-        If the file cannot be read, is too large, or holds no filter that can be told.
+        If the file cannot be read, is too large, or holds no filter that can be recognized.
     """
     suffix = path.suffix.lower()
     if suffix == ".json":
@@ -58,8 +58,8 @@ def read_array_file(path: Path) -> Content:
             return _matlab(path)
         return _numpy(path, suffix)
     except OSError as error:
-        found = (error.strerror or str(error)).lower()
-        raise SpecificationError(f"{path}: the filter must be a readable file, not: {found}") from None
+        reason = (error.strerror or str(error)).lower()
+        raise SpecificationError(f"{path}: the filter must be a readable file, not: {reason}") from None
 
 
 def _numpy(path: Path, suffix: str) -> Content:
@@ -116,34 +116,34 @@ def _matlab(path: Path) -> Content:
     with opened(path) as file:
         content = file.read(MAX_BYTES)
     try:
-        held = matrices(content, MAX_BYTES)
+        variables = matrices(content, MAX_BYTES)
     except NotImplementedError:
         raise SpecificationError(
             f"{path}: the filter must be a MAT file up to version 7, not 7.3: save with -v7"
         ) from None
     except (ValueError, KeyError, IndexError, StopIteration, struct.error, zlib.error):
         raise SpecificationError(f"{path}: the filter must be a MAT file, not a damaged one or another kind") from None
-    names = {name.lower(): name for name in held}
+    names = {name.lower(): name for name in variables}
     if "sos" in names:
-        matrix = _matrix(path, held[names["sos"]])
+        matrix = _matrix(path, variables[names["sos"]])
         scale = next((names[name] for name in ("g", "scalevalues") if name in names), None)
-        gains = () if scale is None else tuple(value for row in _matrix(path, held[scale]) for value in row)
+        gains = () if scale is None else tuple(value for row in _matrix(path, variables[scale]) for value in row)
         if any(len(row) != 6 for row in matrix):
             raise SpecificationError(f"{path}: {names['sos']} must have 6 columns, not {len(matrix[0])}")
         stated = f"MATLAB's {names['sos']}" + ("" if scale is None else f" and {scale}")
         return StatedSections(format=stated, rows=tuple(matrix), gains=gains)
     if {"z", "p", "k"} <= names.keys():
-        return _zeros_poles_gain(path, *(held[names[name]] for name in ("z", "p", "k")))
+        return _zeros_poles_gain(path, *(variables[names[name]] for name in ("z", "p", "k")))
     if {"b", "a"} <= names.keys():
-        return _numerator_and_denominator(path, held[names["b"]], held[names["a"]])
+        return _numerator_and_denominator(path, variables[names["b"]], variables[names["a"]])
     if "ba" in names:
-        return of_rows(path, _matrix(path, held[names["ba"]]), kind=f"{names['ba']} in a MAT file")
+        return of_rows(path, _matrix(path, variables[names["ba"]]), kind=f"{names['ba']} in a MAT file")
     taps = next((names[name] for name in _TAPS if name in names), None)
     if taps is not None:
-        return _numerator_and_denominator(path, held[taps], np.ones((1, 1)), f"{taps} in a MAT file")
+        return _numerator_and_denominator(path, variables[taps], np.ones((1, 1)), f"{taps} in a MAT file")
     raise SpecificationError(
         f"{path}: variables must be SOS, with or without G, b and a, z, p and k, or Num, h or b alone, not only "
-        f"{', '.join(held) or 'none'}"
+        f"{', '.join(variables) or 'none'}"
     )
 
 

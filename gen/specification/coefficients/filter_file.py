@@ -31,7 +31,7 @@ def read_filter_file(path: Path) -> Content:
     Raises
     ------
     SpecificationError
-        If the file cannot be read or holds no filter that can be told.
+        If the file cannot be read or holds no filter that can be recognized.
     """
     suffix = path.suffix.lower()
     if suffix in OTHER_KINDS:

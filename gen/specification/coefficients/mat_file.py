@@ -46,7 +46,7 @@ def matrices(content: bytes, max_bytes: int) -> dict[str, _Array]:
     (version,) = struct.unpack_from(f"{order}H", content, 124)
     if version == 0x0200:
         raise NotImplementedError
-    found = {}
+    arrays = {}
     left = max_bytes
     for element in _elements(content[_HEADER:], order):
         kind, data = element
@@ -59,8 +59,8 @@ def matrices(content: bytes, max_bytes: int) -> dict[str, _Array]:
         if kind != _MATRIX:
             raise ValueError(kind)
         name, array = _variable(data, order)
-        found[name] = array
-    return found
+        arrays[name] = array
+    return arrays
 
 
 def _elements(data: bytes, order: str) -> Iterator[tuple[int, bytes]]:

@@ -63,8 +63,8 @@ def settled(stated: StatedSections, asked: Signs | None = None) -> SettledSectio
     Examples
     --------
     >>> rows = ((Fraction(1), Fraction(0), Fraction(0), Fraction(1), Fraction("1.8"), Fraction("-0.9")),)
-    >>> found = settled(StatedSections(format="a table", rows=rows))
-    >>> found.signs, [float(value) for value in found.rows[0][4:]]
+    >>> sections = settled(StatedSections(format="a table", rows=rows))
+    >>> sections.signs, [float(value) for value in sections.rows[0][4:]]
     ('negated', [-1.8, 0.9])
     """
     normal = _scaled([_normalized(k, row) for k, row in enumerate(stated.rows)], stated.gains)
@@ -89,11 +89,11 @@ def settled(stated: StatedSections, asked: Signs | None = None) -> SettledSectio
     return SettledSections(rows=choices[signs], signs=signs, certain=_OTHER[signs] not in stable)
 
 
-def sentence(stated: StatedSections, found: SettledSections) -> str:
+def sentence(stated: StatedSections, sections: SettledSections) -> str:
     """Say what the file is and in which convention it was read, and why."""
-    other = _OTHER[found.signs]
-    why = f"with {_WORDS[other]} it would be unstable" if found.certain else "as its format says; both are stable"
-    return f"{len(found.rows)} second-order sections from {stated.format}, read with {_WORDS[found.signs]}: {why}"
+    other = _OTHER[sections.signs]
+    why = f"with {_WORDS[other]} it would be unstable" if sections.certain else "as its format says; both are stable"
+    return f"{len(sections.rows)} second-order sections from {stated.format}, read with {_WORDS[sections.signs]}: {why}"
 
 
 def response(rows: Sequence[Row], z: int) -> Fraction:

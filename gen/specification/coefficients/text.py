@@ -106,24 +106,24 @@ def _designer(path: Path, lines: Sequence[str]) -> StatedSections:
 
 def _biquads(path: Path, lines: Sequence[str]) -> StatedSections:
     """Read a list of biquads in the format of Room EQ Wizard and miniDSP."""
-    found: list[dict[str, Fraction]] = []
+    biquads: list[dict[str, Fraction]] = []
     for at, line in enumerate(lines, 1):
         if not line.strip() or line.lstrip().startswith(("#", "%", "//")):
             continue
         if _HEADER.fullmatch(line.strip()):
-            found.append({})
+            biquads.append({})
             continue
         entry = _ENTRY.fullmatch(line)
-        if entry is None or not found or entry[1].lower() not in _KEYS:
+        if entry is None or not biquads or entry[1].lower() not in _KEYS:
             raise _unfit(path, at, "biquadN or one of b0, b1, b2, a1, a2 with its value", line)
-        if entry[1].lower() in found[-1]:
+        if entry[1].lower() in biquads[-1]:
             raise SpecificationError(f"{path}: line {at} must not give {entry[1]} a second time")
-        (found[-1][entry[1].lower()],) = _numbers(path, at, [entry[2]])
-    for index, biquad in enumerate(found, 1):
+        (biquads[-1][entry[1].lower()],) = _numbers(path, at, [entry[2]])
+    for index, biquad in enumerate(biquads, 1):
         for key in _KEYS:
             if key not in biquad:
                 raise SpecificationError(f"{path}: biquad {index} must have {key}, not leave it out")
-    rows = [tuple(biquad[key] for key in _KEYS) for biquad in found]
+    rows = [tuple(biquad[key] for key in _KEYS) for biquad in biquads]
     return StatedSections(
         format="a list of biquads as from Room EQ Wizard and miniDSP", rows=_with_a0(rows), signs="negated"
     )
@@ -229,6 +229,6 @@ def _number(path: Path, at: int, cell: str) -> Fraction:
     return Fraction(value)
 
 
-def _unfit(path: Path, at: int, expected: str, found: str) -> SpecificationError:
-    shown = found.strip()[:60]
+def _unfit(path: Path, at: int, expected: str, line: str) -> SpecificationError:
+    shown = line.strip()[:60]
     return SpecificationError(f"{path}: line {at} must have {expected}, not {shown!r}")

@@ -24,12 +24,17 @@ CERTAIN = 4.6
 LENGTHS = (0.25, 0.5, 2.0, 10.0)
 """Correlation lengths that are compared, relative to the type's; with the last one, an error is an offset."""
 
+POSSIBLE = -2.3
+"""The same from which on another model is possible: a tenth as probable."""
+
 LASTING = 3.0
 """Standard deviation of an error that stays, relative to what the type expects of the error of a day."""
 
 
-def doubts_of(model: Model, curves: SystematicCurves, clearance: Values, weights: Values) -> tuple[str, ...]:
-    """Return a sentence for each model that is far more probable.
+def doubts_of(
+    model: Model, curves: SystematicCurves, clearance: Values, weights: Values, *, of_day: bool
+) -> tuple[str, ...]:
+    """Return a sentence for each model that is far more probable, or that would leave the day's curve less certain.
 
     Parameters
     ----------
@@ -39,6 +44,8 @@ def doubts_of(model: Model, curves: SystematicCurves, clearance: Values, weights
         Its errors of a day.
     clearance, weights : ndarray, shape (n,)
         Clearance in mm of each row, and 0 for those that are left out.
+    of_day : bool
+        Whether the calibration follows the curve of its day, which rests on how far an error of a day reaches.
     """
     if len(model.rows.days) < FEWEST_DAYS:
         return ()
@@ -70,5 +77,11 @@ def doubts_of(model: Model, curves: SystematicCurves, clearance: Values, weights
         found.append(
             f"the errors of a day {what}, not over {known.correlation:g} mm as those of the type {known.name}: a type "
             f"with correlation = {best * known.correlation:g} gives the right intervals"
+        )
+    elif of_day and others[min(LENGTHS)] - plain > POSSIBLE:
+        found.append(
+            f"the measurements are too few to tell over which clearance the errors of a day vary: if that is "
+            f"{min(LENGTHS) * known.correlation:g} mm, not {known.correlation:g} mm as of the type {known.name}, "
+            "the curve of the day is less certain than its intervals say"
         )
     return tuple(found)

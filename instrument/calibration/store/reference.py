@@ -13,7 +13,7 @@ from sosmith.gen.calibration.fit import COLUMNS, Progress, untold
 from sosmith.instrument.calibration.bayesian_fit import bayesian_fit
 from sosmith.instrument.calibration.measurement_store import MeasurementStore, as_measurements
 from sosmith.instrument.calibration.self_updating import Addition, add, known_sensor
-from sosmith.instrument.calibration.sensor_type import SYSTEMATIC_FACTOR
+from sosmith.instrument.calibration.sensor_type import SYSTEMATIC_FACTOR, SensorType
 from sosmith.instrument.calibration.store.measurement_files import Reading
 from sosmith.instrument.calibration.uncertainty import of_posterior
 from sosmith.model.errors import SpecificationError
@@ -83,13 +83,14 @@ def reference(
     *,
     content: bytes | None = None,
     surprising: bool = False,
+    sensor_type: SensorType | None = None,
     progress: Progress = untold,
 ) -> Morning:
     """Add the readings of reference targets, and calibrate for their day.
 
     Parameters
     ----------
-    store, sensor, path, date, content, surprising, progress
+    store, sensor, path, date, content, surprising, sensor_type, progress
         As for `add`.
     uncertainty : float
         Standard uncertainty in mm of a target's clearance, where the file states none.
@@ -114,6 +115,7 @@ def reference(
         content=content,
         uncertainty=uncertainty,
         method="bayes",
+        sensor_type=sensor_type,
         progress=progress,
     )
     if not addition.kept:

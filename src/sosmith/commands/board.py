@@ -138,14 +138,14 @@ def board_command(
     with show_progress() as step:
         from sosmith.interface.design import design
 
-        made = design(asked, core=core, realization=realization, progress=step)
+        designed = design(asked, core=core, realization=realization, progress=step)
         folder = output or default_folder(asked.name) / "board"
         if model:
             step("model of the board")
-            modelled = ModelBoard(made, baud=baud)
+            modelled = ModelBoard(designed, baud=baud)
         else:
             netlist = NetlistBoard(
-                made, folder, clock=clock, board=board, baud=baud, trace=trace, seed=seed, progress=step
+                designed, folder, clock=clock, board=board, baud=baud, trace=trace, seed=seed, progress=step
             )
         if heard is not None:
             step("playing")

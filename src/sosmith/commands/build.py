@@ -72,12 +72,12 @@ def build_command(
     with show_progress() as step:
         from sosmith.interface.design import design
 
-        made = design(asked, core=core, realization=realization, board=board, progress=step)
-        made.generate(folder, step)
+        designed = design(asked, core=core, realization=realization, board=board, progress=step)
+        designed.generate(folder, step)
         if board in PROJECTS:
-            _told(made.project(board, folder=folder, rate=baud, progress=step), folder, as_json=as_json)
+            _show_project(designed.project(board, folder=folder, rate=baud, progress=step), folder, as_json=as_json)
             return
-        built = made.build(board, folder=folder, rate=baud, progress=step)
+        built = designed.build(board, folder=folder, rate=baud, progress=step)
         if program and built.passed:
             step("programming")
             built.program()
@@ -94,7 +94,7 @@ def build_command(
     note(f"bitstream: {built.bitstream}")
 
 
-def _told(summary: dict[str, Any], folder: Path, *, as_json: bool) -> None:
+def _show_project(summary: dict[str, Any], folder: Path, *, as_json: bool) -> None:
     """Print what a project is, and that nothing was built."""
     project = summary["project"]
     if as_json:

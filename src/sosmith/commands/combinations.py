@@ -25,15 +25,15 @@ def combinations_command(*, markdown: bool, as_json: bool) -> None:
         raise SpecificationError("--markdown must come without --json, not with it")
     from sosmith.interface.specification import Specification
 
-    found = Specification.combinations()
+    pairs = Specification.combinations()
     with reader_may_leave():
         if as_json:
-            print_json([each._asdict() for each in found])
+            print_json([each._asdict() for each in pairs])
             return
         from sosmith.commands.tables import combinations as tables
         from sosmith.commands.tables.console import TableConsole
 
         if markdown:
-            click.echo(tables.markdown(found), nl=False)
+            click.echo(tables.markdown(pairs), nl=False)
         else:
-            tables.print_combinations(TableConsole(), found)
+            tables.print_combinations(TableConsole(), pairs)

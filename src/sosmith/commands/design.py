@@ -96,19 +96,19 @@ def design_command(
     with show_progress() as step:
         from sosmith.interface.design import design
 
-        made = design(asked, core=core, realization=realization, widths_of=widths_of, board=board, progress=step)
-        cost = None if board not in BUILDABLE else made.cost_on(board, step)
+        designed = design(asked, core=core, realization=realization, widths_of=widths_of, board=board, progress=step)
+        cost = None if board not in BUILDABLE else designed.cost_on(board, step)
         if plot is not None:
             step("drawing")
-            made.plot(plot)
+            designed.plot(plot)
     if plot is not None:
         note(f"wrote {plot}")
     if as_json:
-        print_json(made.as_dict() if cost is None else made.as_dict() | {"board": cost})
+        print_json(designed.as_dict() if cost is None else designed.as_dict() | {"board": cost})
         return
     from sosmith.interface.build import build_table
 
-    print_tables([*made.tables(details=details), *([] if cost is None else [build_table(cost)])])
+    print_tables([*designed.tables(details=details), *([] if cost is None else [build_table(cost)])])
 
 
 @click.command("generate")
@@ -139,7 +139,7 @@ def generate_command(
     with show_progress() as step:
         from sosmith.interface.design import design
 
-        made = design(asked, core=core, realization=realization, widths_of=widths_of, board=board, progress=step)
-        paths = made.generate(output or default_folder(asked.name), step)
+        designed = design(asked, core=core, realization=realization, widths_of=widths_of, board=board, progress=step)
+        paths = designed.generate(output or default_folder(asked.name), step)
     for path in paths:
         click.echo(path)

@@ -106,7 +106,7 @@ def explore_command(
             twice = [key for k, (key, _) in enumerate(read) if key in dict(read[:k])]
             if twice:
                 raise SpecificationError(f"a parameter must be given once, not twice as {twice[0]}")
-            found = explore(
+            exploration = explore(
                 asked,
                 dict(read) or None,
                 search=search,
@@ -127,14 +127,14 @@ def explore_command(
             note(f"what is done is kept in {folder}; the same command goes on from there")
         raise
     if parquet:
-        found.to_parquet(found.folder / "points.parquet")
+        exploration.to_parquet(exploration.folder / "points.parquet")
     with reader_may_leave():
         if as_json:
-            print_json(found.as_dict())
+            print_json(exploration.as_dict())
         else:
-            print_tables(found.tables())
-            for sentence in found.sentences:
+            print_tables(exploration.tables())
+            for sentence in exploration.sentences:
                 click.echo(sentence)
-    note(f"page: {(found.folder / 'exploration.html').resolve().as_uri()}")
-    if not found.front:
+    note(f"page: {(exploration.folder / 'exploration.html').resolve().as_uri()}")
+    if not exploration.front:
         raise SystemExit(1)

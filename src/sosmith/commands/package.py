@@ -55,7 +55,7 @@ def package_command(
     with show_progress() as step:
         from sosmith.interface.design import design
 
-        made = design(asked, core=core, realization=realization, widths_of=widths_of, board=board, progress=step)
-        paths = made.package(output or default_folder(asked.name) / "package", vlnv=vlnv, progress=step)
+        designed = design(asked, core=core, realization=realization, widths_of=widths_of, board=board, progress=step)
+        paths = designed.package(output or default_folder(asked.name) / "package", vlnv=vlnv, progress=step)
     for path in paths:
         click.echo(path)

@@ -83,18 +83,18 @@ def reload_command(
     with show_progress() as step:
         from sosmith.interface.design import design
 
-        made = design(asked, core=core, realization=realization, widths_of=widths_of, board=board, progress=step)
-        found = made.reload(wanted, active=running, reset=reset, version=version, progress=step)
+        designed = design(asked, core=core, realization=realization, widths_of=widths_of, board=board, progress=step)
+        proven = designed.reload(wanted, active=running, reset=reset, version=version, progress=step)
     path = output or default_folder(asked.name) / f"{other.stem}.reload.json"
-    write_file(path, to_json(found.writes))
+    write_file(path, to_json(proven.writes))
     if as_json:
-        print_json(found.writes)
+        print_json(proven.writes)
     else:
-        print_tables([found.table])
+        print_tables([proven.table])
     note(f"wrote {path}")
     if port is not None:
         from sosmith import Board
 
         with Board(port, baud=baud) as client:
-            loaded = client.load(found.writes)
+            loaded = client.load(proven.writes)
         note(f"active on {port}: version {loaded.version}, CRC {loaded.crc:#010x}, {loaded.words} words")

@@ -203,7 +203,7 @@ def simulate_command(
     with show_progress() as step:
         from sosmith.interface.design import design
 
-        made = design(
+        designed = design(
             asked,
             core=core,
             realization=realization,
@@ -212,7 +212,7 @@ def simulate_command(
             progress=step,
         )
         report = _simulated(
-            made,
+            designed,
             step,
             source,
             folder=output or default_folder(asked.name),
@@ -288,9 +288,9 @@ def emulate_command(
     with show_progress() as step:
         from sosmith.interface.design import design
 
-        made = design(asked, core=core, progress=step)
+        designed = design(asked, core=core, progress=step)
         step(f"emulating {scenario}")
-        trace = made.trace(scenario, seed=seed, seconds=seconds)
+        trace = designed.trace(scenario, seed=seed, seconds=seconds)
         if output is not None:
             trace.write(output)
     if output is None:
@@ -299,7 +299,7 @@ def emulate_command(
     else:
         channels = f" of each of {asked.channels} channels" if asked.channels > 1 else ""
         note(f"wrote {output}: {len(trace.time)} samples{channels} at {asked.sample_rate:g} Hz")
-    for sentence in made.notes_on(scenario):
+    for sentence in designed.notes_on(scenario):
         note(f"note: {sentence}")
 
 
@@ -323,9 +323,9 @@ def demo(output: Path | None, seed: int) -> None:
         (spec,) = write_files(folder, {"flange_wear.toml": Specification.example().toml()})
         from sosmith.interface.design import design
 
-        made = design(Specification.load(spec), progress=step)
-        report = _simulated(made, step, None, folder=folder, seed=seed)
-    print_tables(made.tables())
+        designed = design(Specification.load(spec), progress=step)
+        report = _simulated(designed, step, None, folder=folder, seed=seed)
+    print_tables(designed.tables())
     _finish(report, as_json=False)
 
 
@@ -341,10 +341,10 @@ def _say_how_long() -> None:
         )
 
 
-def _simulated(made: Design, step: Step, source: str | None, **options: Any) -> Report:
-    report = made.simulate(source, progress=step, **options)
+def _simulated(designed: Design, step: Step, source: str | None, **options: Any) -> Report:
+    report = designed.simulate(source, progress=step, **options)
     if source is not None:
-        for sentence in made.notes_on(source):
+        for sentence in designed.notes_on(source):
             note(f"note: {sentence}")
     return report
 

@@ -29,7 +29,7 @@ class _Closed(io.RawIOBase):
 
 
 class _Results(io.FileIO):
-    """Stdout: what it does not take is told at the end, when all files are written."""
+    """Stdout: what it does not take is reported at the end, when all files are written."""
 
     lost: str | None = None
 
@@ -44,7 +44,7 @@ class _Results(io.FileIO):
 
 
 class _Messages(io.FileIO):
-    """Stderr: a message that cannot be told is no reason to leave work undone."""
+    """Stderr: a message that cannot be written is no reason to leave work undone."""
 
     def write(self, data: ReadableBuffer) -> int:
         try:
@@ -54,7 +54,7 @@ class _Messages(io.FileIO):
 
 
 class StandardStreams:
-    """Opens what is closed, so that no file of ours becomes a standard stream of a child; to be made once, at first."""
+    """Opens what is closed, so that no file of ours becomes a standard stream of a child; created once, at first."""
 
     def __init__(self) -> None:
         self._stdout: _Closed | _Results = _Closed()

@@ -72,7 +72,7 @@ class Alarms:
 
     def rises(self, results: Results, first: int, start: float) -> list[Alarm]:
         """Return the rises in results, the first of which is of sample number `first`; sample 0 was at `start`."""
-        found = []
+        rises = []
         values = results.values.reshape(len(results.values), -1)
         for flag in self._flags:
             now = results.flag(flag).reshape(values.shape)
@@ -80,8 +80,8 @@ class Alarms:
             before = np.concatenate([last[np.newaxis], now[:-1]])
             self._raised[flag] = now[-1]
             for n, channel in np.argwhere(now & ~before).tolist():
-                found.append(self._alarm(flag, channel, first + n, float(values[n, channel]), start))
-        return sorted(found, key=lambda alarm: (alarm.sample, alarm.channel))
+                rises.append(self._alarm(flag, channel, first + n, float(values[n, channel]), start))
+        return sorted(rises, key=lambda alarm: (alarm.sample, alarm.channel))
 
     def _alarm(self, flag: str, channel: int, sample: int, value: float, start: float) -> Alarm:
         return Alarm(flag, channel, sample, value, start + sample / self._rate)
@@ -112,7 +112,7 @@ class Hook:
         ToolError
             If it cannot be started.
         """
-        told = {
+        variables = {
             "SOSMITH_FLAG": alarm.flag,
             "SOSMITH_CHANNEL": str(alarm.channel),
             "SOSMITH_SAMPLE": str(alarm.sample),
@@ -122,7 +122,7 @@ class Hook:
         self._running = [process for process in self._running if process.poll() is None]
         try:
             process = subprocess.Popen(
-                self._command, env=os.environ | told, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL
+                self._command, env=os.environ | variables, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL
             )
         except OSError as error:
             raise ToolError(

@@ -146,13 +146,13 @@ class Board:
 
         They count since the first call of this session, modulo 256 between two calls.
         """
-        found = list(self._session.request(Type.COUNTERS))
-        if len(found) != len(Counter):
-            raise LinkError(f"the board must have {len(Counter)} counters, not {len(found)}")
+        counts = list(self._session.request(Type.COUNTERS))
+        if len(counts) != len(Counter):
+            raise LinkError(f"the board must have {len(Counter)} counters, not {len(counts)}")
         if self._counted is not None:
-            for n, (before, now) in enumerate(zip(self._counted, found, strict=True)):
+            for n, (before, now) in enumerate(zip(self._counted, counts, strict=True)):
                 self._totals[n] += (now - before) % 256
-        self._counted = found
+        self._counted = counts
         return {counter.name.lower(): total for counter, total in zip(Counter, self._totals, strict=True)}
 
     def run(self, **inputs: npt.ArrayLike) -> Results:
@@ -215,20 +215,35 @@ class Board:
         block = self._checked(codes)
         total = block.shape[0] * block.shape[1]
         received = bytearray()
-        size = self._identity.result_bytes
-        for results in self._session.exchange(self._requests(block.reshape(total, -1)), self._sound):
-            asked = min(total - len(received) // size, self._identity.samples)
+        size, step = self._identity.result_bytes, self._step
+        for body in self._session.exchange(self._requests(block.reshape(total, -1)), self._sound):
+            results = self._plain(body)
+            asked = min(total - len(received) // size, step)
             if len(results) != asked * size:
                 raise LinkError(f"the board must return {asked} results, not {len(results) / size:g}")
             received += results
             progress(len(received) // size, total)
         return self._results(bytes(received))
 
+    @property
+    def _step(self) -> int:
+        """Most samples of a request."""
+        packing = self._identity.packing
+        return self._identity.samples if packing is None else packing.per_message(self._identity.sample_bytes)
+
+    def _plain(self, results: bytes) -> bytes:
+        """Return results as they are without packing."""
+        packing = self._identity.packing
+        return results if packing is None else packing.plain(results)
+
     def _sound(self, results: bytes) -> bool:
         """Tell whether no bit of results lies outside its field: those of codes repeat the sign, those of flags are 0.
 
-        Incomplete results are another matter.
+        Incomplete results are another matter. Behind packed results, all bits are 0.
         """
+        packing = self._identity.packing
+        if packing is not None:
+            return packing.packed(packing.plain(results)) == results
         size = self._identity.result_bytes
         if len(results) % size:
             return True
@@ -239,10 +254,11 @@ class Board:
 
     def _requests(self, rows: Codes) -> Iterator[Request]:
         """Give requests with the samples of all channels in turn."""
-        step = self._identity.samples
+        step = self._step
+        kind = Type.SAMPLES if self._identity.packing is None else Type.SAMPLES_PACKED
         sizes = [port.bytes for port in self._identity.input_ports]
         for start in range(0, len(rows), step):
-            yield Type.SAMPLES, bytes([start % self._identity.channels]) + bytes_of(rows[start : start + step], sizes)
+            yield kind, bytes([start % self._identity.channels]) + bytes_of(rows[start : start + step], sizes)
 
     def _results(self, data: bytes) -> Results:
         size = self._identity.result_bytes
@@ -270,8 +286,10 @@ class Board:
         for k, port in enumerate(self._identity.input_ports):
             column = block[..., k]
             if column.size and (column.min() < port.lowest or column.max() > port.highest):
-                found = f"{column.min()}..{column.max()}"
-                raise SpecificationError(f"codes of {port.name} must be in {port.lowest}..{port.highest}, not {found}")
+                extremes = f"{column.min()}..{column.max()}"
+                raise SpecificationError(
+                    f"codes of {port.name} must be in {port.lowest}..{port.highest}, not {extremes}"
+                )
         return block.astype(np.int64, copy=False)
 
     def poll(self) -> tuple[int, Results] | None:
@@ -279,14 +297,44 @@ class Board:
 
         None if there are none yet. The arrays have the shape (results,), whatever the number of channels.
         """
-        body = self._session.request(Type.POLL, check=lambda body: self._sound(body[1:]))
-        if not body or (len(body) - 1) % self._identity.result_bytes:
+        return self._polled(self._session.request(self._poll_kind, check=self._polled_sound))
+
+    def poll_all(self, most: int) -> Iterator[tuple[int, Results]]:
+        """Fetch what `poll` fetches, until there are no more results or `most` have come, without a pause in between.
+
+        Whoever stops earlier loses what was asked for meanwhile.
+        """
+        missing, empty = most, False
+
+        def requests() -> Iterator[Request]:
+            while missing > 0 and not empty:
+                yield self._poll_kind, b""
+
+        for body in self._session.exchange(requests(), self._polled_sound):
+            found = self._polled(body)
+            if found is None:
+                empty = True
+            else:
+                missing -= len(found[1].codes)
+                yield found
+
+    @property
+    def _poll_kind(self) -> Type:
+        return Type.POLL if self._identity.packing is None else Type.POLL_PACKED
+
+    def _polled_sound(self, body: bytes) -> bool:
+        return self._sound(body[1:])
+
+    def _polled(self, body: bytes) -> tuple[int, Results] | None:
+        """Return the results of a response, None if it has none."""
+        results = self._plain(body[1:])
+        if not body or len(results) % self._identity.result_bytes:
             raise LinkError(f"the board must answer with whole results, not with {len(body)} bytes")
         if len(body) == 1:
             return None
         if body[0] >= self._identity.channels:
             raise LinkError(f"the board must name a channel below {self._identity.channels}, not {body[0]}")
-        rows = np.frombuffer(body[1:], np.uint8).reshape(-1, self._identity.result_bytes)
+        rows = np.frombuffer(results, np.uint8).reshape(-1, self._identity.result_bytes)
         codes = codes_of(rows[:, :-1].tobytes(), [self._identity.output_port])[:, 0]
         flags = dict(self._identity.flags)
         return body[0], Results(

@@ -54,8 +54,8 @@ def check_files(identity: Identity, folder: Path) -> dict[str, Any]:
         }
     except (KeyError, TypeError) as error:
         raise SpecificationError(f"{folder}: the manifest must have its keys, not be without {error}") from None
-    for key, (expected, found) in facts.items():
-        _check(identity, key, expected, found)
+    for key, (expected, actual) in facts.items():
+        _check(identity, key, expected, actual)
     return manifest
 
 
@@ -73,24 +73,24 @@ def folder_of(identity: Identity, folder: Path) -> Path | None:
         If there are files of a core of this name, but of other designs only.
     """
     name = f"{identity.name}.certificate.json"
-    found = [place.parent for place in (folder / name, *sorted(folder.glob(f"*/{name}"))) if place.exists()]
-    for place in found:
+    folders = [place.parent for place in (folder / name, *sorted(folder.glob(f"*/{name}"))) if place.exists()]
+    for place in folders:
         certificate = read_certificate(place / name)
         files = {} if certificate.about is None else {file.name: file.sha256 for file in certificate.about.files}
         if files.get(f"{identity.name}.sv") == identity.design:
             return place
-    if found:
+    if folders:
         raise ShortfallError(
-            f"one of the folders {', '.join(map(str, found))} must have the files of the board's core, "
+            f"one of the folders {', '.join(map(str, folders))} must have the files of the board's core, "
             f"{identity.name} with the design {identity.design[:12]}, not of other designs only: run `sosmith "
             "generate` on its specification with the options of the board, or name the folder with --files"
         )
     return None
 
 
-def _check(identity: Identity, key: str, expected: Any, found: Any) -> None:
-    if expected != found:
-        raise ShortfallError(f"the board's {key} must be {expected}, not {found}; its core is {identity.name}")
+def _check(identity: Identity, key: str, expected: Any, actual: Any) -> None:
+    if expected != actual:
+        raise ShortfallError(f"the board's {key} must be {expected}, not {actual}; its core is {identity.name}")
 
 
 def _manifest(path: Path) -> dict[str, Any]:

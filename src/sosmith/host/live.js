@@ -9,17 +9,17 @@ let newest = null, shown = null, cursor = null, held = false;
 // ---- Elements and numbers
 
 function element(name, text = "", attributes = {}) {
-  const made = document.createElement(name);
-  made.textContent = text;
-  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
-  return made;
+  const node = document.createElement(name);
+  node.textContent = text;
+  for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
+  return node;
 }
 
 function drawn(name, attributes, text = "") {
-  const made = document.createElementNS("http://www.w3.org/2000/svg", name);
-  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
-  if (text) made.textContent = text;
-  return made;
+  const node = document.createElementNS("http://www.w3.org/2000/svg", name);
+  for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
+  if (text) node.textContent = text;
+  return node;
 }
 
 // What stays the same is left alone: a screen reader would say it again.
@@ -82,18 +82,18 @@ function tiles(picture) {
     return [picture.now[best][column], `channel ${best}`];
   };
   const many = picture.now.length > 1, most = many ? "largest " : "";
-  const made = [];
+  const elements = [];
   if (picture.now.length) {
     const column = (index, name, text) => {
       const [value, where] = largest(index);
-      made.push(tile(most + name, text(value), many ? where : "now"));
+      elements.push(tile(most + name, text(value), many ? where : "now"));
     };
     column(0, facts.quantity, (value) => withUnit(fixed(value, facts.digits), facts.unit));
     if (facts.initial) column(1, "wear", (value) => withUnit(fixed(value, 3), facts.unit));
     if (facts.rated) column(2, "rate", (value) => withUnit(signed(value, 2), perHour));
   }
-  made.push(tile("time", duration(picture.seconds), `${picture.samples.toLocaleString("en")} samples`));
-  byId("tiles").replaceChildren(...made);
+  elements.push(tile("time", duration(picture.seconds), `${picture.samples.toLocaleString("en")} samples`));
+  byId("tiles").replaceChildren(...elements);
 }
 
 function header(table, names) {
@@ -128,10 +128,10 @@ function channels(picture) {
     const cells = [fixed(value, facts.digits)];
     if (facts.initial) cells.push(fixed(wear, 3));
     if (facts.rated) cells.push(signed(rate, 3));
-    const made = cells.map((text) => element("td", text, { class: "number" }));
+    const values = cells.map((text) => element("td", text, { class: "number" }));
     const row = body.rows[k];
     while (row.cells.length > 1) row.deleteCell(-1); // the first one stays, as it may have the focus
-    row.append(...made, badges(flags));
+    row.append(...values, badges(flags));
   });
 }
 
@@ -164,19 +164,43 @@ function series(picture, what) {
   return picture.values;
 }
 
-function limits(what) {
-  const found = Object.entries(facts.limits);
-  if (what === "wear") return found;
-  const same = facts.initial && facts.initial.every((value) => value === facts.initial[0]);
-  return what === "value" && same ? found.map(([name, wear]) => [name, wear + facts.initial[0]]) : [];
+// The limits of wear; those of the value only where they are the same for all channels that are shown.
+function limits(what, visible) {
+  const entries = Object.entries(facts.limits);
+  if (what === "wear") return entries;
+  const starts = facts.initial ? [...new Set(visible.map((channel) => facts.initial[channel]))] : [];
+  return what === "value" && starts.length === 1 ? entries.map(([name, wear]) => [name, wear + starts[0]]) : [];
+}
+
+// A limit that is no further from the curves than they reach is in the picture.
+function withLimits([low, high], values) {
+  const span = high - low, near = values.filter((value) => value > low - span && value < high + span);
+  const room = 0.06 * span, bottom = Math.min(low, ...near), top = Math.max(high, ...near);
+  return [bottom < low ? bottom - room : low, top > high ? top + room : high];
+}
+
+function drawLimits(svg, entries, low, high, y, width) {
+  const above = entries.filter(([, value]) => value >= high), below = entries.filter(([, value]) => value <= low);
+  const text = ([name, value]) => `${name} ${withUnit(Number(value.toPrecision(6)).toString().replace("-", "−"), facts.unit)}`;
+  for (const each of entries) {
+    const [name, value] = each;
+    if (above.includes(each) || below.includes(each)) continue;
+    const place = y(value), under = place < TOP + 20;
+    svg.append(drawn("line", { class: `limit ${name}`, x1: LEFT, x2: width - RIGHT, y1: place, y2: place }));
+    svg.append(drawn("text", { class: "limit-name", x: LEFT + 6, y: place + (under ? 15 : -5) }, text(each)));
+  }
+  above.forEach((each, k) => svg.append(
+    drawn("text", { class: "limit-name", x: width - RIGHT - 4, y: TOP + 14 + 16 * k, "text-anchor": "end" }, `↑ ${text(each)}`)));
+  below.forEach((each, k) => svg.append(
+    drawn("text", { class: "limit-name", x: width - RIGHT - 4, y: y(low) - 6 - 16 * k, "text-anchor": "end" }, `↓ ${text(each)}`)));
 }
 
 function ticks(low, high, count) {
   const rough = (high - low) / count, power = 10 ** Math.floor(Math.log10(rough));
   const step = [1, 2, 5, 10].map((factor) => factor * power).find((each) => each >= rough);
-  const digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9)), found = [];
-  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) found.push(k * step);
-  return found.map((value) => [value, fixed(value === 0 ? 0 : value, digits)]);
+  const digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9)), positions = [];
+  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) positions.push(k * step);
+  return positions.map((value) => [value, fixed(value === 0 ? 0 : value, digits)]);
 }
 
 function range(curves) {
@@ -226,7 +250,8 @@ function draw() {
   const visible = all.map((_, k) => k).filter((k) => !hidden.has(k));
   const flags = Object.entries(facts.flags).filter(([, bit]) => picture.status.some((each) => each.some((status) => status >> bit & 1)));
   const bottom = TOP + Math.max(220, Math.min(320, width * 0.45)), height = bottom + AXIS + flags.length * LANE + 4;
-  const [low, high] = range(visible.map((k) => all[k])), times = picture.times;
+  const bounds = limits(what, visible), times = picture.times;
+  const [low, high] = withLimits(range(visible.map((k) => all[k])), bounds.map(([, value]) => value));
   const end = times.at(-1), unit = end >= 7200 ? [3600, "h"] : end >= 120 ? [60, "min"] : [1, "s"];
   const x = (time) => LEFT + (time - times[0]) / (end - times[0]) * (width - LEFT - RIGHT);
   const y = (value) => bottom - (value - low) / (high - low) * (bottom - TOP);
@@ -241,16 +266,13 @@ function draw() {
   svg.append(drawn("text", { x: LEFT - 8, y: bottom + 19, "text-anchor": "end" }, unit[1]));
   const label = what === "value" ? withUnit(facts.quantity, facts.unit && `in ${facts.unit}`) : what === "rate" ? `rate in ${perHour}` : `wear in ${facts.unit}`;
   svg.append(drawn("text", { class: "strong", x: LEFT, y: 14 }, label));
-  for (const [name, value] of limits(what)) if (value > low && value < high) {
-    svg.append(drawn("line", { class: `limit ${name}`, x1: LEFT, x2: width - RIGHT, y1: y(value), y2: y(value) }));
-    svg.append(drawn("text", { x: LEFT + 6, y: y(value) - 5 }, name));
-  }
   for (const k of visible) {
     const line = drawn("path", { class: "line", d: path(times, all[k], x, y) });
     line.style.stroke = colour(k);
     if (k >= 8) line.style.strokeDasharray = "7 4";
     svg.append(line);
   }
+  drawLimits(svg, bounds, low, high, y, width);
   lanes(svg, picture, visible, flags, x, bottom + AXIS, width);
   if (cursor !== null) {
     cursor = Math.max(0, Math.min(cursor, times.length - 1));

@@ -85,17 +85,17 @@ def load(board: Registers, proven: Mapping[str, Any]) -> Loaded:
         if time.monotonic() > deadline:
             raise LinkError(f"the set must become active within {PATIENCE:g} s, not still be pending")
     _match("STATUS.OUTCOME", Outcome.ACCEPTED, STATUS.field("OUTCOME").of(status))
-    found = Loaded(
+    loaded = Loaded(
         version=board.read_register(VERSION.address),
         crc=board.read_register(CRC.address),
         design=proven["design"],
         words=proven["words"],
     )
-    _match("VERSION", proven["version"], found.version)
-    _match("CRC", writes[-1][1], found.crc)
-    return found
+    _match("VERSION", proven["version"], loaded.version)
+    _match("CRC", writes[-1][1], loaded.crc)
+    return loaded
 
 
-def _match(register: str, expected: int, found: int) -> None:
-    if expected != found:
-        raise ShortfallError(f"the board's register {register} must read {expected:#x}, not {found:#x}")
+def _match(register: str, expected: int, actual: int) -> None:
+    if expected != actual:
+        raise ShortfallError(f"the board's register {register} must read {expected:#x}, not {actual:#x}")

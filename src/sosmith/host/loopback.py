@@ -156,18 +156,18 @@ class Loopback:
         place = request.path.encode()
         if secrets.compare_digest(place, f"/{self._token}/live".encode()):
             return None
-        for name, made in self._pages.items():
+        for name, render in self._pages.items():
             if secrets.compare_digest(place, f"/{self._token}/{name}".encode()):
-                return self._page(connection, name, made)
+                return self._page(connection, name, render)
         return connection.respond(404, _NOT_HERE)
 
-    def _page(self, connection: ServerConnection, name: str, made: Callable[[], tuple[str, str] | None]) -> Response:
+    def _page(self, connection: ServerConnection, name: str, render: Callable[[], tuple[str, str] | None]) -> Response:
         try:
-            found = made()
+            page = render()
         except Exception as error:
             _tell_fault(f"the page {name or 'itself'}", error)
             return connection.respond(500, "A fault of this program, not of the request: its terminal tells more.\n")
-        return connection.respond(404, _NOT_HERE) if found is None else _page(connection, *found)
+        return connection.respond(404, _NOT_HERE) if page is None else _page(connection, *page)
 
     def _serve(self, connection: ServerConnection) -> None:
         if not self._free.acquire(blocking=False):

@@ -97,7 +97,7 @@ class Changed:
 
 @dataclass(frozen=True)
 class Idle:
-    """Nothing new: no board, or one without new results. It is told at every turn, for what must not wait."""
+    """Nothing new: no board, or one without new results. Given in every pass of the loop, for what must not wait."""
 
 
 Event = Connected | Received | Changed | Lost | Idle
@@ -194,12 +194,12 @@ def _connected(connect: Callable[[], Board], clock: Clock, *, wait: bool) -> Boa
         return None
 
 
-def _check_same(known: Identity | None, found: Identity) -> None:
+def _check_same(known: Identity | None, identity: Identity) -> None:
     """Check that a board is the one of the sessions before."""
-    if known is None or known == found:
+    if known is None or known == identity:
         return
-    key = next(key for key in type(known).model_fields if getattr(known, key) != getattr(found, key))
-    before, now = (str(getattr(each, key)) for each in (known, found))
+    key = next(key for key in type(known).model_fields if getattr(known, key) != getattr(identity, key))
+    before, now = (str(getattr(each, key)) for each in (known, identity))
     raise ShortfallError(
         f"the board must be the one of the sessions before, not another: its {key} is {now}, not {before}"
     )
@@ -255,11 +255,10 @@ class _Fetched:
 
     def fetch(self, clock: Clock) -> float:
         """Fetch what there is; return when the last of it came."""
-        moment, count = clock.monotonic(), 0
-        while count < MAX_FETCHED and (found := self._board.poll()) is not None:
+        moment = clock.monotonic()
+        for fetched in self._board.poll_all(MAX_FETCHED):
             moment = clock.monotonic()
-            count += len(found[1].codes)
-            self._take(*found)
+            self._take(*fetched)
         return moment
 
     def _take(self, channel: int, results: Results) -> None:

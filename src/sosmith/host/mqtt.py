@@ -221,7 +221,7 @@ class Publisher:
         if time.monotonic() >= self._due and self._client.is_connected():
             self._due = time.monotonic() + INTERVAL
             for one in readings.now:
-                made = {
+                content = {
                     "time": utc_text(readings.utc, "milliseconds"),
                     "sample": readings.samples - 1,
                     "quantity": readings.identity.output_port.name,
@@ -231,13 +231,13 @@ class Publisher:
                     "per_hour": one.per_hour,
                     "flags": one.flags,
                 }
-                self._outbox.show(f"{self._topic}/channel/{one.channel}", _json(made))
-        self._turn()
+                self._outbox.show(f"{self._topic}/channel/{one.channel}", _json(content))
+        self._exchange()
 
     def alarm(self, alarm: Alarm) -> None:
         """Publish an alarm, now or when the broker is back."""
         self._number += 1
-        made = {
+        content = {
             "number": self._number,
             "since": utc_text(self._start, "milliseconds"),
             "time": utc_text(alarm.utc, "milliseconds"),
@@ -247,11 +247,11 @@ class Publisher:
             "value": alarm.value,
             "unit": self._readings.identity.output_port.unit,
         }
-        self._outbox.put(f"{self._topic}/alarm", _json(made))
+        self._outbox.put(f"{self._topic}/alarm", _json(content))
         if self._outbox.left_out and not self._left_out:
             self._news.put(f"{MOST} alarms wait for the broker at {self._broker}; further ones are left out")
         self._left_out = self._outbox.left_out
-        self._turn()
+        self._exchange()
 
     def news(self) -> list[str]:
         """Return what has happened to the connection since the last call, a sentence each."""
@@ -270,7 +270,7 @@ class Publisher:
         self._outbox.show(f"{self._topic}/status", "ended")
         end = time.monotonic() + PATIENCE
         while True:
-            self._turn()
+            self._exchange()
             if self._outbox.empty or time.monotonic() > end:
                 break
             time.sleep(0.01)
@@ -281,7 +281,7 @@ class Publisher:
             kept = "" if self._keep is None else f"; {self._outbox.waiting} wait in {self._keep} for the next start"
             raise ToolError(f"the broker at {self._broker} must acknowledge every alarm, not leave out {left}{kept}")
 
-    def _turn(self) -> None:
+    def _exchange(self) -> None:
         """Take what is acknowledged, and give the client what it may have now."""
         for number in _drained(self._acknowledged):
             self._outbox.acknowledged(number)
@@ -353,8 +353,8 @@ def _topic(text: str) -> str:
     return text
 
 
-def _json(made: dict[str, Any]) -> str:
-    return json.dumps(made, ensure_ascii=False, allow_nan=False)
+def _json(content: dict[str, Any]) -> str:
+    return json.dumps(content, ensure_ascii=False, allow_nan=False)
 
 
 def _drained(queue: SimpleQueue[Item]) -> list[Item]:

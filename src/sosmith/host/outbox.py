@@ -81,7 +81,7 @@ class Outbox:
                 raise self._full(error) from None
             reason = "in use by another process" if "locked" in str(error) else str(error)
             raise SpecificationError(f"{path}: the file must be one of waiting messages, not: {reason}") from None
-        self._waiting = self._told("SELECT count(*) FROM message")
+        self._waiting = self._value_of("SELECT count(*) FROM message")
         self._last = 0  # number of the last one that was handed over
         self._states: dict[str, str] = {}
         self._under_way: dict[int, _UnderWay] = {}
@@ -132,9 +132,9 @@ class Outbox:
 
     def acknowledged(self, client_number: int) -> None:
         """Note that the broker has acknowledged what has this number of the client."""
-        found = self._under_way.pop(client_number, None)
-        if found is not None and found.number is not None:
-            self._changed("DELETE FROM message WHERE number = ?", found.number)
+        message = self._under_way.pop(client_number, None)
+        if message is not None and message.number is not None:
+            self._changed("DELETE FROM message WHERE number = ?", message.number)
             self._waiting -= 1
 
     def close(self) -> None:
@@ -143,8 +143,8 @@ class Outbox:
 
     def _open(self) -> None:
         self._kept.execute("PRAGMA locking_mode = EXCLUSIVE")
-        if self._told("PRAGMA application_id") != _APPLICATION:
-            if self._told("SELECT count(*) FROM sqlite_master"):
+        if self._value_of("PRAGMA application_id") != _APPLICATION:
+            if self._value_of("SELECT count(*) FROM sqlite_master"):
                 raise sqlite3.DatabaseError("a database of another program")
             self._kept.execute(f"PRAGMA application_id = {_APPLICATION}")
         self._kept.execute("PRAGMA journal_mode = WAL")
@@ -164,7 +164,7 @@ class Outbox:
         self._under_way[hand(topic, text, number is None)] = _UnderWay(self._handed, topic, number)
         self._handed += 1
 
-    def _told(self, query: str) -> int:
+    def _value_of(self, query: str) -> int:
         (value,) = self._kept.execute(query).fetchone()
         return int(value)
 

@@ -98,9 +98,9 @@ class LivePage:
 
     def _show(self, state: str) -> None:
         self._due, self._state = time.monotonic() + INTERVAL, state
-        made = json.dumps(picture(self._readings, state), allow_nan=False, separators=(",", ":"))
+        text = json.dumps(picture(self._readings, state), allow_nan=False, separators=(",", ":"))
         with self._changed:
-            self._picture, self._number = made, self._number + 1
+            self._picture, self._number = text, self._number + 1
             self._changed.notify_all()
 
     def _is_after(self, seen: int) -> bool:

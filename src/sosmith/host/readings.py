@@ -184,10 +184,10 @@ class Readings:
         """The newest reading of each channel; none before the first result."""
         if not self.samples:
             return []
-        found = []
+        readings = []
         for channel, (value, status) in enumerate(self._last):
             slope = self.histories[channel].slope()
-            found.append(
+            readings.append(
                 Reading(
                     channel=channel,
                     value=value,
@@ -196,7 +196,7 @@ class Readings:
                     flags=self.flags_of(status),
                 )
             )
-        return found
+        return readings
 
     def flags_of(self, status: int) -> tuple[str, ...]:
         """Return the names of the flags in a status."""

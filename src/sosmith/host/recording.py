@@ -149,8 +149,8 @@ class CsvRecording:
 
     def _take(self) -> None:
         """Check that the file is a regular one, and lock it."""
-        if found := kind_of(os.fstat(self._file).st_mode):
-            raise SpecificationError(f"{self._path}: the recording must be a regular file, not {found}")
+        if kind := kind_of(os.fstat(self._file).st_mode):
+            raise SpecificationError(f"{self._path}: the recording must be a regular file, not {kind}")
         try:
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
@@ -261,9 +261,9 @@ def _complete_lines(path: Path) -> int:
         while end:
             start = max(end - 4096, 0)
             file.seek(start)
-            found = file.read(end - start).rfind(b"\n")
-            if found >= 0:
-                return start + found + 1
+            newline = file.read(end - start).rfind(b"\n")
+            if newline >= 0:
+                return start + newline + 1
             end = start
     return 0
 

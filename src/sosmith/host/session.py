@@ -156,10 +156,10 @@ class Session:
         deadline = time.monotonic() + self._patience(attempt)
         while True:
             while self._arrived:
-                found = self._arrived.popleft()
-                place = self._place(found)
-                if place == 0 and isinstance(found, Message):
-                    return self._finished(found)
+                arrived = self._arrived.popleft()
+                place = self._place(arrived)
+                if place == 0 and isinstance(arrived, Message):
+                    return self._finished(arrived)
                 if place is not None and not asked:
                     # The board repeats the responses from this one on by itself.
                     self.faults.gaps += 1
@@ -178,16 +178,16 @@ class Session:
             silent = not data
             self._arrived.extend(self._receiver.feed(data))
 
-    def _place(self, found: Message | Counter) -> int | None:
+    def _place(self, arrived: Message | Counter) -> int | None:
         """Index of the request that a message answers; counts what answers none."""
-        if isinstance(found, Counter):
+        if isinstance(arrived, Counter):
             self.faults.damaged += 1
             return None
         for place, pending in enumerate(self._pending):
-            if (found.type, found.sequence) == (pending.message.type | RESPONSE, pending.message.sequence):
-                if not found.body:
+            if (arrived.type, arrived.sequence) == (pending.message.type | RESPONSE, pending.message.sequence):
+                if not arrived.body:
                     break
-                if found.body[-1] != Status.OK or pending.check(found.body[:-1]):
+                if arrived.body[-1] != Status.OK or pending.check(arrived.body[:-1]):
                     return place
                 self._damaged(pending)
                 return None

@@ -34,10 +34,10 @@ class Build(View):
     shortfall: str | None = field(repr=False)
 
     @classmethod
-    def written(cls, made: BoardBuild, folder: Path) -> Build:
+    def written(cls, build: BoardBuild, folder: Path) -> Build:
         """Write the files of a build into `folder`, and return their content."""
-        made.write(folder)
-        return cls(made.summary, folder, None if made.passed else made.shortfall)
+        build.write(folder)
+        return cls(build.summary, folder, None if build.passed else build.shortfall)
 
     @property
     def passed(self) -> bool:

@@ -250,7 +250,7 @@ class Certificate:
         """
         _check_second_reader(second_reader, files)
         checked = None if spec is None else load(Path(fspath(spec)))
-        found = judge(
+        judgement = judge(
             self.entries,
             progress,
             stated=None if checked is None else _stated(checked, core),
@@ -258,16 +258,16 @@ class Certificate:
             content=self.text().encode() if self.path is None else _content(self.path),
             seconds=seconds,
         )
-        scope = dict(found.scope)
+        scope = dict(judgement.scope)
         if second_reader is not None and files is not None:
             progress("second reader", 0, 0)
-            readings = read_again(found.files[f"{self.name}.sv"].decode("ascii"), self.name, seconds)
+            readings = read_again(judgement.files[f"{self.name}.sv"].decode("ascii"), self.name, seconds)
             why = (
                 f"Yosys sees the same {readings.register_bits} bits of registers and {readings.words} words of "
                 f"memories in {readings.modules} modules, and what each of them becomes"
             )
             scope["second_reader"] = Part(State.PROVEN, why)
-        verdict, again = found.verdict, 0
+        verdict, again = judgement.verdict, 0
         if rebuild:
             from sosmith.gen.output.rebuild import rebuilt
 
@@ -283,12 +283,12 @@ class Certificate:
             lsb=Quantity(float(lsb), unit),
             nodes=verdict.nodes,
             ranges=verdict.ranges,
-            agreement=found.agreement,
-            files=len(found.files),
-            program=found.proofs.program,
-            calibration=found.proofs.calibration,
-            hardware=found.proofs.hardware,
-            decimator=found.decimator,
+            agreement=judgement.agreement,
+            files=len(judgement.files),
+            program=judgement.proofs.program,
+            calibration=judgement.proofs.calibration,
+            hardware=judgement.proofs.hardware,
+            decimator=judgement.decimator,
             rebuilt=again,
             scope=scope,
         )

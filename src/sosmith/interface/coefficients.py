@@ -86,7 +86,7 @@ class Coefficients:
         Raises
         ------
         SpecificationError
-            If the file cannot be read, holds no filter that can be told, or is not stable.
+            If the file cannot be read, holds no filter that can be recognized, or is not stable.
         """
         source = Path(fspath(path))
         content = read_filter_file(source)
@@ -96,22 +96,23 @@ class Coefficients:
         asked = None if signs == "auto" else signs
         try:
             if isinstance(content, StatedSections):
-                found = settled(content, asked)
-                return cls(found.rows, (sentence(content, found),), rate)
+                sections = settled(content, asked)
+                return cls(sections.rows, (sentence(content, sections),), rate)
             if isinstance(content, TransferFunction) and content.taps is not None:
                 return cls((), (f"{len(content.taps)} taps from {content.format}",), rate, content.taps)
-            made = factored(content, rate)
-            exact = tuple(tuple(Fraction(value) for value in row) for row in made.rows)
-            found = settled(StatedSections(format=content.format, rows=exact), "scipy")
+            factorization = factored(content, rate)
+            exact = tuple(tuple(Fraction(value) for value in row) for row in factorization.rows)
+            sections = settled(StatedSections(format=content.format, rows=exact), "scipy")
         except SpecificationError as error:
             raise SpecificationError(f"{source}: {error}") from None
         except (OverflowError, ZeroDivisionError):  # responses beyond doubles
             raise SpecificationError(f"{source}: the filter must have numbers within reason, not beyond") from None
         return cls(
-            found.rows,
+            sections.rows,
             (
-                f"{len(found.rows)} second-order sections factored from {content.format}, scipy's signs",
-                f"their response is within {made.deviation:.1e} of the stated one, relative to its largest magnitude",
+                f"{len(sections.rows)} second-order sections factored from {content.format}, scipy's signs",
+                f"their response is within {factorization.deviation:.1e} of the stated one, relative to its largest "
+                "magnitude",
             ),
             rate,
         )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property, partial
 from os import PathLike, fspath
@@ -25,7 +25,7 @@ from sosmith.interface.quantity import Quantity
 from sosmith.interface.specification import Specification, specification_of
 from sosmith.interface.tables.cost import Cost
 from sosmith.interface.trace import Trace
-from sosmith.model.errors import SpecificationError, falling_short
+from sosmith.model.errors import ShortfallError, SpecificationError, falling_short
 
 if TYPE_CHECKING:
     from sosmith.gen.estimate.estimate import Estimate
@@ -213,13 +213,16 @@ class Design:
     def rate_costs(self) -> dict[str, RateCosts]:
         """What the filter costs "decimated", and the same filter "direct", without a decimator; empty without one.
 
-        The second is designed for the comparison.
+        The second is designed for the comparison, and missing if no formats meet the specification without a decimator.
         """
         from sosmith.gen.output.decimation_facts import direct_design, rate_costs
 
         if self.core.datapath.decimator is None:
             return {}
-        return {"decimated": rate_costs(self.core), "direct": rate_costs(direct_design(self.core))}
+        costs = {"decimated": rate_costs(self.core)}
+        with suppress(ShortfallError):
+            costs["direct"] = rate_costs(direct_design(self.core))
+        return costs
 
     @property
     def cost(self) -> Cost:
@@ -558,8 +561,8 @@ class Design:
 
         target = find_board(board, BUILDABLE)
         place = Path("build") / self.core.spec.name / target.name if folder is None else Path(fspath(folder))
-        made = build_board(self.core, target, rate=rate, progress=lambda step: progress(step, 0, 0))
-        return Build.written(made, place)
+        built = build_board(self.core, target, rate=rate, progress=lambda step: progress(step, 0, 0))
+        return Build.written(built, place)
 
     def project(
         self,
@@ -599,9 +602,9 @@ class Design:
 
         target = find_board(board, PROJECTS)
         place = Path("build") / self.core.spec.name / target.name if folder is None else Path(fspath(folder))
-        made = board_project(self.core, target, rate=rate, progress=lambda step: progress(step, 0, 0))
-        made.write(place)
-        return made.summary
+        project = board_project(self.core, target, rate=rate, progress=lambda step: progress(step, 0, 0))
+        project.write(place)
+        return project.summary
 
     def cost_on(self, board: str, progress: Progress = lambda step, done, total: None) -> dict[str, Any]:
         """Return what the design takes of a board's FPGA, with the serial link: the content of ``build.json``.
@@ -763,8 +766,8 @@ class Design:
 
         worth = None if self.uncertainty is None else budget_json(self.uncertainty)
         beside = {name: asdict(costs) for name, costs in self.rate_costs.items()}
-        found = {"uncertainty": worth, "estimates": [each.as_dict() for each in self.estimates]}
-        return self.manifest | found | ({"rate_costs": beside} if beside else {})
+        tree = {"uncertainty": worth, "estimates": [each.as_dict() for each in self.estimates]}
+        return self.manifest | tree | ({"rate_costs": beside} if beside else {})
 
     def _repr_html_(self) -> str:
         overview, budget, *_ = self.tables()
@@ -774,8 +777,8 @@ class Design:
         return overview.html() + budget.html()
 
     def __repr__(self) -> str:
-        made = ", ".join(filter(None, (self.realization, self.architecture)))
-        return f"<sosmith.Design {self.name}: {made}, error at most {self.bound}>"
+        structure = ", ".join(filter(None, (self.realization, self.architecture)))
+        return f"<sosmith.Design {self.name}: {structure}, error at most {self.bound}>"
 
 
 def design(
@@ -827,7 +830,7 @@ def design(
     target = None if board is None else find_board(board)
     spec = specification_of(specification).checked
     with falling_short(spec.path):
-        made = design_core(
+        core_design = design_core(
             spec,
             core=core,
             realization=realization,
@@ -835,4 +838,4 @@ def design(
             board=target,
             progress=lambda step: progress(step, 0, 0),
         )
-    return Design(made)
+    return Design(core_design)

@@ -200,8 +200,8 @@ def explore(
     >>> spec = sosmith.Specification.from_sos([[0.25, 0.5, 0.25, 1.0, -0.5, 0.25]], 1000, input_bits=8)
     >>> sweep = {"hardware.architecture": ["parallel"], "output.max_error": [0.006, 0.03], "output.bits": [8, 10]}
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     found = sosmith.explore(spec, sweep, folder=folder, samples=500, jobs=1)
-    >>> found
+    ...     exploration = sosmith.explore(spec, sweep, folder=folder, samples=500, jobs=1)
+    >>> exploration
     <sosmith.Exploration sos_filter: 4 points, ... on the front>
     """
     from sosmith.instrument.scenarios.traces import ChosenTraces
@@ -243,14 +243,14 @@ def explore(
     if simulate:
         outcome = confirmed(outcome, place, uncertainty=budget_in_json, simulator=simulator, progress=progress)
     progress("writing the results", 0, 0)
-    made = Exploration(outcome, place)
+    exploration = Exploration(outcome, place)
     files = {
-        "exploration.json": to_json(made.as_dict()),
+        "exploration.json": to_json(exploration.as_dict()),
         "points.csv": outcome.table(),
-        "exploration.html": made.page(),
+        "exploration.html": exploration.page(),
     }
     write_files(place, files)
-    return made
+    return exploration
 
 
 def _arrow() -> tuple[Any, Any]:

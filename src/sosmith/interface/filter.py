@@ -1,4 +1,4 @@
-"""The ideal filter of a specification: what can be told about it before anything is rounded."""
+"""The ideal filter of a specification: what can be said about it before anything is rounded."""
 
 from __future__ import annotations
 
@@ -136,18 +136,18 @@ class Filter:
 
     @cached_property
     def _plain(self) -> response.FilterFacts:
-        made = self.designed
+        designed = self.designed
         return response.FilterFacts(
-            sample_rate=made.sample_rate,
-            ideal_sos=made.sos,
-            quantized_sos=made.sos,
-            kind="lowpass" if made.cutoff is None else made.kind,
-            passband_edge=made.passband_edge,
-            stopband_edge=made.stopband_edge,
-            passband_loss=made.passband_loss,
-            stopband_loss=made.stopband_loss,
-            cutoff=made.cutoff,
-            cutoff_of_stopband=made.cutoff_of_stopband,
+            sample_rate=designed.sample_rate,
+            ideal_sos=designed.sos,
+            quantized_sos=designed.sos,
+            kind="lowpass" if designed.cutoff is None else designed.kind,
+            passband_edge=designed.passband_edge,
+            stopband_edge=designed.stopband_edge,
+            passband_loss=designed.passband_loss,
+            stopband_loss=designed.stopband_loss,
+            cutoff=designed.cutoff,
+            cutoff_of_stopband=designed.cutoff_of_stopband,
         )
 
     def __repr__(self) -> str:

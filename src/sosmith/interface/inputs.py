@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from numbers import Real
 from os import PathLike, fspath
 from typing import Any
 
@@ -78,8 +79,8 @@ def codes_of(design: CoreDesign, inputs: Mapping[str, npt.ArrayLike]) -> Codes:
         if not np.issubdtype(values.dtype, np.integer) and not _whole(values):
             raise SpecificationError(f"codes of {port.name} must be integers, not {values.dtype}")
         if values.min() < port.lowest or values.max() > port.highest:
-            found = f"{values.min()}..{values.max()}"
-            raise SpecificationError(f"codes of {port.name} must be in {port.lowest}..{port.highest}, not {found}")
+            extremes = f"{values.min()}..{values.max()}"
+            raise SpecificationError(f"codes of {port.name} must be in {port.lowest}..{port.highest}, not {extremes}")
         columns.append(values.astype(np.int64))
     return np.stack(columns, axis=-1)
 
@@ -106,7 +107,10 @@ def traces_of(
     if not isinstance(trace, Mapping):
         from sosmith.instrument.scenarios.traces import default_scenario, traces_for  # and with it all scenarios
 
-        source = default_scenario(design) if trace is None else fspath(trace)
+        what = "the trace must be the name of one, a path, or arrays by the names of the inputs"
+        source = default_scenario(design) if trace is None else path_of(trace, what)
+        if seconds is not None and not isinstance(seconds, Real):
+            raise SpecificationError(f"seconds must be a number, not {seconds!r}")
         return traces_for(design, source, seed=seed, seconds=seconds)
     if seconds is not None:
         raise SpecificationError("seconds must come with the name of a built-in trace, not with arrays")
@@ -122,6 +126,19 @@ def traces_of(
         first = one(lambda array: array)
         return tuple(first.delayed(k) for k in range(channels))
     return tuple(one(lambda array, k=k: array[:, k]) for k in range(channels))  # type: ignore[misc]
+
+
+def path_of(source: str | PathLike[str], what: str) -> str:
+    """Return a path as text; `what` begins the sentence that refuses other things."""
+    try:
+        return fspath(source)
+    except TypeError:
+        raise SpecificationError(f"{what}, not {_kind(source)}") from None
+
+
+def _kind(value: object) -> str:
+    plain = value is None or isinstance(value, int | float)
+    return repr(value) if plain else f"something of type {type(value).__name__}"
 
 
 def _in_one_shape(design: CoreDesign, inputs: Mapping[str, npt.ArrayLike]) -> list[npt.NDArray[np.generic]]:

@@ -25,9 +25,9 @@ class Quantity(float):
 
     def __new__(cls, value: float, unit: str = "") -> Quantity:
         """Make the quantity `value` in `unit`."""
-        made = super().__new__(cls, value)
-        made.unit = unit
-        return made
+        instance = super().__new__(cls, value)
+        instance.unit = unit
+        return instance
 
     def __reduce__(self) -> tuple[type[Quantity], tuple[float, str]]:
         """Keep the unit in copies and pickles."""

@@ -48,22 +48,22 @@ class Reload(View):
         progress: Progress,
     ) -> Reload:
         """Prove a set; parameters and errors are those of `Design.reload`."""
-        made = design.core
+        core = design.core
         progress("set", 0, 0)
         with falling_short(wanted.checked.path):
-            new = set_for(made, wanted.checked)
+            new = set_for(core, wanted.checked)
         with falling_short((active or design.specification).checked.path):
-            before = own_set(made) if active is None else set_for(made, active.checked)
+            before = own_set(core) if active is None else set_for(core, active.checked)
         progress("swap", 0, 0)
-        swap = check_swap(made, None if reset else before, new)
-        return cls(design, wanted, reload_json(made, swap, version), swap)
+        swap = check_swap(core, None if reset else before, new)
+        return cls(design, wanted, reload_json(core, swap, version), swap)
 
     @property
     def table(self) -> Table:
         """The error bound of the new set, and the transient of the swap."""
-        made, swap, tree = self.design.core, self._swap, self.writes
-        output, quantized, allowed = made.datapath.output, swap.made.quantized, self.wanted.checked.max_error
-        unit, rate = f" {output.unit}".rstrip(), float(made.spec.sample_rate)
+        core, swap, tree = self.design.core, self._swap, self.writes
+        output, quantized, allowed = core.datapath.output, swap.new_set.quantized, self.wanted.checked.max_error
+        unit, rate = f" {output.unit}".rstrip(), float(core.spec.sample_rate)
         bound = quantized.bound * output.lsb
         rows: list[Sequence[str]] = []
         if quantized.filter is not None:
@@ -72,15 +72,15 @@ class Reload(View):
         rows.append(("headroom", f"{float(allowed - bound):.3g}{unit}, {float(100 * (1 - bound / allowed)):.1f} %"))
         fades = f"{swap.samples:,} samples, {swap.samples / rate:.3g} s, until the bound holds again"
         rows.append(("transient", fades if swap.samples else "none, the bound holds from the first sample"))
-        if made.architecture.restarts:
-            settling = made.quantized.settling
+        if core.architecture.restarts:
+            settling = core.quantized.settling
             flagged = f"from zero; it flags {settling:,} samples as settling, {settling / rate:.3g} s"
             rows.append(("the core restarts", flagged if settling else "in the steady state of its next sample"))
         rows.append(("states", f"use at most {100 * float(swap.use):.3g} % of their range"))
         crc = tree["writes"][-1][1]
         rows.append(("load", f"version {tree['version']}, {tree['words']:,} words, CRC 0x{crc:08X}"))
         rows.append(("for the design", f"0x{tree['design']:08X}"))
-        return Table(f"{made.spec.name}: the set may be loaded", rows)
+        return Table(f"{core.spec.name}: the set may be loaded", rows)
 
     def tables(self) -> list[Table]:
         """Return `table` alone."""

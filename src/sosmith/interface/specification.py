@@ -24,6 +24,7 @@ from sosmith.gen.specification.combinations import Combination, combinations
 from sosmith.gen.specification.exact_values import exact
 from sosmith.gen.specification.specification import Specification as Checked
 from sosmith.gen.specification.specification import example, from_text, from_tree, load
+from sosmith.interface.inputs import path_of, real_numbers
 from sosmith.interface.quantity import Quantity
 from sosmith.model.errors import SpecificationError
 
@@ -85,7 +86,7 @@ class Specification(View):
         """
         if isinstance(source, Mapping):
             return cls(from_tree(exact(source), _UNNAMED))
-        return cls(load(Path(fspath(source))))
+        return cls(load(Path(path_of(source, "the specification must be a path, a dict or a Specification"))))
 
     @classmethod
     def from_toml(cls, text: str, path: str | PathLike[str] = _UNNAMED) -> Specification:
@@ -201,7 +202,7 @@ class Specification(View):
                 "sample_rate": _float(sample_rate, "sample_rate"),
                 "channels": channels,
                 "input": {"x": _format(input_bits, input_range)},
-                "filter": {"sos": sos},
+                "filter": {"sos": real_numbers(sos, "sos")},
                 "output": _format(output_bits or input_bits, output_range or input_range)
                 | {"unit": unit, "max_error": max_error},
                 "hardware": {"realization": realization, "architecture": architecture, "clock": _float(clock, "clock")},
@@ -391,14 +392,15 @@ def specification_of(source: Specification | str | PathLike[str] | Mapping[str, 
 def _float(value: float, name: str) -> float:
     try:
         return float(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise SpecificationError(f"{name} must be a number of Hz, not {value!r}") from None
 
 
 def _format(bits: int, ends: Sequence[float]) -> dict[str, Any]:
-    if len(ends) != 2:
-        raise SpecificationError(f"a range must be two numbers, (low, high), not {len(ends)}")
-    low, high = map(float, ends)
+    try:
+        low, high = map(float, ends)
+    except (TypeError, ValueError, OverflowError):
+        raise SpecificationError(f"a range must be two numbers, (low, high), not {ends!r}") from None
     return {"bits": bits, "range": [low, high], "signed": low == -high}
 
 

@@ -19,7 +19,7 @@ from sosmith.model.traces.wav_file import check_rate, is_wav, wav_bytes
 
 @dataclass(frozen=True, eq=False)
 class Streamed:
-    """What a board made of a trace.
+    """What a board computed from a trace.
 
     Attributes
     ----------

@@ -67,56 +67,56 @@ def preview(tell: Tell, *, text: str, path: str) -> dict[str, Any]:
 
 def prove(tell: Tell, *, text: str, path: str) -> dict[str, Any]:
     """Design the core of a specification and prove its error; return what the page shows of it."""
-    made = _designed(tell, text, path)
-    manifest = made.manifest
-    ideal = made.specification.filter
+    design = _designed(tell, text, path)
+    manifest = design.manifest
+    ideal = design.specification.filter
     f = ideal.frequencies(POINTS)
-    gain = abs(made.frequency_response(f))
+    gain = abs(design.frequency_response(f))
     lsb = float(manifest["streams"]["m_axis"]["fields"][0]["lsb"])
     return {
-        "bound": float(made.bound),
-        "allowed": float(made.specification.max_error),
-        "unit": made.bound.unit,
+        "bound": float(design.bound),
+        "allowed": float(design.specification.max_error),
+        "unit": design.bound.unit,
         "lsb": lsb,
-        "budget": [[part, float(value)] for part, value in made.budget.items()],
-        "realization": made.realization,
-        "architecture": made.architecture,
-        "reasons": made.reasons,
-        "latency": made.latency_cycles,
-        "cycles": made.core.architecture.clocks_per_sample,
-        "clock": made.specification.as_dict().get("hardware", {}).get("clock"),
-        "cost": _cost(made),
+        "budget": [[part, float(value)] for part, value in design.budget.items()],
+        "realization": design.realization,
+        "architecture": design.architecture,
+        "reasons": design.reasons,
+        "latency": design.latency_cycles,
+        "cycles": design.core.architecture.clocks_per_sample,
+        "clock": design.specification.as_dict().get("hardware", {}).get("clock"),
+        "cost": _cost(design),
         "db": _numbers(_decibels(gain / max(float(abs(ideal.frequency_response(f)).max()), 1e-12))),
         "f": _numbers(f),
         "limit_cycles": [
-            [found["section"], found["largest"] / lsb, found["dead_band"] / lsb] for found in manifest["limit_cycles"]
+            [each["section"], each["largest"] / lsb, each["dead_band"] / lsb] for each in manifest["limit_cycles"]
         ],
         "sections": [
             [section.name, [[name, c.integer, c.fraction_bits] for name, c in section.coefficients.items()]]
-            for section in made.sections
+            for section in design.sections
         ],
-        "scenarios": made.scenarios,
+        "scenarios": design.scenarios,
     }
 
 
 def side_by_side(tell: Tell, *, text: str, path: str) -> list[dict[str, Any]]:
-    """Design every realization of a specification; each row is told as a part as soon as it is there."""
+    """Design every realization of a specification; each row is sent as a part as soon as it is there."""
     spec = _specification(text, path)
     rows = []
     for name in spec.realizations:
         tell("step", name)
         try:
-            made = sosmith.design(spec, realization=name)
+            design = sosmith.design(spec, realization=name)
         except (sosmith.ShortfallError, sosmith.SpecificationError) as error:  # look-ahead chooses for itself
             row: dict[str, Any] = {"realization": name, "refused": str(error).removeprefix(f"{path}: ")}
         else:
             row = {
                 "realization": name,
-                "architecture": made.architecture,
-                "bound": float(made.bound),
-                "cycles": made.core.architecture.clocks_per_sample,
-                "latency": made.latency_cycles,
-                "cost": _cost(made),
+                "architecture": design.architecture,
+                "bound": float(design.bound),
+                "cycles": design.core.architecture.clocks_per_sample,
+                "latency": design.latency_cycles,
+                "cost": _cost(design),
             }
         rows.append(row)
         tell("part", row)
@@ -130,23 +130,23 @@ def _columns(values: Floats) -> list[Floats]:
 
 def trace(tell: Tell, *, text: str, path: str, source: str, seconds: float | None) -> dict[str, Any]:
     """Run the integer model of a design on a trace, and hold it against the exact result."""
-    made = _designed(tell, text, path)
+    design = _designed(tell, text, path)
     tell("step", "making the trace")
-    inputs = made.trace(source, seconds=seconds)
+    inputs = design.trace(source, seconds=seconds)
     tell("step", f"integer model, {len(inputs.time):,} samples")
-    hardware = made.run(**inputs.inputs)
+    hardware = design.run(**inputs.inputs)
     tell("step", "exact result")
-    exact = made.run_exact(**inputs.inputs)
+    exact = design.run_exact(**inputs.inputs)
     error = hardware - exact
-    decimator = made.core.datapath.decimator
-    every = 1 if decimator is None else decimator.factor  # what is told of a sample is told of those with a result
+    decimator = design.core.datapath.decimator
+    every = 1 if decimator is None else decimator.factor  # only samples with a result can be compared
     edges = np.unique(np.linspace(0, len(error), min(POINTS, len(error)) + 1).astype(int))
     truth = [None] * error[0].size if inputs.truth is None else _columns(inputs.truth[::every])
     return {
         "name": inputs.name,
         "samples": len(error),
-        "unit": made.bound.unit,
-        "bound": float(made.bound),
+        "unit": design.bound.unit,
+        "bound": float(design.bound),
         "max_error": float(abs(error).max()),
         "rms_error": float(np.sqrt(np.mean(error**2))),
         "t": _numbers(inputs.time[::every][edges[:-1]]),
@@ -165,12 +165,12 @@ def trace(tell: Tell, *, text: str, path: str, source: str, seconds: float | Non
 
 def simulate(tell: Tell, *, text: str, path: str, source: str, seconds: float | None, folder: str) -> dict[str, Any]:
     """Co-simulate a design; its report is in `folder`."""
-    made = _designed(tell, text, path)
+    design = _designed(tell, text, path)
 
     def progress(step: str, done: int, total: int) -> None:
         tell("step", f"{step}, {done:,} of {total:,}" if total else step)
 
-    report = made.simulate(source, seconds=seconds, folder=folder, progress=progress)
+    report = design.simulate(source, seconds=seconds, folder=folder, progress=progress)
     return {
         "passed": report.passed,
         "shortfalls": list(report.shortfalls),
@@ -221,22 +221,22 @@ def _tree(text: str) -> dict[str, Any]:
 def _designed(tell: Tell, text: str, path: str) -> Design:
     if text not in _proven:
         spec = _specification(text, path)
-        made = sosmith.design(spec, progress=lambda step, done, total: tell("step", step))
+        design = sosmith.design(spec, progress=lambda step, done, total: tell("step", step))
         _proven.clear()
-        _proven[text] = made
+        _proven[text] = design
     return _proven[text]
 
 
-def _cost(made: Design) -> dict[str, Any]:
+def _cost(design: Design) -> dict[str, Any]:
     """Return what the core is estimated to take on an ECP5, before synthesis."""
-    found = made.estimates[0]
+    estimate = design.estimates[0]
     return {
-        "device": found.device,
-        "luts": found.luts,
-        "flip_flops": found.flip_flops,
-        "multipliers": found.multiplier_blocks,
-        "memory": found.memory_bits,
-        "within": found.tested.nine_in_ten,
+        "device": estimate.device,
+        "luts": estimate.luts,
+        "flip_flops": estimate.flip_flops,
+        "multipliers": estimate.multiplier_blocks,
+        "memory": estimate.memory_bits,
+        "within": estimate.tested.nine_in_ten,
     }
 
 

@@ -37,7 +37,7 @@ class Lane:
     Parameters
     ----------
     lock : RLock
-        Held while news are told, and expected to be held by whoever calls: what is told is never out of date.
+        Held while news are sent, and expected to be held by the caller: what is sent is never out of date.
     """
 
     def __init__(self, lock: threading.RLock) -> None:
@@ -127,7 +127,7 @@ class _Worker:
         return cls(process, ours, process.pid)
 
     def send(self, message: tuple[int, str, dict[str, Any]]) -> None:
-        with suppress(OSError):  # it has died: whoever listens is told
+        with suppress(OSError):  # it has died, of which the listener learns
             self.connection.send(message)
 
     def receive(self) -> tuple[int, str, Any] | None:

@@ -4,10 +4,10 @@
 const LEFT = 58, RIGHT = 14, TOP = 12, BOTTOM = 34;
 
 function drawn(name, attributes, text = "") {
-  const made = document.createElementNS("http://www.w3.org/2000/svg", name);
-  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
-  if (text) made.textContent = text;
-  return made;
+  const node = document.createElementNS("http://www.w3.org/2000/svg", name);
+  for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
+  if (text) node.textContent = text;
+  return node;
 }
 
 const minus = (text) => `${text}`.replace("-", "−");
@@ -35,20 +35,20 @@ const superscript = (power) => [...`${power}`].map((each) => "⁰¹²³⁴⁵⁶
 function evenTicks(low, high, count) {
   const rough = (high - low) / count, power = 10 ** Math.floor(Math.log10(rough));
   const step = [1, 2, 5, 10].map((factor) => factor * power).find((each) => each >= rough * 0.999);
-  const found = [];
-  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) found.push(k * step);
-  return found.map((value) => [value, short(Math.abs(value) < step / 1e6 ? 0 : value, 6), true]);
+  const positions = [];
+  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) positions.push(k * step);
+  return positions.map((value) => [value, short(Math.abs(value) < step / 1e6 ? 0 : value, 6), true]);
 }
 
 function decadeTicks(low, high) {
-  const found = [];
+  const labelled = [];
   for (let power = Math.floor(Math.log10(low)); 10 ** power <= high; power++) {
     for (let k = 1; k < 10; k++) {
       const value = k * 10 ** power;
-      if (value >= low * 0.9999 && value <= high * 1.0001) found.push([value, k === 1 ? short(value) : "", k === 1]);
+      if (value >= low * 0.9999 && value <= high * 1.0001) labelled.push([value, k === 1 ? short(value) : "", k === 1]);
     }
   }
-  return found;
+  return labelled;
 }
 
 // Axes in a place of the page: returns the layer for curves, and the scales.

@@ -163,10 +163,10 @@ class Session:
 
     def _save(self, message: dict[str, Any]) -> None:
         try:
-            found = _read(self.file) if self.file.exists() else None
+            on_disk = _read(self.file) if self.file.exists() else None
         except (OSError, ValueError, SpecificationError):
-            found = ""  # it is no specification of ours: ask
-        if found not in {None, self._on_disk} and not _typed(message, "overwrite", bool, False):
+            on_disk = ""  # it is no specification of ours: ask
+        if on_disk not in {None, self._on_disk} and not _typed(message, "overwrite", bool, False):
             self._document(
                 question=f"{self.file.name} has changed on the disk since it was read. Overwrite it?"
                 if self._on_disk is not None
@@ -305,12 +305,12 @@ class Session:
 
     def _preview_news(self, last: tuple[str, int], kind: str, value: Any) -> None:
         with self._changed:
-            told = {"client": last[0], "n": last[1]}
+            request = {"client": last[0], "n": last[1]}
             if kind == "result":
-                self._tell("preview", told | {"error": None, **value})
+                self._tell("preview", request | {"error": None, **value})
             else:
                 error = value if kind == "refused" else "the preview must live until it is done, and has ended before"
-                self._tell("preview", self._state["preview"] | told | {"error": error})
+                self._tell("preview", self._state["preview"] | request | {"error": error})
             if self._text != self._previewed:
                 self._preview()
 

@@ -52,10 +52,10 @@ function say(id, text) {
 }
 
 function element(name, text = "", attributes = {}) {
-  const made = document.createElement(name);
-  made.textContent = text;
-  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
-  return made;
+  const node = document.createElement(name);
+  node.textContent = text;
+  for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
+  return node;
 }
 
 function rows(table, head, body) {
@@ -122,8 +122,8 @@ byId("controls").addEventListener("submit", (event) => event.preventDefault());
 function reform(to) {
   const { filter, spec } = known.preview, half = spec.sample_rate / 2;
   const edges = (bands) => {
-    const found = bands.flat().filter((value) => value > 0 && value < half).map((value) => rounded(value, 6));
-    return isBand() ? found : found[0];
+    const frequencies = bands.flat().filter((value) => value > 0 && value < half).map((value) => rounded(value, 6));
+    return isBand() ? frequencies : frequencies[0];
   };
   if (to === "mask") change({ "filter.passband_edge": edges(filter.passbands), "filter.stopband_edge": edges(filter.stopbands) });
   else {
@@ -158,7 +158,7 @@ function controls() {
 // ---- Handles on the gain
 
 const handles = new Map();
-let scales = null, held = null, frozen = null;
+let scales = null, dragged = null, frozen = null;
 
 function wanted() {
   if (!known.preview || !known.preview.spec) return [];
@@ -208,30 +208,30 @@ function handle(one) {
     group.setPointerCapture(event.pointerId);
     group.classList.add("held");
     frozen = scales.range;
-    held = { id: one.id, x: event.clientX, y: event.clientY, loss: null, up: false, last: null };
+    dragged = { id: one.id, x: event.clientX, y: event.clientY, loss: null, up: false, last: null };
     const now = wanted().find((each) => each.id === one.id);
-    held.loss = now.loss ? asked(now.loss) : null;
+    dragged.loss = now.loss ? asked(now.loss) : null;
   });
   group.addEventListener("pointermove", (event) => {
-    if (!held || held.id !== one.id) return;
+    if (!dragged || dragged.id !== one.id) return;
     const now = wanted().find((each) => each.id === one.id);
     if (!now) return;
-    const box = byId("gain").getBoundingClientRect(), dy = event.clientY - held.y;
-    const f = Math.abs(event.clientX - held.x) > 2 || held.last ? scales.inverse(event.clientX - box.left) : null;
-    if (Math.abs(dy) > 6) held.up = true;
+    const box = byId("gain").getBoundingClientRect(), dy = event.clientY - dragged.y;
+    const f = Math.abs(event.clientX - dragged.x) > 2 || dragged.last ? scales.inverse(event.clientX - box.left) : null;
+    if (Math.abs(dy) > 6) dragged.up = true;
     // A loss near 0 dB would be out of reach on this scale: there, up and down multiply it.
-    const db = !held.up || held.loss === null ? null : now.path.endsWith("passband_edge") ? held.loss * 10 ** (dy / 120) : -scales.level(event.clientY - box.top);
+    const db = !dragged.up || dragged.loss === null ? null : now.path.endsWith("passband_edge") ? dragged.loss * 10 ** (dy / 120) : -scales.level(event.clientY - box.top);
     const changes = settle(now, f, db);
     if (!Object.keys(changes).length) return;
-    held.last = changes;
+    dragged.last = changes;
     for (const [path, value] of Object.entries(changes)) pending[path] = { value, n: Infinity };
     move(changes);
     place();
   });
   const drop = () => {
-    if (!held || held.id !== one.id) return;
-    const last = held.last;
-    held = null;
+    if (!dragged || dragged.id !== one.id) return;
+    const last = dragged.last;
+    dragged = null;
     frozen = null;
     group.classList.remove("held");
     if (last) release(last);
@@ -291,11 +291,11 @@ function redrawn(where, to, label) {
   const former = where.querySelector("svg");
   if (!former || !where.handles) return shown(where, to, label);
   const svg = document.createElement("div");
-  const made = shown(svg, to, label);
+  const fresh = shown(svg, to, label);
   // Children are exchanged one by one, so that the handles never leave the document.
   for (const child of [...former.children]) if (child !== where.handles) child.remove();
-  former.prepend(...made.children);
-  for (const name of ["viewBox", "width", "height"]) former.setAttribute(name, made.getAttribute(name));
+  former.prepend(...fresh.children);
+  for (const name of ["viewBox", "width", "height"]) former.setAttribute(name, fresh.getAttribute(name));
   return former;
 }
 
@@ -386,17 +386,17 @@ function sizeBeside(one) {
 function verdict() {
   const { preview, proof } = known, box = byId("verdict");
   const wrong = preview && preview.error;
-  const told = (kind, state, detail) => { box.className = `verdict ${kind}`; say("state", state); say("detail", detail); };
-  if (ended) told("fail", "The studio has ended", "What was not saved is in the text below.");
-  else if (!socket || socket.readyState !== WebSocket.OPEN) told("wait", "No connection to the studio", "Trying again.");
-  else if (wrong) told("fail", "Not a filter yet", wrong);
-  else if (!proof || proof.state === "waiting") told("wait", "Changing", "The proof begins when the handle is let go.");
-  else if (proof.state === "working") told("wait", "Proving", `${proof.step}. The response is already that of the new filter.`);
-  else if (proof.state === "refused") told("fail", "No proven design", proof.error);
+  const show = (kind, state, detail) => { box.className = `verdict ${kind}`; say("state", state); say("detail", detail); };
+  if (ended) show("fail", "The studio has ended", "What was not saved is in the text below.");
+  else if (!socket || socket.readyState !== WebSocket.OPEN) show("wait", "No connection to the studio", "Trying again.");
+  else if (wrong) show("fail", "Not a filter yet", wrong);
+  else if (!proof || proof.state === "waiting") show("wait", "Changing", "The proof begins when the handle is let go.");
+  else if (proof.state === "working") show("wait", "Proving", `${proof.step}. The response is already that of the new filter.`);
+  else if (proof.state === "refused") show("fail", "No proven design", proof.error);
   else {
     const { bound, allowed, unit, realization, architecture } = proof.result;
     const kept = bound <= allowed;
-    told(kept ? "pass" : "fail", `Proven: error at most ${withUnit(short(bound), unit)}`, `For all inputs in range; ${withUnit(short(allowed), unit)} allowed. ${[realization, architecture].filter(Boolean).join(", ")}.`);
+    show(kept ? "pass" : "fail", `Proven: error at most ${withUnit(short(bound), unit)}`, `For all inputs in range; ${withUnit(short(allowed), unit)} allowed. ${[realization, architecture].filter(Boolean).join(", ")}.`);
   }
 }
 
@@ -448,13 +448,13 @@ function proven() {
 }
 
 function realizations() {
-  const { state, step: at, rows: found } = known.realizations, chosen = known.proof && known.proof.state === "proven" && known.proof.result.realization;
+  const { state, step: at, rows: designs } = known.realizations, chosen = known.proof && known.proof.state === "proven" && known.proof.result.realization;
   byId("compare").setAttribute("aria-pressed", `${state !== "off"}`);
   byId("compare").textContent = state === "off" ? "Compare realizations" : "Stop comparing";
   say("comparing", state === "working" ? `Designing ${at}.` : state === "waiting" ? "After the proof." : "");
-  byId("realizations").hidden = !found.length;
+  byId("realizations").hidden = !designs.length;
   const unit = known.preview ? known.preview.unit : "";
-  rows("realizations", [["realization", false], ["architecture", false], [withUnit("bound", unit && `in ${unit}`), true], ["clocks a sample", true], ["latency", true], ["cost, estimated", false]], found.map((one) => ({
+  rows("realizations", [["realization", false], ["architecture", false], [withUnit("bound", unit && `in ${unit}`), true], ["clocks a sample", true], ["latency", true], ["cost, estimated", false]], designs.map((one) => ({
     name: one.realization === chosen ? "taken" : "",
     cells: one.refused ? [one.realization, "–", "–", "–", "–", one.refused] : [one.realization + (one.realization === chosen ? ", taken" : ""), one.architecture, short(one.bound), one.cycles.toLocaleString("en"), one.latency.toLocaleString("en"), `${size(one.cost)}, ${counted(one.cost.multipliers, "multiplier")}`],
   })));
@@ -507,13 +507,13 @@ byId("stop").addEventListener("click", () => send({ do: "stop" }));
 byId("compare").addEventListener("click", () => send({ do: "realizations", on: known.realizations.state === "off" }));
 
 function calibrated() {
-  const found = known.calibration;
-  byId("fitted").className = found.state === "refused" ? "problem" : "";
-  if (found.state === "working") say("fitted", "Fitting.");
-  else if (found.state === "refused") say("fitted", found.error);
-  else if (found.state === "done") {
-    const [m, n] = found.orders, [low, high] = found.half_width;
-    say("fitted", `${found.measurements} measurements, orders ${m} in voltage and ${n} in temperature, adjusted r ${found.adjusted_r.toFixed(6)}. Standard error ${short(found.rms, 3)} mm rms, ${short(found.largest, 3)} mm at most; 95 % of the clearances lie within ±${short(low, 3)} to ±${short(high, 3)} mm. The coefficients are in the specification. ${found.warning}`);
+  const calibration = known.calibration;
+  byId("fitted").className = calibration.state === "refused" ? "problem" : "";
+  if (calibration.state === "working") say("fitted", "Fitting.");
+  else if (calibration.state === "refused") say("fitted", calibration.error);
+  else if (calibration.state === "done") {
+    const [m, n] = calibration.orders, [low, high] = calibration.half_width;
+    say("fitted", `${calibration.measurements} measurements, orders ${m} in voltage and ${n} in temperature, adjusted r ${calibration.adjusted_r.toFixed(6)}. Standard error ${short(calibration.rms, 3)} mm rms, ${short(calibration.largest, 3)} mm at most; 95 % of the clearances lie within ±${short(low, 3)} to ±${short(high, 3)} mm. The coefficients are in the specification. ${calibration.warning}`);
   } else say("fitted", "");
 }
 
@@ -564,9 +564,9 @@ function picture() {
 
 function take(news) {
   Object.assign(known, news);
-  const told = news.preview || news.document;
+  const answer = news.preview || news.document;
   for (const path of Object.keys(pending)) {
-    if (news.preview && (told.client !== me || told.n >= pending[path].n)) delete pending[path];
+    if (news.preview && (answer.client !== me || answer.n >= pending[path].n)) delete pending[path];
   }
   if (news.preview) {
     if (news.preview.spec) {

@@ -175,3 +175,30 @@ def test_moments() -> None:
     assert parse_moment("2024-03-01") == 19_783
     assert parse_moment("2024-03-01T12:00+01:00") == pytest.approx(19_783 + 11 / 24)
     assert moment_text(parse_moment("2024-03-01T06:30")) == "2024-03-01 06:30"
+
+
+def test_wear_is_followed_over_days_and_a_jump_is_told() -> None:
+    rows = [f"{k},{1.5 + 0.1 * k - 0.5 * (k >= 60) + 0.02 * (-1) ** k:.6g}" for k in range(66)]
+    Path("jump.csv").write_text("\n".join(["days,clearance_mm", *rows]) + "\n")
+    call = ("jump.csv", *LIMITS, "--risk", "0.05", "--day-error", "0.02")
+    shown = re.sub(r" {2,}", "  ", good(*call).stdout)
+    assert "  past the limit  with a probability of 0: not critical at a risk of 0.05" in shown
+    assert re.search(
+        r"^  told  a jump of about -0\.[45]\d* mm at day 60, seen at day 60 with a probability of 1$", shown, re.M
+    )
+    tree = json.loads(good(*call, "--json").stdout)["over_days"]
+    assert tree["clearance_mm"]["value"] == pytest.approx(7.5, abs=0.03)
+    assert [(one["what"], one["days"]) for one in tree["told"]] == [("jump", 60.0)]
+    assert tree["day_error_mm"] == 0.02
+    assert json.loads(good("jump.csv", *LIMITS, "--json").stdout)["over_days"] is None
+
+
+def test_wear_is_critical_before_the_reading_is_past_the_limit() -> None:
+    call = ("days.csv", "--initial", "1.5", "--limit", "7.95", "--risk", "0.05", "--day-error", "0.2")
+    tree = json.loads(good(*call, "--json").stdout)
+    assert (tree["state"], tree["over_days"]["critical"]) == ("good", True)
+    assert 0.05 < tree["over_days"]["probability_past_the_limit"] < 0.5
+
+
+def test_an_error_of_a_day_goes_with_a_risk() -> None:
+    refused("--day-error must go with --risk, not without it", "days.csv", *LIMITS, "--day-error", "0.1")

@@ -173,4 +173,10 @@ def test_the_clocks_stated_are_those_of_the_hardware(combination: Combination) -
 
 def early(made: Architecture) -> int:
     """Clocks from the edge that finds a sample to that which accepts it: the latency counts from the first."""
-    return made._taken_cycles if made.decimator is None else 0 if made.ahead is None else made.ahead._taken_cycles
+    return (
+        made._taken_cycles
+        if made.decimator is None
+        else 0
+        if made.calibration is None
+        else made.calibration._taken_cycles
+    )

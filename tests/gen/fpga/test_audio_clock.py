@@ -1,12 +1,15 @@
 """Clocks for an I2S: dividers of PLLs within their limits, and the rates that boards make."""
 
 import re
+from dataclasses import replace
 from fractions import Fraction
 
 import pytest
 
+import sosmith
 from sosmith.gen.fpga.audio_clock import audio_pll
 from sosmith.gen.fpga.boards import BOARDS
+from sosmith.gen.output import board_build
 from sosmith.hdl.boards.pll import Pll, pll_near
 from sosmith.model.converters.i2s_converter import I2S_CONVERTERS
 from sosmith.model.converters.i2s_frame import I2sFrame
@@ -68,3 +71,26 @@ def test_dividers_keep_to_the_limits_of_the_pll(
         assert detector[0] <= reference / pll.divider <= detector[1]
         assert abs(pll.clock / wanted - 1) < Fraction(1, 100)
         assert pll.clock == own / (pll.output * pll.scale)
+
+
+@pytest.mark.parametrize(("board", "waits"), [("ulx3s_25f", True), (None, False)])
+def test_the_link_waits_for_a_pll(board: str | None, waits: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The link of a board whose clock is its own has no reset."""
+    own = replace(BOARDS["ulx3s_25f"], clock=24_576_000)
+    given: list[bool] = []
+    monkeypatch.setattr(board_build, "core_verilog", lambda design: "")
+    monkeypatch.setattr(board_build, "board_verilog", lambda design, *, waits, **others: given.append(waits) or "")
+    board_build.texts(sosmith.design(LIVE).core, BOARDS[board] if board else own, 1_000_000, lambda step: None)
+    assert given == [waits]
+
+
+LIVE = {
+    "name": "stereo",
+    "sample_rate": 48000,
+    "channels": 2,
+    "input": {"x": {"bits": 16, "signed": True, "range": [-1.0, 1.0]}},
+    "filter": {"family": "butterworth", "kind": "lowpass", "order": 2, "cutoff": 3000.0},
+    "output": {"bits": 16, "signed": True, "range": [-1.0, 1.0]},
+    "converter": {"x": {"device": "pcm1808"}, "output": {"device": "pcm5102a"}},
+    "hardware": {"clock": 24.576e6},
+}

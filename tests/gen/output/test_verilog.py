@@ -100,7 +100,7 @@ def test_long_runs_are_loops(text: str) -> None:
 
 
 def test_the_reader_finds_the_words(text: str) -> None:
-    (held,) = (module.held for module in read_modules(text).values() if module.held)
+    (held,) = (module.contents for module in read_modules(text).values() if module.contents)
     assert [words[address] for words in held.values() for address in sorted(words)] == WORDS
 
 

@@ -111,7 +111,7 @@ def test_samples_around_a_node_far_away_are_within_the_bound(denominators: tuple
     samples = exact(denominator, max(made.places) + more + 1)
     assert max(made.places) > 64
     for place in made.places:
-        found = made.around(place, more)
+        found = made.samples_at(place, more)
         assert len(found) == made.degree + more
         for at, value in enumerate(found, start=place - made.degree + 1):
             if at < 0:

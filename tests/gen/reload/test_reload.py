@@ -200,13 +200,13 @@ def test_a_cutoff_a_fifth_away_may_be_swapped_to(example: str, ratio: str) -> No
     swap = check_swap(hardware, own_set(hardware), made)
     assert 0 < swap.use < Fraction(1, 100)
     assert 50 < swap.samples < 1000
-    assert swap.made.quantized is made.quantized
+    assert swap.new_set.quantized is made.quantized
     back = check_swap(hardware, made, own_set(hardware))
-    assert back.made.program is not None
+    assert back.new_set.program is not None
     assert hardware.architecture.program is not None
-    assert len(back.made.program.instructions) == len(hardware.architecture.program.instructions)
+    assert len(back.new_set.program.instructions) == len(hardware.architecture.program.instructions)
     if example != "audio_lowpass.toml":  # there, a value needs one digit more while states of the other set are left
-        assert back.made.program.instructions == hardware.architecture.program.instructions
+        assert back.new_set.program.instructions == hardware.architecture.program.instructions
 
 
 def test_a_program_takes_over_under_the_worst_input() -> None:
@@ -216,11 +216,11 @@ def test_a_program_takes_over_under_the_worst_input() -> None:
     made = other_set(hardware, ideal=moved(hardware, "0.5"))
     swap = check_swap(hardware, own, made)
     assert first is not None
-    assert swap.made.program is not None
+    assert swap.new_set.program is not None
     codes = worst_input(own.quantized, made.quantized, 250, 300)
     expected = compute_swapping(own.quantized.datapath, [(250, during(own.quantized, made.quantized))], codes)
-    assert interpreted(hardware, [(0, first), (250, swap.made.program)], codes) == expected
-    narrow = replace(swap.made.program, accumulator_bits=swap.made.program.accumulator_bits - 4)
+    assert interpreted(hardware, [(0, first), (250, swap.new_set.program)], codes) == expected
+    narrow = replace(swap.new_set.program, accumulator_bits=swap.new_set.program.accumulator_bits - 4)
     with pytest.raises(OverflowError):
         interpreted(hardware, [(0, first), (250, narrow)], codes)
 
@@ -272,9 +272,9 @@ def far_from(hardware: CoreDesign) -> Quantized:
 def test_writes_of_a_program() -> None:
     hardware = hardware_in("folded")
     swap = check_swap(hardware, own_set(hardware), other_set(hardware, ideal=moved(hardware, "1.2")))
-    version, *data, crc = register_writes(hardware, swap.made, 7)
+    version, *data, crc = register_writes(hardware, swap.new_set, 7)
     words, bits = bank_size(hardware.architecture)
-    made = swap.made.program
+    made = swap.new_set.program
     assert made is not None
     assert version == (VERSION, 7)
     assert data == [(DATA, encoded(instruction, made)) for instruction in made.instructions]
@@ -286,7 +286,7 @@ def test_writes_of_a_program() -> None:
     assert (tree["words"], tree["design"]) == (words, hardware.architecture.fingerprint)
     assert tree["error_bound"] < tree["error_after_transient"] <= float(hardware.spec.max_error)
     with pytest.raises(ValueError, match=r"^version must be in 0\.\.4294967295, not -1$"):
-        register_writes(hardware, swap.made, -1)
+        register_writes(hardware, swap.new_set, -1)
 
 
 def test_writes_of_the_parallel_architecture() -> None:

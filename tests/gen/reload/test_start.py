@@ -12,7 +12,7 @@ from tests.model.reload.swapping import compute_swapping
 
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.output.core_facts import core_facts
-from sosmith.gen.proof.cascade_proof import made_response
+from sosmith.gen.proof.cascade_proof import quantized_response
 from sosmith.gen.proof.linear_model import linear_models
 from sosmith.gen.reload.first_samples import check_samples, first_samples, held_codes, samples_of
 from sosmith.gen.reload.other_constants import with_constants
@@ -115,12 +115,12 @@ def test_the_error_of_a_set_counts_first_samples_of_others() -> None:
     ripple = replace(spec.filter, family="chebyshev1", order=2, passband_loss=Fraction(1))
     wanted = replace(spec.hardware, architecture="folded", start="steady", reload=True)
     made = design_core(replace(spec, filter=ripple, hardware=wanted)).quantized
-    assert made.held is not None
-    assert not made.held.is_plain
+    assert made.first_sample is not None
+    assert not made.first_sample.is_plain
     own = with_constants(made, None, None)
     assert made.filter is not None
     off = abs(
-        made_response([linear_models(section.graph) for section in made.sections]).at_zero_frequency
+        quantized_response([linear_models(section.graph) for section in made.sections]).at_zero_frequency
         - gain_at_zero(made.filter)
     )
     low, high = samples_of(made)
@@ -139,7 +139,7 @@ def test_a_gain_that_the_hardware_cannot_give_is_refused() -> None:
         ):
             starting_like(stage, Fraction(gain), held)
     made = starting_like(stage, Fraction(3, 4), FirstSample(range=stage.output, gain=5, gain_frac=3))
-    assert made.start == Start(held=FirstSample(range=stage.output, gain=6, gain_frac=3), error=Fraction(0))
+    assert made.start == Start(first_sample=FirstSample(range=stage.output, gain=6, gain_frac=3), error=Fraction(0))
 
 
 @pytest.mark.parametrize("architecture", ["parallel", "folded"])

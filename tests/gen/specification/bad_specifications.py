@@ -219,6 +219,12 @@ BAD = [
     ("name with a dollar", NAME, 'name = "a$b"', f"name must be {IDENTIFIER}, not 'a$b'"),
     ("name with a line break", NAME, 'name = "a\\nb"', f"name must be {IDENTIFIER}, not 'a\\nb'"),
     (
+        "name is a word that tools obey",
+        NAME,
+        'name = "Verilator"',
+        f"name must be {IDENTIFIER}, and no word that tools obey in comments, not 'Verilator'",
+    ),
+    (
         "name is a keyword",
         NAME,
         'name = "module"',
@@ -673,7 +679,20 @@ BAD = [
     ("cutoff above half the sample rate", CUT, "cutoff = 60.5", f"filter.cutoff must be {NYQUIST}, not 60.5"),
     ("cutoff zero", CUT, "cutoff = 0.0", f"filter.cutoff must be {NYQUIST}, not 0"),
     ("cutoff negative", CUT, "cutoff = -1e-3", f"filter.cutoff must be {NYQUIST}, not -0.001"),
-    ("cutoff of a millionth", CUT, "cutoff = 9.9e-5", f"filter.cutoff must be {MARGIN}, not 9.9e-05"),
+    (
+        "cutoff of a millionth",
+        CUT,
+        "cutoff = 9.9e-5",
+        f"filter.cutoff must be {MARGIN} without filter.decimate, not 9.9e-05",
+    ),
+    (
+        "cutoff of a millionth behind a decimator",
+        CUT,
+        "cutoff = 2.4e-5\ndecimate = 4",
+        f"filter.cutoff must be {MARGIN}, not 2.4e-05".replace(
+            "the sample_rate (0.0001 Hz)", "the sample_rate / 4 (2.5e-05 Hz)"
+        ),
+    ),
     (
         "cutoff just below half the sample rate",
         CUT,
@@ -1221,7 +1240,7 @@ BAD = [
         "syntax error",
         ORD,
         "order 7",
-        "line 17, column 7 must be valid TOML, not a syntax error: expected '=' after a key in a key/value pair",
+        "line 17 must be a key, an equals sign and a value: order = 7",
     ),
     (
         "key given twice",

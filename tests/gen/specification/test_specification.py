@@ -16,9 +16,10 @@ from hypothesis import strategies as st
 
 from sosmith.gen.specification import specification
 from sosmith.gen.specification.specification import CalibrationSpec, FilterSpec, HardwareSpec, Specification, load
-from sosmith.gen.specification.verilog_names import KEYWORDS
+from sosmith.gen.specification.verilog_names import KEYWORDS, OBEYED
 from sosmith.model.errors import SpecificationError
 from sosmith.model.port import Port
+from sosmith.verify.reader import tokens
 
 EXAMPLES = sorted((Path(__file__).parents[3] / "examples").glob("*.toml"))
 
@@ -267,6 +268,10 @@ def test_byte_order_mark_of_some_editors_is_no_syntax_error(tmp_path: Path) -> N
 def test_keywords_are_all_of_systemverilog() -> None:
     # IEEE 1800-2017, Annex B lists 248.
     assert len(KEYWORDS) == 248
+
+
+def test_what_the_verifier_takes_for_an_order_is_no_name() -> None:
+    assert tokens._OBEYED.pattern == rf"\b(?:{OBEYED.pattern})\b|/\*|\*/"
 
 
 # Whatever is written, a specification is either good or refused by a SpecificationError of one line.

@@ -77,8 +77,8 @@ def test_the_worst_inputs_reach_the_ranges_of_all_states(inputs: Port) -> None:
 def test_a_gain_that_is_not_1_is_rounded_within_a_share_of_the_error(inputs: Port) -> None:
     output = OUT if inputs is SIGNED else replace(CURRENT, name="y")
     made = plain(ripple(), inputs=inputs, output=output, steady=True)
-    assert made.held is not None
-    gain = made.held.gain * 2.0**-made.held.gain_frac
+    assert made.first_sample is not None
+    gain = made.first_sample.gain * 2.0**-made.first_sample.gain_frac
     assert gain == pytest.approx(10 ** (-1 / 20), abs=2e-5)
     assert 0 < made.budget[START] < Fraction(1, 16)
     rng = np.random.default_rng(4)
@@ -141,6 +141,6 @@ def test_another_realization_keeps_the_start() -> None:
     made = steady_design("audio_lowpass.toml").quantized
     other = with_realization(made, "df1_ef1")
     assert [stage.name for stage in other.datapath.stages] == [stage.name for stage in made.datapath.stages]
-    assert other.held == made.held
+    assert other.first_sample == made.first_sample
     codes = np.random.default_rng(7).integers(-32768, 32768, (200, 1))
     assert error(other, codes) <= float(other.bound)

@@ -19,20 +19,21 @@ from sosmith.hdl.bus.command_engine import WINDOW, CommandEngine, Face
 from sosmith.model.errors import SpecificationError
 from sosmith.model.link.device import Device
 from sosmith.model.link.frames import Message, Receiver
+from sosmith.model.link.identity import Identity
 from sosmith.model.link.integer_core import IntegerCore
 from sosmith.model.link.protocol import Counter, Status, Type
 from sosmith.model.reload.registers import DATA, DESIGN, ID, MAGIC, STATUS, VERSION
 
 CLOCK, RATE = Fraction(12_000_000), 3_000_000
 RATIO = CLOCK / RATE
-SILENCE = 6_000
+SILENCE = 9_000
 """Clocks without a byte after which no response is expected any more; the longest request takes less."""
 SPEC = {
     "name": "three",
-    "sample_rate": 1000,
+    "sample_rate": 32_000,
     "channels": 3,
     "input": {"x": {"bits": 12, "range": [-1.0, 1.0], "signed": True}},
-    "filter": {"family": "butterworth", "kind": "lowpass", "order": 1, "cutoff": 100.0},
+    "filter": {"family": "butterworth", "kind": "lowpass", "order": 1, "cutoff": 3200.0},
     "output": {"bits": 12, "range": [-1.0, 1.0], "signed": True},
     "hardware": {"realization": "df1_ef1", "architecture": "parallel", "clock": 12e6, "reload": True},
 }
@@ -110,6 +111,22 @@ def test_samples_of_all_channels_give_the_results_of_the_model(board: Both) -> N
             board.ask(Type.SAMPLES, bytes([channel]) + rng.randbytes(2 * count))
 
 
+def test_packed_results_of_all_channels_are_those_of_the_model(board: Both) -> None:
+    """A rate of 96,000 results a second that 3 Mbaud carry only so."""
+    board.open()
+    packing = Identity.of_memory(board.model._identity.memory).packing
+    assert packing is not None
+    assert (packing.bits, packing.per_message(2)) == (19, 101)
+    rng = random.Random(4)
+    for count in (0, 1, 2, 3, 8, 101, 5):
+        body = bytes([count % 3]) + rng.randbytes(2 * count)
+        assert len(board.ask(Type.SAMPLES_PACKED, body)) == -(-19 * count // 8) + 1
+    assert board.ask(Type.SAMPLES_PACKED, b"\1\2\3\4")[3:] == bytes([Status.LENGTH])
+    assert board.ask(Type.SAMPLES_PACKED, b"\0" + bytes(204)) == bytes([Status.LENGTH])
+    assert board.ask(Type.SAMPLES_PACKED) == bytes([Status.LENGTH])
+    assert board.ask(Type.SAMPLES_PACKED, b"\3\0\0") == bytes([Status.CHANNEL])
+
+
 def test_a_session_clears_the_states(board: Both) -> None:
     board.open()
     step = b"\0\0" + b"\xff\x07" * 29
@@ -121,7 +138,7 @@ def test_a_session_clears_the_states(board: Both) -> None:
 
 def test_what_cannot_be_carried_out_is_told(board: Both) -> None:
     board.open()
-    for kind in (0, Type.POLL, 8, 0x7F, 0x81, 0xFF):
+    for kind in (0, Type.POLL, 8, Type.POLL_PACKED, 0x7F, 0x81, 0xFF):
         assert board.ask(kind, b"\0") == bytes([Status.UNKNOWN])
     for kind, body in ((Type.IDENTITY, b""), (Type.IDENTITY, b"\0\0"), (Type.COUNTERS, b"\0"), (Type.SAMPLES, b"")):
         assert board.ask(kind, body) == bytes([Status.LENGTH])
@@ -256,7 +273,7 @@ def test_a_core_without_registers_knows_no_requests_for_them(tmp_path: Path) -> 
     with Line(program, float(RATIO)) as line:
         both = Both(line, design)
         both.open()
-        for kind in (Type.READ, Type.WRITE):
+        for kind in (Type.READ, Type.WRITE, Type.SAMPLES_PACKED):
             assert both.ask(kind, b"\0") == bytes([Status.UNKNOWN])
         assert both.ask(Type.SAMPLES, b"\1\2\3") == bytes([Status.CHANNEL])
         both.ask(Type.SAMPLES, b"\0" + bytes(2 * 80))

@@ -23,11 +23,14 @@ ARCHITECTURES = ("parallel", "folded", "serial")
 def made_in(name: str, before: str = "", *, hold: bool = False) -> Architecture:
     """Return the small instrument, with measurements of its calibration, which may have another architecture."""
     made = small(f"[hardware]\narchitecture = '{name}'\n").architecture
-    other = small(f"[hardware]\narchitecture = '{before or name}'\n").architecture.ahead
+    other = small(f"[hardware]\narchitecture = '{before or name}'\n").architecture.calibration
     assert other is not None
     ahead = replace(other, datapath=replace(other.datapath, calibrated=LIMITS))
     return replace(
-        made, datapath=replace(made.datapath, calibrated=LIMITS, ahead=ahead.datapath), ahead=ahead, hold=hold
+        made,
+        datapath=replace(made.datapath, calibrated=LIMITS, ahead=ahead.datapath),
+        calibration=ahead,
+        hold=hold,
     )
 
 
@@ -110,7 +113,7 @@ BROKEN = [
     ("the first sample twice", "self.s_axis_tvalid & (first | flows)", "self.s_axis_tvalid"),
     ("the first sample lost", "filled | (flows &", "filled | first | (flows &"),
     ("never filled", "fills.eq(0), filled.eq(1)", "fills.eq(0), filled.eq(0)"),
-    ("no calibration's flags", "decimator.i_flags.eq(ahead.m_axis_tuser)", "decimator.i_flags.eq(0)"),
+    ("no calibration's flags", "decimator.i_flags.eq(calibration.m_axis_tuser)", "decimator.i_flags.eq(0)"),
 ]
 
 

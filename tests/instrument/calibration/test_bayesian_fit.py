@@ -8,10 +8,11 @@ import pytest
 from tests.instrument.calibration.bayesian import FIRST, RANGES, TRUE, TYPE, fitted, measured
 
 from sosmith.gen.calibration.fit import Measurements
-from sosmith.instrument.calibration.bayesian_fit import bayesian_fit, lowest_slope, stays_within
+from sosmith.instrument.calibration.bayesian_fit import bayesian_fit
 from sosmith.instrument.calibration.coefficient_covariance import columns, of_bayes
 from sosmith.instrument.calibration.covered_region import CoveredRegion
 from sosmith.instrument.calibration.fit_quality import assess_posterior
+from sosmith.instrument.calibration.mixed_effects.day_polynomial import extremes, lowest_slope, stays_within
 from sosmith.instrument.calibration.rails import rails_of
 from sosmith.instrument.calibration.uncertainty import of_posterior
 from sosmith.model.errors import SpecificationError
@@ -102,12 +103,34 @@ def test_too_many_outliers_are_refused() -> None:
 
 
 def test_a_days_curve_that_leaves_the_range_falls_back_to_the_posterior() -> None:
-    rows = measured(8, 60, scatter=0.05, systematic=0.2)
-    assert not fitted(rows).plain
-    narrow = ((0.0, 11.0), *RANGES[1:])
-    made = bayesian_fit(rows, TYPE, FIRST + 7, narrow)
-    assert made.plain
-    assert made.fit.polynomial == TYPE.polynomial(made.posterior.deviations)
+    rows = measured(8, 60, scatter=0.05, systematic=0.2, seed=2)
+    made = fitted(rows)
+    assert not made.plain
+    plain = TYPE.polynomial(made.posterior.deviations)
+    (_, own), (_, most) = extremes(made.fit.polynomial, RANGES), extremes(plain, RANGES)
+    between = ((0.0, float(own + most) / 2), *RANGES[1:])
+    assert most < own
+    narrow = bayesian_fit(rows, TYPE, FIRST + 7, between)
+    assert narrow.plain
+    assert narrow.fit.polynomial == plain
+
+
+def test_a_sensor_that_leaves_the_range_anyway_keeps_its_days_curve() -> None:
+    rows = measured(8, 60, scatter=0.05, systematic=0.2, seed=2)
+    own = fitted(rows).fit.polynomial
+    made = bayesian_fit(rows, TYPE, FIRST + 7, ((0.0, 11.3), *RANGES[1:]))
+    assert (made.plain, made.fit.polynomial) == (False, own)
+
+
+def test_a_day_is_followed_by_as_high_an_order_as_it_needs() -> None:
+    rows = measured(3, 60, scatter=0.05, systematic=0.2)
+    kind = replace(TYPE, order=6)
+    low, high = (bayesian_fit(rows, one, FIRST + 2, RANGES) for one in (TYPE, kind))
+    assert (low.fit.orders, high.fit.orders) == ((2, 1), (6, 1))
+    V, T = rows.voltage[-60:], rows.temperature[-60:]
+    off = [float(np.std(one.fit.polynomial(V, T) - one.posterior.curve(V, T))) for one in (low, high)]
+    assert off[1] < 0.2 * off[0]
+    assert bayesian_fit(rows, kind, FIRST + 3, RANGES).fit.orders == (2, 1)
 
 
 @pytest.mark.parametrize(
@@ -120,6 +143,34 @@ def test_the_range_is_exact_at_ends_and_turns(polynomial: Polynomial | list[list
     V, T = np.meshgrid(np.linspace(0, 10, 201), [0.0, 128.0])
     values = made(V, T)
     assert bool(np.all((values >= 0) & (values <= 16))) == inside
+
+
+def test_high_orders_are_enclosed_over_the_ports_and_along_the_edges() -> None:
+    generator = np.random.default_rng(4)
+    grid = np.linspace(0.0, 10.0, 401)
+    region = CoveredRegion(((1.0, 20.0), (8.0, 25.0), (9.0, 90.0), (2.0, 80.0)))
+    for order in (3, 6, 8):
+        rows = [
+            [float(generator.normal() / 5.0**i), float(generator.normal() / 5.0**i / 100)] for i in range(order + 1)
+        ]
+        polynomial = Polynomial.from_numbers(rows)
+        values = np.array([polynomial(grid, T) for T in RANGES[2]])
+        low, high = map(float, extremes(polynomial, RANGES))
+        assert low <= values.min() + 1e-12
+        assert values.max() - 1e-12 <= high
+        assert high - low < 1.005 * np.ptp(values)
+        V, T = region.points()
+        slopes = (polynomial(V + 1e-5, T) - polynomial(V - 1e-5, T)) / 2e-5
+        lowest = float(lowest_slope(polynomial, region))
+        assert lowest <= slopes.min() + 1e-6
+        assert slopes.min() - lowest < 0.1 * np.ptp(slopes)
+
+
+def test_a_polynomial_that_turns_often_is_enclosed_closely() -> None:
+    turning = np.polynomial.Chebyshev([0.0] * 8 + [1.0], domain=[0.0, 10.0]).convert(kind=np.polynomial.Polynomial)
+    low, high = extremes(Polynomial.from_numbers([[c] for c in turning.coef.tolist()]), RANGES)
+    assert -1.2 < low <= -1.0
+    assert 1.0 <= high < 1.1
 
 
 def test_the_lowest_slope_is_at_a_corner() -> None:

@@ -21,8 +21,9 @@ from tests.instrument.calibration.old_stores import older
 from sosmith.gen.calibration.fit import fit, read_measurements
 from sosmith.instrument.calibration.calibration_report import measurements_csv
 from sosmith.instrument.calibration.measurement_store import MeasurementStore, Withdrawal, open_store
-from sosmith.instrument.calibration.self_updating import add, calibration_of, find_version, refit, withdraw
+from sosmith.instrument.calibration.self_updating import add, calibration_of, find_version, refit
 from sosmith.instrument.calibration.sensor_type import SENSOR_TYPES
+from sosmith.instrument.calibration.store.withdrawing import withdraw
 from sosmith.model.errors import ShortfallError, SpecificationError, ToolError
 from sosmith.model.polynomial import EQUATION_5A, Polynomial
 from sosmith.verify.specified.calibration_fit import check_fit

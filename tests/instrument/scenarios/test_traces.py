@@ -55,11 +55,11 @@ def test_traces_of_a_file_are_its_first_samples_and_told_by_its_content(tmp_path
     (trace,) = traces(made.core, 1, 0.1)
     assert np.array_equal(trace.codes, whole.coded[0].codes[:100])
     assert traces.least(made.core.spec, None) == 1
-    assert ChosenTraces().told() == []
-    assert ChosenTraces("noise").told() == ["noise"]
-    before = traces.told()
+    assert ChosenTraces().identity() == []
+    assert ChosenTraces("noise").identity() == ["noise"]
+    before = traces.identity()
     path.write_bytes(path.read_bytes()[:-1] + b"\x01")
-    assert len({*before, *traces.told()}) == 2
+    assert len({*before, *traces.identity()}) == 2
     with pytest.raises(SpecificationError, match=r"^scenario for a plain filter must be one of .*, not 'noises'"):
         ChosenTraces("noises").check(made.core.spec, None)
     with pytest.raises(

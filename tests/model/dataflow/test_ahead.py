@@ -37,7 +37,7 @@ def calibration() -> Datapath:
 def instrument(**changes: Any) -> Datapath:
     """Return the decimated low-pass filter with the polynomial before it."""
     ahead = calibration()
-    given: dict[str, Any] = {"inputs": (V, T), "calibrated": LIMITS, "ahead": ahead}
+    given: dict[str, Any] = {"inputs": (V, T), "calibrated": LIMITS, "calibration": ahead}
     return replace(decimated(), **given | changes)
 
 
@@ -61,17 +61,17 @@ def flagged() -> tuple[np.ndarray, list[int]]:
 
 def test_results_are_those_of_its_parts() -> None:
     datapath = instrument()
-    assert datapath.ahead is not None
+    assert datapath.calibration is not None
     assert datapath.decimator is not None
     codes = codes_for(1001)
-    column = datapath.ahead.compute(codes)
+    column = datapath.calibration.compute(codes)
     assert (column.min(), column.max()) != (0, 0)
     entering = datapath.decimator.compute(column)[:, np.newaxis]
     found = datapath.behind_decimator.compute(entering)
     assert datapath.compute(codes).tolist() == found.tolist() == datapath.compute_exact(codes)
     both = np.stack([codes, codes[::-1]], axis=1)
     assert datapath.compute(both)[:, 1].tolist() == datapath.compute(codes[::-1]).tolist()
-    assert datapath.decimated_range == datapath.ahead.result_range
+    assert datapath.decimated_range == datapath.calibration.result_range
     assert decimated().decimated_range == (INPUT.lowest, INPUT.highest)
 
 
@@ -133,32 +133,32 @@ def test_the_c_model_judges_the_wear_of_each_channel(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [
-        ({"decimator": None}, "ahead must be left out where there is no decimator"),
+        ({"decimator": None}, "calibration must be left out where there is no decimator"),
         (
-            {"ahead": replace(calibration(), output=replace(INPUT, name="other"))},
-            f"ahead must give what the decimator takes, {INPUT}, not {replace(INPUT, name='other')}",
+            {"calibration": replace(calibration(), output=replace(INPUT, name="other"))},
+            f"calibration must give what the decimator takes, {INPUT}, not {replace(INPUT, name='other')}",
         ),
         (
             {"inputs": (T, V)},
-            f"ahead must take the inputs, {((T, V), LIMITS)}, not {((V, T), LIMITS)}",
+            f"calibration must take the inputs, {((T, V), LIMITS)}, not {((V, T), LIMITS)}",
         ),
         (
             {"calibrated": ()},
-            f"ahead must take the inputs, {((V, T), ((0, 255), (-32, 31)))}, not {((V, T), LIMITS)}",
+            f"calibration must take the inputs, {((V, T), ((0, 255), (-32, 31)))}, not {((V, T), LIMITS)}",
         ),
         (
-            {"ahead": replace(decimated(), decimator=None), "inputs": (INPUT,), "calibrated": ()},
-            "ahead must be without memory, which one sample alone fills, and without a decimator",
+            {"calibration": replace(decimated(), decimator=None), "inputs": (INPUT,), "calibrated": ()},
+            "calibration must be without memory, which one sample alone fills, and without a decimator",
         ),
         (
-            {"ahead": decimated(), "inputs": (INPUT,), "calibrated": ()},
-            "ahead must be without memory, which one sample alone fills, and without a decimator",
+            {"calibration": decimated(), "inputs": (INPUT,), "calibrated": ()},
+            "calibration must be without memory, which one sample alone fills, and without a decimator",
         ),
-        ({"ahead": None}, f"inputs must be what the decimator takes, {INPUT}, not {(V, T)}"),
+        ({"calibration": None}, f"inputs must be what the decimator takes, {INPUT}, not {(V, T)}"),
     ],
 )
 def test_refusals(changes: dict[str, Any], sentence: str) -> None:
-    if "ahead" in changes and changes["ahead"] is not None and "inputs" in changes:
-        changes["ahead"] = replace(changes["ahead"], output=INPUT)
+    if "calibration" in changes and changes["calibration"] is not None and "inputs" in changes:
+        changes["calibration"] = replace(changes["calibration"], output=INPUT)
     with pytest.raises(ValueError, match=f"^{re.escape(sentence)}$"):
         instrument(**changes)

@@ -160,3 +160,18 @@ def test_arbitrary_bytes_never_wedge_the_board(parts: list[bytes]) -> None:
 def test_the_window_is_one_of_a_few() -> None:
     with pytest.raises(ValueError, match=r"^window must be one of 2, 4, 8, 16, not 3$"):
         device(filter_design(), 3)
+
+
+def test_packed_results_are_the_same_results() -> None:
+    plain = device(filter_design())
+    identity = plain._identity.model_copy(update={"packed": (0, 2)})
+    packing = identity.packing
+    assert packing is not None
+    board = Device(identity, plain._core)
+    samples = bytes(range(80))
+    _, response = ask(plain, OPEN, Message(Type.SAMPLES, 1, b"\0" + samples))
+    _, packed = ask(board, OPEN, Message(Type.SAMPLES_PACKED, 1, b"\0" + samples))
+    assert packing.plain(packed.body[:-1]) == response.body[:-1]
+    assert len(packed.body) < len(response.body)
+    _, refused = ask(plain, OPEN, Message(Type.SAMPLES_PACKED, 1, b"\0" + samples))
+    assert refused.body == bytes([Status.UNKNOWN])

@@ -84,6 +84,8 @@ REFUSED = [
     ({"inputs": [["x", 8, False, 0.0, 1.0, "V"]] * 2}, "text: Names of inputs should differ"),
     ({"source": "converter", "flags": {}}, "text: Flags of a device with converters should have fault"),
     ({"inputs": []}, "inputs: Tuple should have at least 1 item after validation, not 0"),
+    ({"packed": [2, 0]}, "text: Packed flags should be bits of flags, in increasing order"),
+    ({"packed": [7]}, "text: Packed flags should be bits of flags, in increasing order"),
     ({"reload": {"design": -1, "words": 1}}, "reload.design: Input should be greater than or equal to 0"),
 ]
 
@@ -161,6 +163,38 @@ def test_no_board_is_made_with_an_identity_that_a_host_refuses() -> None:
     expected = "a board must have an identity as in docs/protocol.md, not: sample_rate: Input should be greater than or"
     with pytest.raises(SpecificationError, match=expected):
         identity(made, "", baud=1, clock=1.0)
+
+
+@pytest.mark.parametrize(
+    ("rate", "channels", "baud", "packed"),
+    [
+        pytest.param(1000, 2, 3_000_000, None, id="plain ones fit"),
+        pytest.param(48_000, 2, 3_000_000, (0, 2), id="only packed ones fit"),
+        pytest.param(48_000, 3, 3_000_000, None, id="neither fit"),
+        pytest.param(48_000, 2, 6_000_000, None, id="a faster line"),
+    ],
+)
+def test_results_are_packed_where_the_line_carries_them_only_so(
+    rate: int, channels: int, baud: int, packed: tuple[int, ...] | None
+) -> None:
+    narrow = {"bits": 16, "range": [-1.0, 1.0], "signed": True}
+    made = sosmith.design(
+        SLOW
+        | {"sample_rate": rate, "channels": channels, "input": {"x": narrow}, "output": narrow}
+        | {"filter": {"family": "butterworth", "kind": "lowpass", "order": 1, "cutoff": 100.0}}
+    ).core
+    found = identity(made, "", baud=baud, clock=25e6)
+    assert found.packed == packed
+    assert (b'"packed"' in found.memory) is (packed is not None)
+
+
+def test_all_flags_of_a_core_with_registers_are_packed() -> None:
+    narrow = {"bits": 16, "range": [-1.0, 1.0], "signed": True}
+    spec = SLOW | {"sample_rate": 96_000, "input": {"x": narrow}, "output": narrow, "hardware": {"reload": True}}
+    spec["filter"] = {"family": "butterworth", "kind": "lowpass", "order": 1, "cutoff": 100.0}
+    assert identity(sosmith.design(spec).core, "", baud=3_000_000, clock=25e6).packed is None
+    narrow["bits"] = 12
+    assert identity(sosmith.design(spec).core, "", baud=3_000_000, clock=25e6).packed == tuple(range(7))
 
 
 SLOW = {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -160,4 +161,20 @@ def test_a_file_that_cannot_be_read(tmp_path: Path) -> None:
     path = tmp_path / "none.csv"
     message = f"{path} must be a readable CSV file (no such file or directory)"
     with pytest.raises(SpecificationError, match=f"^{re.escape(message)}$"):
+        read(path)
+
+
+@pytest.mark.parametrize("cut", [round, math.floor])
+def test_times_are_rounded_to_their_last_digit(cut: Callable[[float], int], tmp_path: Path) -> None:
+    """Microseconds at 48 kHz: 20 or 21 of them a sample."""
+    path = write(tmp_path / "t.csv", "time_s,a_mm", lambda k: f"{cut(k * 1e6 / 48000) / 1e6:.6f},1", 2401)
+    assert read(path).sample_rate == pytest.approx(48000, rel=1e-6)
+
+
+def test_a_gap_among_rounded_times_is_told(tmp_path: Path) -> None:
+    path = write(
+        tmp_path / "t.csv", "time_s,a_mm", lambda k: f"{round((k + (k > 70)) * 1e6 / 48000) / 1e6:.6f},1", 2000
+    )
+    message = "line 73: time_s must be .* s after the previous row, like most rows, not 4.2e-05 s"
+    with pytest.raises(SpecificationError, match=message):
         read(path)

@@ -231,7 +231,7 @@ def worst_cases(made: CoreDesign) -> Iterator[np.ndarray]:
 def test_random_designs(number: int, tmp_path: Path) -> None:
     """No input exceeds the bound, no result differs, and the other method proves the same."""
     made = design_core(Specification.load(random_tree(number)).checked)
-    assert made.datapath.ahead is not None
+    assert made.datapath.calibration is not None
     bound = float(made.quantized.bound)
     for codes in worst_cases(made):
         assert worst_error(made, codes) <= bound

@@ -130,14 +130,18 @@ def test_digits_that_are_wrong_are_rejected() -> None:
 BROKEN = [
     ("a first sample twice", "(first | flows))", "(first | flows | filled))"),
     ("a first sample that is not accepted", "self.s_axis_tready.eq(filled |", "self.s_axis_tready.eq("),
-    ("a calibration that is not asked", "(flows & ahead.s_axis_tready)", "flows"),
-    ("filled before it is", "fills & ahead.m_axis_tvalid & decimator.i_ready", "fills & ahead.m_axis_tvalid"),
-    ("a result that gets lost", "ahead.m_axis_tready.eq(decimator.i_ready)", "ahead.m_axis_tready.eq(1)"),
+    ("a calibration that is not asked", "(flows & calibration.s_axis_tready)", "flows"),
+    (
+        "filled before it is",
+        "fills & calibration.m_axis_tvalid & decimator.i_ready",
+        "fills & calibration.m_axis_tvalid",
+    ),
+    ("a result that gets lost", "calibration.m_axis_tready.eq(decimator.i_ready)", "calibration.m_axis_tready.eq(1)"),
     ("flags of one sample", "found.eq(found | self.i_flags)", "found.eq(self.i_flags)"),
     ("flags of the last sample", "self.o_flags.eq(found | self.i_flags), found.eq(0)", "self.o_flags.eq(found)"),
-    ("flags the wrong way round", "i_flags.eq(ahead.m_axis_tuser)", "i_flags.eq(ahead.m_axis_tuser[::-1])"),
-    ("a reset that is not passed on", "ahead.aresetn.eq(self.aresetn)", "ahead.aresetn.eq(1)"),
-    ("samples that are late", "ahead.s_axis_tdata.eq(self.s_axis_tdata)", "ahead.s_axis_tdata.eq(0)"),
+    ("flags the wrong way round", "i_flags.eq(calibration.m_axis_tuser)", "i_flags.eq(calibration.m_axis_tuser[::-1])"),
+    ("a reset that is not passed on", "calibration.aresetn.eq(self.aresetn)", "calibration.aresetn.eq(1)"),
+    ("samples that are late", "calibration.s_axis_tdata.eq(self.s_axis_tdata)", "calibration.s_axis_tdata.eq(0)"),
 ]
 
 

@@ -52,11 +52,11 @@ def test_every_edit_is_rejected(case: Case) -> None:
 
 BROKEN = [
     ("a comb of another delay", "difference.eq(value - before), before.eq(value)", "difference.eq(value - before)"),
-    ("a rounding down", "(value + (1 << made.dropped >> 1)) >>", "value >>"),
-    ("a first sample that counts once", "filled == made.stages - 1", "filled == 0"),
+    ("a rounding down", "(value + (1 << cic.dropped >> 1)) >>", "value >>"),
+    ("a first sample that counts once", "filled == cic.stages - 1", "filled == 0"),
     ("a result that is not waited for", "~(waiting & completes)", "~(waiting & completes & 0)"),
     ("a sum that takes what is not there", "with m.If(valid):", "with m.If(1):"),
-    ("a flag of one sample", "(rail | found) & ~completes", "found & ~completes"),
+    ("a flag of one sample", "(rail | at_end) & ~completes", "at_end & ~completes"),
     ("one copy less", "left.eq(self.copies - 1)", "left.eq(self.copies - 2)"),
     ("a word that is not held", "self.i_ready.eq(~self.o_valid | (self.o_ready & ~left.any()))", "self.i_ready.eq(1)"),
     ("a reset that is not passed on", "core.aresetn.eq(self.aresetn)", "core.aresetn.eq(1)"),

@@ -64,7 +64,7 @@ BROKEN = [
     (HELD, "flags that do not stand still", pipeline, f"with m.If(advance):{HOLDS}", f"with m.If(Const(1, 1)):{HOLDS}"),
     (INSTRUMENT, "flags the wrong way round", shell, "return given\n", "return given[::-1]\n"),
     (INSTRUMENT, "a rail that is not told", shell, "at_rail(self.datapath.inputs, tdata) if", "Const(0, 1) if"),
-    (SEVERAL, "a flag that passes the buffer", hardware, "held.given if", "self.s_axis_tuser if"),
+    (SEVERAL, "a flag that passes the buffer", hardware, "head.given if", "self.s_axis_tuser if"),
     (SEVERAL, "a sample that does not wait", hardware, "waits = waits | (taken & (near == channel))", "pass"),
 ]
 

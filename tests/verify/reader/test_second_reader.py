@@ -252,7 +252,7 @@ def test_a_broken_reader_is_refused(misreading: str, monkeypatch: pytest.MonkeyP
         (lambda top: top.registers.update(r=0), "the second reader must see the register r .*"),
         (lambda top: top.registers.update(unnamed=0), "the second reader must see the register unnamed .*"),
         (lambda top: top.registers.pop("r"), ".*"),
-        (lambda top: top.held["words"].update({2: 0}), "the second reader must see the memory words .*"),
+        (lambda top: top.contents["words"].update({2: 0}), "the second reader must see the memory words .*"),
         (lambda top: top.ports.update(b="output"), ".*"),
         (lambda top: top.widths.update(r=7), ".*"),
         (lambda top: top.clocked.pop(), ".*"),

@@ -194,7 +194,7 @@ def test_what_is_read_again_is_not_what_others_have_changed() -> None:
     for module in first.modules.values():
         for inside, _, ports in module.instances:
             ports[inside] = Number(0, 1)
-        for words in module.held.values():
+        for words in module.contents.values():
             words.clear()
         for found in fields(module):
             getattr(module, found.name).clear()

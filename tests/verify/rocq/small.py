@@ -1,23 +1,80 @@
 """Small certificates for Rocq, and the mark of tests that need it."""
 
 import shutil
+from collections.abc import Sequence
 from fractions import Fraction
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
 from tests.gen.word_lengths.filters import butterworth, plain
 
+from sosmith.model.polynomial import Polynomial
 from sosmith.gen.output.certificate import certificate
+from sosmith.gen.word_lengths.quantize import quantize
+from sosmith.model.port import Port
 from sosmith.verify.certificate_file import Certificate
+from sosmith.verify.rocq.check import DATA, head, theorems
+from sosmith.verify.rocq.claims import Claim
+from sosmith.verify.rocq.kernel import THEORIES, compile_theories, ending, mark, run_kernel, theory_texts
 
 needs_coqc = pytest.mark.skipif(shutil.which("coqc") is None, reason="there is no coqc on this machine")
 
 GRID = Fraction(1, 1 << 64)
 
 
+@cache
+def _compiled() -> TemporaryDirectory[str]:
+    """All theories, compiled once in a process."""
+    folder = TemporaryDirectory()
+    for name, text in theory_texts().items():
+        (Path(folder.name) / name).write_text(text, encoding="utf-8")
+    compile_theories(Path(folder.name))
+    return folder
+
+
+def library(folder: Path) -> None:
+    """Put the compiled theories into a folder."""
+    for name in THEORIES:
+        shutil.copy(Path(_compiled().name) / f"{name}.vo", folder)
+
+
+def checked(made: Certificate, folder: Path, claims: Sequence[Claim] | None = None) -> set[str]:
+    """Have Rocq check a certificate's theorems, or some of them; return the axioms."""
+    library(folder)
+    written = theorems(made)
+    chosen = written.claims if claims is None else claims
+    parts = [f"{claim.text}{mark(claim)}" for claim in chosen]
+    text = "".join([head(), written.definitions, *parts, ending(chosen)])
+    (folder / f"{DATA}.v").write_text(text, encoding="utf-8")
+    return set(run_kernel(folder, chosen, DATA, theories=()).axioms)
+
+
 def small(realization: str = "df1", order: int = 3, *, steady: bool = False) -> Certificate:
     """Return the certificate of a low-pass filter that settles soon."""
     quantized = plain(butterworth(order, 0.2), realization, steady=steady)
     return certificate(quantized, quantized.datapath.output.lsb)
+
+
+def calibrated() -> Certificate:
+    """Return the certificate of a calibration of two inputs before a low-pass filter, with an output that begins at -8."""
+    inputs = (
+        Port.from_range("voltage", 12, Fraction(0), Fraction(10)),
+        Port.from_range("temperature", 10, Fraction(-40), Fraction(215)),
+    )
+    output = Port.from_range("d", 12, Fraction(-8), Fraction(24))
+    quantized = quantize(
+        name="calibrated",
+        inputs=inputs,
+        output=output,
+        max_error=output.lsb,
+        ideal=butterworth(2, 0.1),
+        polynomial=Polynomial.from_numbers([["1.16", "-0.0036"], ["0.3672", "0.0006618"], ["0.05812"]]),
+        realization="df1",
+        steady=True,
+    )
+    return certificate(quantized, output.lsb)
 
 
 def with_gain(made: Certificate, section: int, **gains: Fraction) -> Certificate:

@@ -11,33 +11,82 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.gen.word_lengths.filters import butterworth, plain
-from tests.verify.rocq.small import GRID, needs_coqc, small
+from tests.verify.rocq.small import GRID, calibrated, checked, library, needs_coqc, small
 
 from sosmith.gen.output.certificate import certificate
 from sosmith.gen.realizations.registry import REALIZATIONS
 from sosmith.verify.certificate_file import Certificate, certificate_text
 from sosmith.verify.graph import RejectedError
-from sosmith.verify.rocq.check import check_in_rocq, rocq_texts, theorems
+from sosmith.verify.rocq.check import GIVEN, check_in_rocq, head, rocq_texts, theorems
 from sosmith.verify.rocq.flat import flattened
-from sosmith.verify.rocq.kernel import STANDARD, THEORIES
+from sosmith.verify.rocq.kernel import ACCEPTED, STANDARD
+
+
+@needs_coqc
+def test_a_small_filter(tmp_path: Path) -> None:
+    assert checked(small(order=1, steady=True), tmp_path) <= STANDARD
 
 
 @needs_coqc
 @pytest.mark.slow
+@pytest.mark.parametrize("steady", [False, True])
 @pytest.mark.parametrize("realization", REALIZATIONS)
-def test_every_code_and_the_error_bound(realization: str) -> None:
-    verdict = check_in_rocq(small(realization))
-    assert {"recursion_gain_0", "ranges_before", "every_code_in_range", "error_is_bounded"} <= verdict.claims.keys()
+def test_every_code_and_the_error_bound(realization: str, steady: bool, tmp_path: Path) -> None:
+    made = small(realization, steady=steady)
+    assert checked(made, tmp_path) <= STANDARD
+    assert theorems(made).unchecked == ()
+
+
+@needs_coqc
+@pytest.mark.slow
+def test_a_calibration_before_the_filter(tmp_path: Path) -> None:
+    assert checked(calibrated(), tmp_path) <= STANDARD
+
+
+@needs_coqc
+@pytest.mark.slow
+def test_the_verdict() -> None:
+    verdict = check_in_rocq(small(order=1))
+    assert {"recursion_gain_0", "every_code_in_range", "error_in_parts", "error_is_bounded"} <= verdict.claims.keys()
     assert set(verdict.axioms) <= STANDARD
-    assert verdict.unchecked == (
-        "parts of the error budget, each on its own",
-        "the ideal filter: its coefficients are those of the certificate",
-    )
+    assert (verdict.given, verdict.unchecked) == (GIVEN, ())
 
 
 def less_bound(tree: Any) -> None:
-    """Claim less by more than what rounding up two parts of the budget may have added."""
-    tree["claims"]["bound"] = str(Fraction(tree["claims"]["bound"]) - 3 * GRID)
+    """Claim one unit of the grid less."""
+    tree["claims"]["bound"] = str(Fraction(tree["claims"]["bound"]) - GRID)
+
+
+def less_rounding(tree: Any) -> None:
+    """Claim one unit less of a part of the budget, and of their sum."""
+    less_bound(tree)
+    tree["claims"]["budget"]["filter rounding"] = str(Fraction(tree["claims"]["budget"]["filter rounding"]) - GRID)
+
+
+def more_rounding(tree: Any) -> None:
+    """Claim one unit more than follows."""
+    for claims, name in ((tree["claims"], "bound"), (tree["claims"]["budget"], "filter rounding")):
+        claims[name] = str(Fraction(claims[name]) + GRID)
+
+
+def less_allowed(tree: Any) -> None:
+    """Allow less than the bound."""
+    tree["max_error"] = str(Fraction(tree["claims"]["bound"]) * Fraction(tree["output"]["lsb"]) - GRID)
+
+
+def wider_sum(tree: Any) -> None:
+    """Let a sum's range end one code later."""
+    next(node for node in tree["stages"][-1]["nodes"] if node["op"] == "add")["high"] += 1
+
+
+def other_start(tree: Any) -> None:
+    """Hold something else than the first sample."""
+    next(node for node in tree["stages"][0]["nodes"] if node.get("name") == "first")["operands"] = [4]
+
+
+def other_scale(tree: Any) -> None:
+    """Let the codes of the input mean something else."""
+    tree["inputs"][0]["lsb"] = str(Fraction(tree["inputs"][0]["lsb"]) * 2)
 
 
 def smaller_sum(tree: Any) -> None:
@@ -67,18 +116,30 @@ def other_filter(tree: Any) -> None:
 @pytest.mark.parametrize(
     ("edit", "name"),
     [
-        (less_bound, "error_is_bounded"),
-        (smaller_sum, "ranges_of_section_1|every_code_in_range"),
-        (smaller_state, "ranges_of_section_1"),
-        (other_product, "recursion_gain_1|peak_gain_1_0"),
-        (other_filter, "error_is_bounded"),
+        (less_bound, "bound_is_sum_of_parts"),
+        (less_rounding, "error_in_parts"),
+        (more_rounding, "error_in_parts"),
+        (less_allowed, "error_is_allowed"),
+        (smaller_sum, "ranges_are_tight_"),
+        (wider_sum, "ranges_are_tight_"),
+        (smaller_state, "ranges_of_section_0|ranges_are_tight_"),
+        (other_product, "recursion_gain_0|peak_gain_0_0"),
+        (other_filter, "error_in_parts"),
+        (other_scale, "calibrated_input|error_in_parts"),
     ],
 )
-def test_what_is_wrong_is_refused(edit: Callable[[Any], None], name: str) -> None:
-    tree = json.loads(certificate_text(small()))
+def test_what_is_wrong_is_refused(edit: Callable[[Any], None], name: str, tmp_path: Path) -> None:
+    tree = json.loads(certificate_text(small(steady=True)))
     edit(tree)
     with pytest.raises(RejectedError, match=f"^Rocq must accept (?:{name}) \\("):
-        check_in_rocq(Certificate.model_validate(tree))
+        checked(Certificate.model_validate(tree), tmp_path)
+
+
+def test_a_start_that_holds_something_else_has_no_theorem() -> None:
+    tree = json.loads(certificate_text(small(steady=True)))
+    other_start(tree)
+    with pytest.raises(RejectedError, match=r"^a start must have a bound at its node 4, not a multiply$"):
+        theorems(Certificate.model_validate(tree))
 
 
 @needs_coqc
@@ -87,30 +148,29 @@ def test_what_is_wrong_is_refused(edit: Callable[[Any], None], name: str) -> Non
 def test_the_graph_in_rocq_computes_what_the_model_computes(realization: str, tmp_path: Path) -> None:
     quantized = plain(butterworth(3, 0.2), realization)
     made = certificate(quantized, quantized.datapath.output.lsb)
-    for name, text in rocq_texts(made).items():
-        (tmp_path / name).write_text(text)
+    library(tmp_path)
     codes = np.random.default_rng(1).integers(-(1 << 15), 1 << 15, 40)
     graph = flattened(made)
     out = graph.offsets[-2] + made.stages[-1].outputs[0]
     inputs = "; ".join(f"({code})" for code in codes)
     (tmp_path / "Claims.v").write_text(
-        (tmp_path / "Claims.v").read_text().partition("(* section 0: gain")[0]
+        head()
+        + theorems(made).definitions
         + f"Definition x (n p : nat) := nth n [{inputs}] 0.\n"
         + f"Eval vm_compute in map (fun n => nth {out} (run core x n) 0) (seq 0 {len(codes)}).\n"
     )
-    for name in (*THEORIES, "Claims"):
-        said = subprocess.run(
-            ["coqc", "-Q", ".", "Sosmith", f"{name}.v"], cwd=tmp_path, capture_output=True, text=True, check=True
-        )
+    said = subprocess.run(
+        ["coqc", "-Q", ".", "Sosmith", "Claims.v"], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
     shown = [int(code) for code in re.findall(r"-?\d+", said.stdout.partition(":")[0])]
     assert shown == quantized.datapath.compute(codes.reshape(-1, 1)).ravel().tolist()
 
 
 def test_what_no_theorem_is_about_is_named() -> None:
-    assert theorems(small(steady=True))[2] == (
-        "ranges: a filter that starts from its first sample",
-        "error bound: no ranges are proven",
-    )
+    made = small()
+    flagged = made.model_copy(update={"claims": made.claims.model_copy(update={"settling": 9})})
+    assert theorems(flagged).unchecked == ("how soon the filter has settled",)
+    assert theorems(made).unchecked == ()
 
 
 @pytest.mark.sweep(2)
@@ -119,4 +179,5 @@ def test_theorems_are_the_same_on_every_run(realization: str) -> None:
     made = small(realization)
     texts = rocq_texts(made)
     assert texts == rocq_texts(made)
-    assert texts["Claims.v"].count("Print Assumptions ") == len(theorems(made)[1])
+    assert texts["Claims.v"].count(ACCEPTED) == len(theorems(made).claims)
+    assert texts["Claims.v"].count("Print Assumptions all_claims") == 1

@@ -5,40 +5,30 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
-from tests.verify.rocq.small import GRID, needs_coqc, small, with_gain
+from tests.verify.rocq.small import GRID, checked, needs_coqc, small, with_gain
 
 from sosmith.gen.realizations.registry import REALIZATIONS
 from sosmith.verify.graph import RejectedError, Transfer
-from sosmith.verify.rocq.check import DATA, head
 from sosmith.verify.rocq.claims import Claim, gain_claims
-from sosmith.verify.rocq.kernel import STANDARD, run_kernel, theory_texts
+from sosmith.verify.rocq.kernel import STANDARD
 from sosmith.verify.rocq.linear import LinearStage
-
-THEORIES = ("Streams", "PeakGain")
-"""What theorems on gains need."""
-
-
-def checked(claims: list[Claim], folder: Path) -> set[str]:
-    """Have Rocq check these theorems; return the axioms."""
-    for name in THEORIES:
-        (folder / f"{name}.v").write_text(theory_texts()[f"{name}.v"])
-    parts = [f"{claim.text}Print Assumptions {claim.name}.\n" for claim in claims]
-    (folder / f"{DATA}.v").write_text("".join([head(THEORIES), *parts]))
-    return set(run_kernel(folder, claims, DATA, theories=THEORIES).axioms)
-
 
 def refusal(claim: Claim) -> str:
     return f"^Rocq must accept {re.escape(f'{claim.name} ({claim.words})')}, and says: .*$"
 
 
 @needs_coqc
+@pytest.mark.slow
 def test_claims_are_accepted_and_one_unit_less_is_refused(tmp_path: Path) -> None:
+    """To the last unit of the grid, in both directions: what claims more than is proven is refused as well."""
     made = small()
-    less = with_gain(made, 1, recursion_gain=made.claims.sections[1].recursion_gain - GRID)
-    accepted, refused = list(gain_claims(made))[:2], list(gain_claims(less))[2]
-    assert refused.name == "recursion_gain_1"
-    with pytest.raises(RejectedError, match=refusal(refused)):
-        checked([*accepted, refused], tmp_path)
+    claimed = made.claims.sections[1].recursion_gain
+    accepted = list(gain_claims(made))[:2]
+    for other in (claimed - GRID, claimed + GRID):
+        refused = list(gain_claims(with_gain(made, 1, recursion_gain=other)))[2]
+        assert refused.name == "recursion_gain_1"
+        with pytest.raises(RejectedError, match=refusal(refused)):
+            checked(made, tmp_path, [*accepted, refused])
 
 
 @needs_coqc
@@ -47,16 +37,16 @@ def test_claims_are_accepted_and_one_unit_less_is_refused(tmp_path: Path) -> Non
 def test_every_claim_of_every_realization(realization: str, tmp_path: Path) -> None:
     made = small(realization)
     claims = list(gain_claims(made))
-    assert checked(claims, tmp_path) <= STANDARD
+    assert checked(made, tmp_path, claims) <= STANDARD
     for index, entry in enumerate(made.claims.sections):
         less = with_gain(made, index, recursion_gain=entry.recursion_gain - GRID, peak_gain=entry.peak_gain - GRID)
         name = f"recursion_gain_{index}"
         refused = next(claim for claim in gain_claims(less) if claim.name == name)
         with pytest.raises(RejectedError, match=refusal(refused)):
-            checked([refused], tmp_path)
+            checked(made, tmp_path, [refused])
         peaks = [claim for claim in gain_claims(less) if claim.name.startswith(f"peak_gain_{index}")]
         with pytest.raises(RejectedError, match=r"^Rocq must accept peak_gain_"):
-            checked(peaks, tmp_path)
+            checked(made, tmp_path, peaks)
 
 
 @pytest.mark.sweep(2)

@@ -46,7 +46,8 @@ def test_numbers_are_exact() -> None:
         ({}, "filter.family must be given, not missing"),
         (
             {**BY_ORDER, "family": "gauss"},
-            "filter.family must be one of butterworth, chebyshev1, chebyshev2, elliptic, bessel, not gauss",
+            "filter.family must be one of butterworth, chebyshev1, chebyshev2, elliptic, bessel, "
+            "equiripple, least_squares, kaiser, halfband, not gauss",
         ),
         (
             {**BY_ORDER, "kind": "allpass"},

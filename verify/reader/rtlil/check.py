@@ -123,14 +123,14 @@ class _Pair:
         self._require(ports == own.ports, "ports")
         self._require(other.clocks() == own.clocks and len(own.clocks) <= 1, "clocks")
         self._require(other.instances == own.instances, "instances")
-        found = self._found()
-        self._settle(found)
-        held = {place for place in found.values() if isinstance(place, tuple)}
+        places = self._found()
+        self._settle(places)
+        matched = {place for place in places.values() if isinstance(place, tuple)}
         for name, register in own.registers.items():
             for place in range(len(register.next)):
-                if (name, place) not in held:
+                if (name, place) not in matched:
                     self.open.append(f"bit {place} of the register {name} of {self._name}")
-        for bit, there in found.items():
+        for bit, there in places.items():
             self._check_next(bit, there)
         self._check_memories()
         for name, wire in wires.items():
@@ -142,7 +142,7 @@ class _Pair:
         self._require(given.keys() == own.given.keys(), "inputs of instances")
         for name, bits in given.items():
             self._compare(own.given[name], other.word(bits), f"input {name}")
-        return len(held)
+        return len(matched)
 
     def _require(self, holds: bool, what: str) -> None:
         require(holds, f"the {what} of {self._name} must be the same in the RTLIL as in the SystemVerilog")
@@ -160,40 +160,40 @@ class _Pair:
 
     def _found(self) -> dict[Place, Place | int]:
         """Return where each bit that the RTLIL holds is in the SystemVerilog: a register's bit, or a constant."""
-        found: dict[Place, Place | int] = {}
-        held = {bit for bit, (cell, _) in self._other.registers().items() if self._is_clocked(cell)}
+        places: dict[Place, Place | int] = {}
+        registers = {bit for bit, (cell, _) in self._other.registers().items() if self._is_clocked(cell)}
         for name, wire in self._other.module.wires.items():
             for place in range(wire.width):
                 root = self._other.root((name, place))
-                if root in held and root not in found:
+                if root in registers and root not in places:
                     assert isinstance(root, tuple)
                     there = self._there((self._plain[name], place))
                     if there is not None:
-                        found[root] = there
-        self._find_renamed(found, held)
-        for bit in held - found.keys():
+                        places[root] = there
+        self._find_renamed(places, registers)
+        for bit in registers - places.keys():
             first = self._other.first_of(bit)
             if first is not None:
-                found[bit] = first
-        return found
+                places[bit] = first
+        return places
 
-    def _find_renamed(self, found: dict[Place, Place | int], held: set[Place]) -> None:
+    def _find_renamed(self, places: dict[Place, Place | int], registers: set[Place]) -> None:
         """Find registers by nets that turn out to be the same only when gates are taken for what they are."""
-        known = {place for place in found.values() if isinstance(place, tuple)}
+        known = {place for place in places.values() if isinstance(place, tuple)}
         self._other.restart()
-        variables = {self._other.bit(bit): bit for bit in held}
+        variables = {self._other.bit(bit): bit for bit in registers}
         for name, wire in self._other.module.wires.items():
             for place in range(wire.width):
                 there = self._there((self._plain[name], place))
                 if isinstance(there, tuple) and there not in known and self._other.is_driven((name, place)):
                     bit = variables.get(self._other.bit((name, place)))
-                    if bit is not None and bit not in found:
-                        found[bit] = there
+                    if bit is not None and bit not in places:
+                        places[bit] = there
                         known.add(there)
 
     def _is_clocked(self, cell: str) -> bool:
-        made = self._other.module.cells[cell]
-        return made.kind == "$dff" or (made.kind == "$memrd_v2" and made.number("CLK_ENABLE") == 1)
+        instance = self._other.module.cells[cell]
+        return instance.kind == "$dff" or (instance.kind == "$memrd_v2" and instance.number("CLK_ENABLE") == 1)
 
     def _there(self, place: Place) -> Place | int | None:
         """Follow assignments of the SystemVerilog to a register or a constant."""
@@ -206,22 +206,22 @@ class _Pair:
             at = self._alias[at]
         return at
 
-    def _settle(self, found: dict[Place, Place | int]) -> None:
+    def _settle(self, places: dict[Place, Place | int]) -> None:
         """Let what is held stand for what it is; take back constants that do not stay."""
         while True:
             self._other.restart()
-            for bit, place in found.items():
+            for bit, place in places.items():
                 self._other.hold(bit, self._literal(place))
             wrong = [
                 bit
-                for bit, place in found.items()
+                for bit, place in places.items()
                 if isinstance(place, int)
                 and not (self._other.first_of(bit) == place and self._same(self._other.next_of(bit), place))
             ]
             if not wrong:
                 return
             for bit in wrong:
-                del found[bit]
+                del places[bit]
 
     def _literal(self, place: Place | int) -> int:
         if isinstance(place, int):
@@ -267,12 +267,12 @@ def _padded(a: tuple[int, ...], b: tuple[int, ...]) -> Iterator[tuple[int, int]]
 
 def _aliases(module: Module) -> dict[Place, Place | int]:
     """Return what the bits of nets are that are assigned bits of other nets, or constants."""
-    found: dict[Place, Place | int] = {}
+    aliases: dict[Place, Place | int] = {}
     for target, value in module.assigns:
         one, other = _places(target, module), _places(value, module)
         if one is not None and other is not None and len(one) == len(other):
-            found |= {bit: to for bit, to in zip(one, other, strict=True) if isinstance(bit, tuple)}
-    return found
+            aliases |= {bit: to for bit, to in zip(one, other, strict=True) if isinstance(bit, tuple)}
+    return aliases
 
 
 def _places(value: Expression, module: Module) -> list[Place | int] | None:

@@ -71,13 +71,13 @@ class Equality:
         return False
 
     def _cone(self, literal: int) -> set[int]:
-        found, left = set[int](), [literal >> 1]
+        gates, left = set[int](), [literal >> 1]
         while left:
             gate = left.pop()
-            if gate not in found:
-                found.add(gate)
+            if gate not in gates:
+                gates.add(gate)
                 left += [each >> 1 for each in self._gates.inputs(2 * gate) or ()]
-        return found
+        return gates
 
 
 class _Diagrams:
@@ -112,8 +112,8 @@ class _Diagrams:
         return self._side(literal)
 
     def _side(self, literal: int) -> int:
-        found = self._of[literal >> 1]
-        return self._not(found) if literal & 1 else found
+        node = self._of[literal >> 1]
+        return self._not(node) if literal & 1 else node
 
     def _node(self, variable: int, low: int, high: int) -> int:
         if low == high:

@@ -152,7 +152,7 @@ class RtlilLogic:
 
     def clocks(self) -> set[str]:
         """Return the inputs that clock anything."""
-        found = set()
+        clocks = set()
         for cell in self.module.cells.values():
             if cell.kind in {"$dff", "$memwr_v2"} or (cell.kind == "$memrd_v2" and cell.number("CLK_ENABLE")):
                 require(cell.number("CLK_POLARITY") == 1, "the RTLIL must take the rising edge")
@@ -162,8 +162,8 @@ class RtlilLogic:
                     name in self.module.wires and self.module.wires[name].direction == "input",
                     "a clock must be an input",
                 )
-                found.add(self._plain[name])
-        return found
+                clocks.add(self._plain[name])
+        return clocks
 
     # Memories.
 
@@ -256,20 +256,20 @@ class RtlilLogic:
 
     def _case(self, case: Case, bit: Place, before: int | None) -> int:
         """Return what a bit is after a case; `before` is what it was, None if it was not set."""
-        found = self.bit(case.sets[bit]) if bit in case.sets else before
+        value = self.bit(case.sets[bit]) if bit in case.sets else before
         for word, cases in case.choices:
             if not any(each.touches(bit) for _, each in cases):
                 continue
-            require(found is not None, f"bit {bit[1]} of {bit[0]} of the RTLIL must be set in any case")
-            assert found is not None
-            literals, result = self.word(word), found
+            require(value is not None, f"bit {bit[1]} of {bit[0]} of the RTLIL must be set in any case")
+            assert value is not None
+            literals, result = self.word(word), value
             for patterns, each in reversed(cases):
-                inside = self._case(each, bit, found)
+                inside = self._case(each, bit, value)
                 result = self.gates.chosen(self._matches(literals, patterns), inside, result)
-            found = result
-        require(found is not None, f"bit {bit[1]} of {bit[0]} of the RTLIL must be set in any case")
-        assert found is not None
-        return found
+            value = result
+        require(value is not None, f"bit {bit[1]} of {bit[0]} of the RTLIL must be set in any case")
+        assert value is not None
+        return value
 
     def _matches(self, word: Literals, patterns: Sequence[str]) -> int:
         """Return whether a word is of one of some patterns; of any word if there is none."""
@@ -343,11 +343,11 @@ _SAME = {"$dff": ("D", "Q"), "$mux": ("A", "B", "Y")}
 def _check_shape(cell: Cell) -> None:
     """Check that a cell has the ports and parameters of its kind, and no others: tools do not take it otherwise."""
     ports, parameters = _SHAPES.get(cell.kind, _BINARY)
-    for what, found, wanted in (("ports", cell.ports, ports), ("parameters", cell.parameters, parameters)):
+    for what, names, wanted in (("ports", cell.ports, ports), ("parameters", cell.parameters, parameters)):
         require(
-            set(found) == wanted,
+            set(names) == wanted,
             f"a cell {cell.kind} of the RTLIL must have the {what} {', '.join(sorted(wanted))}, "
-            f"not {', '.join(sorted(found))}",
+            f"not {', '.join(sorted(names))}",
         )
     for port in _SAME.get(cell.kind, ()):
         require(len(cell.ports[port]) == cell.number("WIDTH"), f"WIDTH of a cell {cell.kind} must be that of {port}")

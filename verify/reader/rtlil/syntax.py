@@ -78,11 +78,11 @@ class Case:
 
     def targets(self) -> set[tuple[str, int]]:
         """Return all bits that are set in it."""
-        found = set(self.sets)
+        targets = set(self.sets)
         for _, cases in self.choices:
             for _, case in cases:
-                found |= case.targets()
-        return found
+                targets |= case.targets()
+        return targets
 
 
 @dataclass
@@ -125,18 +125,18 @@ class _Reader:
         return kind, match
 
     def modules(self) -> dict[str, RtlilModule]:
-        found: dict[str, RtlilModule] = {}
+        modules: dict[str, RtlilModule] = {}
         while self._place < len(self._lines):
             kind, match = self._take("attribute", "module")
             if kind == "attribute":
                 self._note(match)
                 continue
-            require(match[1] not in found, f"the module {match[1]} of the RTLIL must be there once")
-            self._module = found[match[1]] = RtlilModule()
+            require(match[1] not in modules, f"the module {match[1]} of the RTLIL must be there once")
+            self._module = modules[match[1]] = RtlilModule()
             self._said = {}
             while self._item():
                 pass
-        return found
+        return modules
 
     def _note(self, match: re.Match[str]) -> None:
         require(_ATTRIBUTES.fullmatch(match[1]) is not None, f"the RTLIL must not have the attribute {match[1]}")
@@ -199,8 +199,8 @@ class _Reader:
                 continue
             word, cases = self._bits(match[1]), []
             while self._next() == "case":
-                _, found = self._take("case")
-                patterns = [each.partition("'")[2] for each in (found[1] or "").split(", ") if each]
+                _, header = self._take("case")
+                patterns = [each.partition("'")[2] for each in (header[1] or "").split(", ") if each]
                 right = all(len(pattern) == len(word) and "x" not in pattern for pattern in patterns)
                 require(right, "a case of the RTLIL must have as many bits as what is chosen by")
                 cases.append((patterns, self._case()))
@@ -220,7 +220,7 @@ class _Reader:
 
     def _bits(self, text: str) -> list[Bit]:
         """Read a word, the lowest bit first."""
-        found: list[list[Bit]] = []
+        parts: list[list[Bit]] = []
         place, inside = 0, False
         while place < len(text.rstrip(" ")):
             match = _TOKEN.match(text, place)
@@ -233,11 +233,11 @@ class _Reader:
             elif match[4]:
                 width, _, digits = match[4].partition("'")
                 require(int(width) == len(digits), f"{match[4]} of the RTLIL must have as many digits as bits")
-                found.append(list(reversed(digits)))
+                parts.append(list(reversed(digits)))
             else:
-                found.append(self._slice(_plain(match[1]), match[2], match[3]))
+                parts.append(self._slice(_plain(match[1]), match[2], match[3]))
         require(not inside, f"{text[:60]!a} of the RTLIL must be a word")
-        return [bit for part in reversed(found) for bit in part]
+        return [bit for part in reversed(parts) for bit in part]
 
     def _slice(self, name: str, high: str | None, low: str | None) -> list[Bit]:
         require(name in self._module.wires, f"{name} of the RTLIL must be a net before it is used")

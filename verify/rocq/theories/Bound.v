@@ -1,22 +1,11 @@
 (* The error bound: what a filter's output code differs from the exact filter, for ever and for all inputs.
 
-   The exact filter is any sequence y of real numbers with A * y = B * x, in units of the output's last place. The code v in
-   front of the last rounding has f fraction bits and D * v = N1 * u1 + N2 * u2 + ... Then z = v - 2^f y, the error so far,
-   obeys A D * z = A N1 * u1 + A N2 * u2 + ... - 2^f D B * x: one more recursion, of which a peak gain is known. *)
+   The code in front of the last rounding is a known response to what enters the sections and to the roundings (`Cascade`);
+   the exact filter is a known response to the exact input (`Exact`). Their difference is one response to what enters, and
+   the other roundings; to that come what the calibration adds, the first sample, and the last rounding. *)
 Require Import Bool ZArith Reals List Lia Lra. Import ListNotations.
-From Sosmith Require Import Streams PeakGain Graph Ranges Linear.
+From Sosmith Require Import Definitions Streams Responses Graph Ranges Linear Gains Cascade Exact.
 Open Scope Z_scope.
-
-Definition limited (lowest highest y : R) : R := Rmax lowest (Rmin highest y).
-
-Lemma conv_comm a : forall b u n, conv a (conv b u) n = conv b (conv a u) n.
-Proof.
-  induction a as [|c a IH]; intros b u n; [symmetry; apply conv_zero|].
-  rewrite (conv_ext b (conv (c :: a) u) (fun m => IZR c * u m + 1 * match m with O => 0 | S j => conv a u j end)%R).
-  - rewrite (conv_plus b (fun m => IZR c * u m)%R), !conv_multiple, (conv_late_one b (conv a u)). simpl.
-    destruct n as [|m]; [ring|]. rewrite IH. ring.
-  - intros m _. simpl. destruct m; ring.
-Qed.
 
 Lemma min_near h a b : (Rabs (Rmin h a - Rmin h b) <= Rabs (a - b))%R.
 Proof.
@@ -30,157 +19,323 @@ Proof.
 Qed.
 Lemma limited_near lo hi a b : (Rabs (limited lo hi a - limited lo hi b) <= Rabs (a - b))%R.
 Proof. eapply Rle_trans; [apply max_near|apply min_near]. Qed.
-
-(* The last stage adds one half and rounds down: to nearest. Then it limits the code. *)
-Definition rounds (g : graph) (v out : nat) : bool :=
-  let at_ i := nth i g blank in
-  Nat.ltb out (length g)
-  && match op (at_ out) with
-     | Clamp a => match op (at_ a) with
-       | Floor b => match op (at_ b) with
-         | Add c d => match op (at_ c), op (at_ d) with
-           | Wire w, Constant one =>
-               Nat.eqb w v && (one =? 1) && (frac (at_ d) =? 1) && (frac (at_ a) =? 0) && (0 <? frac (at_ c))
-           | _, _ => false end
-         | _ => false end
-       | _ => false end
-     | _ => false
-     end.
-
-Lemma rounds_spec g x v out n : ordered g = true -> rounds g v out = true ->
-  (Rabs (IZR (code g x out n)
-         - limited (IZR (low (nth out g blank))) (IZR (high (nth out g blank)))
-             (IZR (code g x v n) / IZR (2 ^ frac_of g v))) <= 1 / 2)%R.
+Lemma limited_code lo hi r : IZR (Z.max lo (Z.min hi r)) = limited (IZR lo) (IZR hi) (IZR r).
 Proof.
-  intros G H. unfold rounds in H. apply andb_prop in H. destruct H as [L H]. apply Nat.ltb_lt in L.
-  assert (Code : forall i, (i < length g)%nat -> code g x i n = compute g (run g x n) (before g x n) (x n) (nth i g blank))
-    by (intros i Hi; apply (code_spec g x G i n Hi)).
-  destruct (op (nth out g blank)) as [| | | | | | | | | |a| | |] eqn:Eo; try discriminate.
-  assert (La : (a < out)%nat) by (apply (operands_before g G out a L); rewrite Eo; left; reflexivity).
-  destruct (op (nth a g blank)) as [| | | | | | |b| | | | | |] eqn:Ea; try discriminate.
-  assert (Lb : (b < a)%nat) by (apply (operands_before g G a b ltac:(lia)); rewrite Ea; left; reflexivity).
-  destruct (op (nth b g blank)) as [| |c d| | | | | | | | | | |] eqn:Eb; try discriminate.
-  assert (Lc : (c < b)%nat) by (apply (operands_before g G b c ltac:(lia)); rewrite Eb; left; reflexivity).
-  assert (Ld : (d < b)%nat) by (apply (operands_before g G b d ltac:(lia)); rewrite Eb; right; left; reflexivity).
-  destruct (op (nth c g blank)) as [| | | | | | | | | | | |w|] eqn:Ec; try discriminate.
-  destruct (op (nth d g blank)) as [|one| | | | | | | | | | | |] eqn:Ed; try discriminate.
-  apply andb_prop in H. destruct H as [H H5]. apply andb_prop in H. destruct H as [H H4].
-  apply andb_prop in H. destruct H as [H H3]. apply andb_prop in H. destruct H as [H1 H2].
-  apply Nat.eqb_eq in H1. apply Z.eqb_eq in H2. apply Z.eqb_eq in H3. apply Z.eqb_eq in H4. apply Z.ltb_lt in H5.
-  subst w one.
-  pose proof (points_fit g G c ltac:(lia)) as Pc. unfold points in Pc. rewrite Ec in Pc. apply Z.eqb_eq in Pc.
-  pose proof (points_fit g G b ltac:(lia)) as Pb. unfold points in Pb. rewrite Eb in Pb. apply Z.eqb_eq in Pb.
-  set (f := frac_of g v) in *.
-  assert (Fc : frac_of g c = f) by exact Pc. assert (Fd : frac_of g d = 1) by exact H3.
-  assert (Fb : frac_of g b = f) by (unfold frac_of at 1; rewrite Pb, Fc, Fd; unfold frac_of in Fc; lia).
-  assert (Fp : 0 < f) by (unfold frac_of in Fc; lia).
-  assert (Ca := Code a ltac:(lia)). assert (Cb := Code b ltac:(lia)). assert (Cc := Code c ltac:(lia)).
-  assert (Cd := Code d ltac:(lia)). rewrite (Code out L).
-  unfold compute in *. rewrite Eo. rewrite Ea in Ca. rewrite Eb in Cb. rewrite Ec in Cc. rewrite Ed in Cd.
-  change (nth a (run g x n) 0) with (code g x a n). change (nth b (run g x n) 0) with (code g x b n) in Ca.
-  change (nth c (run g x n) 0) with (code g x c n) in Cb. change (nth d (run g x n) 0) with (code g x d n) in Cb.
-  change (nth v (run g x n) 0) with (code g x v n) in Cc.
-  rewrite H4, Fb, Z.sub_0_r in Ca. change (frac (nth b g blank)) with (frac_of g b) in Cb.
-  rewrite Fb, Fc, Fd, Z.sub_diag, Cc, Cd in Cb. change (2 ^ 0) with 1 in Cb.
-  set (q := 2 ^ (f - 1)) in *. assert (Q : 2 ^ f = 2 * q) by (unfold q; rewrite <- Z.pow_succ_r by lia; f_equal; lia).
-  assert (Qp : 0 < q) by (apply Z.pow_pos_nonneg; lia).
-  rewrite Q in *. set (t := code g x v n) in *.
-  assert (E : code g x b n = t + q) by lia. rewrite E in Ca.
-  pose proof (Z.div_mod (t + q) (2 * q) ltac:(lia)) as M. pose proof (Z.mod_pos_bound (t + q) (2 * q) ltac:(lia)) as B.
-  rewrite <- Ca in M. set (r := code g x a n) in *. set (e := (t + q) mod (2 * q)) in *.
-  assert (Hr : (Rabs (IZR r - IZR t / IZR (2 * q)) <= 1 / 2)%R).
-  { assert (X : (IZR t = IZR (2 * q) * IZR r + (IZR e - IZR q))%R) by (rewrite <- mult_IZR, <- minus_IZR, <- plus_IZR; f_equal; lia).
-    assert (Y : (0 < IZR q)%R) by (apply IZR_lt; lia). assert (Z1 : (IZR (2 * q) = 2 * IZR q)%R) by (rewrite mult_IZR; ring).
-    assert (B1 : (0 <= IZR e)%R) by (apply IZR_le; lia). assert (B2 : (IZR e <= 2 * IZR q)%R) by (rewrite <- Z1; apply IZR_le; lia).
-    rewrite X, Z1. replace (IZR r - (2 * IZR q * IZR r + (IZR e - IZR q)) / (2 * IZR q))%R
-      with ((IZR q - IZR e) / (2 * IZR q))%R by (field; lra).
-    assert (V : ((IZR q - IZR e) / (2 * IZR q) * (2 * IZR q) = IZR q - IZR e)%R) by (field; lra).
-    apply Rabs_le. split; apply Rmult_le_reg_r with (2 * IZR q)%R; try lra; rewrite V; lra. }
-  assert (Hl : IZR (Z.max (low (nth out g blank)) (Z.min (high (nth out g blank)) r))
-    = limited (IZR (low (nth out g blank))) (IZR (high (nth out g blank))) (IZR r)).
-  { unfold limited. assert (Mi : forall a' b', IZR (Z.min a' b') = Rmin (IZR a') (IZR b')).
-    { intros a' b'. unfold Rmin. destruct (Rle_dec (IZR a') (IZR b')) as [l|l].
-      - apply le_IZR in l. f_equal. lia.
-      - f_equal. assert (~ a' <= b') by (intros X; apply l, IZR_le, X). lia. }
-    assert (Ma : forall a' b', IZR (Z.max a' b') = Rmax (IZR a') (IZR b')).
-    { intros a' b'. unfold Rmax. destruct (Rle_dec (IZR a') (IZR b')) as [l|l].
-      - apply le_IZR in l. f_equal. lia.
-      - f_equal. assert (~ a' <= b') by (intros X; apply l, IZR_le, X). lia. }
-    rewrite Ma, Mi. reflexivity. }
-  rewrite Hl. eapply Rle_trans; [apply limited_near|exact Hr].
+  unfold limited. assert (Mi : forall a' b', IZR (Z.min a' b') = Rmin (IZR a') (IZR b')).
+  { intros a' b'. unfold Rmin. destruct (Rle_dec (IZR a') (IZR b')) as [l|l].
+    - apply le_IZR in l. f_equal. lia.
+    - f_equal. assert (~ a' <= b') by (intros X; apply l, IZR_le, X). lia. }
+  assert (Ma : forall a' b', IZR (Z.max a' b') = Rmax (IZR a') (IZR b')).
+  { intros a' b'. unfold Rmax. destruct (Rle_dec (IZR a') (IZR b')) as [l|l].
+    - apply le_IZR in l. f_equal. lia.
+    - f_equal. assert (~ a' <= b') by (intros X; apply l, IZR_le, X). lia. }
+  rewrite Ma, Mi. reflexivity.
+Qed.
+Lemma floor_near z d : 0 < d -> (Rabs (IZR (z / d) - (IZR z / IZR d - 1 / 2)) <= 1 / 2)%R.
+Proof.
+  intros D. pose proof (Z.div_mod z d ltac:(lia)) as M. pose proof (Z.mod_pos_bound z d D) as B.
+  set (q := z / d) in *. set (r := z mod d) in *. assert (D0 : (0 < IZR d)%R) by (apply IZR_lt; exact D).
+  assert (E : (IZR z / IZR d = IZR q + IZR r / IZR d)%R) by (rewrite M, plus_IZR, mult_IZR; field; lra).
+  assert (B0 : (0 <= IZR r)%R) by (apply IZR_le; lia). assert (B1 : (IZR r <= IZR d)%R) by (apply IZR_le; lia).
+  assert (V : (0 <= IZR r / IZR d <= 1)%R).
+  { split; [apply Rmult_le_pos; [exact B0|left; apply Rinv_0_lt_compat; exact D0]|].
+    apply Rmult_le_reg_r with (IZR d); [exact D0|]. unfold Rdiv. rewrite Rmult_assoc, Rinv_l by lra. lra. }
+  rewrite E. apply Rabs_le. lra.
 Qed.
 
-(* h is a witness for A D. The error of v is at most 2^f (p / q - 1 / 2), and that of the output p / q. *)
-Definition error_holds (g : graph) (sources : list source) (forms : list (option form)) (k input v out : nat)
-    (A B h : list Z) (K p q : Z) : bool :=
-  match nth v forms None, find (Of input) sources with
-  | Some f, Some s =>
-      let AD := mul A (under f) in
-      let N := add_rows (map (mul A) (over f)) (place s (scale (- 2 ^ frac_of g v) (mul (under f) B))) in
-      let most := 2 ^ frac_of g v * (2 * p - q) in
-      let b := map (reach g) sources in
-      let r := norm1 (rest AD h K) in
-      rounds g v out && (0 <=? frac_of g v) && (0 <? q) && Nat.ltb v k && forallb proper sources && (r <? K)
-      && range_fits r K (map (mul h) N) b (map opposite b) (2 * q) (- most) most
-  | _, _ => false
+(* In front of the last rounding: alpha v + beta h + gamma, with codes of nodes v and h. *)
+Fixpoint affine (g : graph) (v : nat) (h : option nat) (fuel i : nat) : option (Z * Z * Z) :=
+  match fuel with
+  | O => None
+  | S f =>
+      if Nat.eqb i v then Some (1, 0, 0)
+      else if match h with Some j => Nat.eqb i j | None => false end then Some (0, 1, 0)
+      else
+        let up a := 2 ^ (frac_of g i - frac_of g a) in
+        let both a b s := match affine g v h f a, affine g v h f b with
+          | Some (p, q, r), Some (p', q', r') =>
+              Some (up a * p + up b * s * p', up a * q + up b * s * q', up a * r + up b * s * r')
+          | _, _ => None end in
+        match op (nth i g blank) with
+        | Constant c => Some (0, 0, c)
+        | Wire a | Shift a _ | Bound a => affine g v h f a
+        | Scale a c _ => match affine g v h f a with Some (p, q, r) => Some (c * p, c * q, c * r) | None => None end
+        | Add a b => both a b 1
+        | Subtract a b => both a b (-1)
+        | _ => None
+        end
+  end.
+Definition code_if (g : graph) (x : nat -> nat -> Z) (h : option nat) (n : nat) : Z :=
+  match h with Some j => code g x j n | None => 0 end.
+Lemma affine_spec g x v h n : ordered g = true -> forall fuel i p q r, (i < length g)%nat -> affine g v h fuel i = Some (p, q, r) ->
+  code g x i n = p * code g x v n + q * code_if g x h n + r.
+Proof.
+  intros G. induction fuel as [|f IH]; intros i p q r Hi; cbn [affine]; [discriminate|].
+  destruct (Nat.eqb_spec i v) as [->|Nv]; [intros X; injection X as <- <- <-; ring|].
+  destruct (match h with Some j => Nat.eqb i j | None => false end) eqn:Eh.
+  { destruct h as [j|]; [|discriminate]. apply Nat.eqb_eq in Eh. subst j. intros X; injection X as <- <- <-. cbn [code_if]. ring. }
+  assert (O := fun a => operands_before g G i a Hi). rewrite (code_spec g x G i n Hi). unfold compute.
+  change (frac (nth i g blank)) with (frac_of g i).
+  destruct (op (nth i g blank)) as [|c|a b|a b| |a c bits|a s| | | | |a|a|]; try discriminate; cbn [operands] in O.
+  - intros X; injection X as <- <- <-. ring.
+  - destruct (affine g v h f a) as [[[p1 q1] r1]|] eqn:Ea; [|discriminate]. destruct (affine g v h f b) as [[[p2 q2] r2]|] eqn:Eb; [|discriminate].
+    intros X; injection X as <- <- <-. pose proof (IH a _ _ _ ltac:(specialize (O a (or_introl eq_refl)); lia) Ea) as Ha.
+    pose proof (IH b _ _ _ ltac:(specialize (O b (or_intror (or_introl eq_refl))); lia) Eb) as Hb. unfold code in Ha, Hb |- *. rewrite Ha, Hb. ring.
+  - destruct (affine g v h f a) as [[[p1 q1] r1]|] eqn:Ea; [|discriminate]. destruct (affine g v h f b) as [[[p2 q2] r2]|] eqn:Eb; [|discriminate].
+    intros X; injection X as <- <- <-. pose proof (IH a _ _ _ ltac:(specialize (O a (or_introl eq_refl)); lia) Ea) as Ha.
+    pose proof (IH b _ _ _ ltac:(specialize (O b (or_intror (or_introl eq_refl))); lia) Eb) as Hb. unfold code in Ha, Hb |- *. rewrite Ha, Hb. ring.
+  - destruct (affine g v h f a) as [[[p1 q1] r1]|] eqn:Ea; [|discriminate]. intros X; injection X as <- <- <-.
+    pose proof (IH a _ _ _ ltac:(specialize (O a (or_introl eq_refl)); lia) Ea) as Ha. unfold code in Ha |- *. rewrite Ha. ring.
+  - intros Ea. exact (IH a _ _ _ ltac:(specialize (O a (or_introl eq_refl)); lia) Ea).
+  - intros Ea. exact (IH a _ _ _ ltac:(specialize (O a (or_introl eq_refl)); lia) Ea).
+  - intros Ea. exact (IH a _ _ _ ltac:(specialize (O a (or_introl eq_refl)); lia) Ea).
+Qed.
+
+(* The node that rounds, behind which a code may be limited to lo .. hi. *)
+Definition rounding_node (g : graph) (out : nat) (lo hi : Z) : option nat :=
+  let v := nth out g blank in
+  match op v with
+  | Clamp a => if (low v =? lo) && (high v =? hi) then Some a else None
+  | Floor _ => if (lo <=? low v) && (high v <=? hi) then Some out else None
+  | _ => None
   end.
 
-Theorem error_bound (g : graph) (x : nat -> nat -> Z) sources F forms k first input v out A B h K p q :
-  ordered g = true -> closed k g = true -> every (fits_node g sources F forms) 0 (firstn k g) = true ->
-  forallb (known_source g first) sources = true ->
-  error_holds g sources forms k input v out A B h K p q = true ->
-  (forall n i, (i < first)%nat -> in_range g x i n) ->
-  forall y : sequence, (forall n, conv A y n = conv B (signal g x input) n) ->
-  forall n, (Rabs (IZR (code g x out n)
-    - limited (IZR (low (nth out g blank))) (IZR (high (nth out g blank))) (y n)) <= IZR p / IZR q)%R.
+(* All that goes into the bound. `entry` is the place of the source that enters the sections, `taken` the node with the
+   samples, and `held` that with the first sample; in_p / in_q bounds what the calibration adds at the input. The exact
+   filter is followed with `more` bits than the graph, and the limits of its signals in units of 1 / fine. *)
+Record parts_ := Parts { out : nat; last_ : nat; plan_ : plan; entry : nat; taken : nat; held_ : option nat; steady : bool;
+  exact : list part; least_ : Z; fine : Z; more : Z; in_p : Z; in_q : Z }.
+Definition at_most_ (value unit : Z) (a : ratio) : bool := (0 <? snd a) && (value * snd a <=? fst a * unit).
+Lemma at_most_spec value unit a : 0 < unit -> at_most_ value unit a = true -> (IZR value / IZR unit <= real a)%R.
 Proof.
-  intros G C E S H Known y Y n. unfold error_holds in H.
-  destruct (nth v forms None) as [f|] eqn:Ef; [|discriminate].
-  destruct (find (Of input) sources) as [s|] eqn:Es; [|discriminate].
-  set (AD := mul A (under f)) in *.
-  set (N := add_rows (map (mul A) (over f)) (place s (scale (- 2 ^ frac_of g v) (mul (under f) B)))) in *.
-  set (most := 2 ^ frac_of g v * (2 * p - q)) in *.
-  apply andb_prop in H. destruct H as [H H7]. apply andb_prop in H. destruct H as [H H6].
-  apply andb_prop in H. destruct H as [H H5]. apply andb_prop in H. destruct H as [H H4].
-  apply andb_prop in H. destruct H as [H H3]. apply andb_prop in H. destruct H as [H1 H2].
-  apply Z.leb_le in H2. apply Z.ltb_lt in H3. apply Nat.ltb_lt in H4.
-  set (u := map (drive g x) sources).
-  set (z := fun m => (signal g x v m - IZR (2 ^ frac_of g v) * y m)%R).
-  assert (Form_ : forall m, conv (under f) (signal g x v) m = total (over f) u m)
-    by (intros m; apply (forms_hold g x sources F forms k G C E m v H4 f Ef)).
-  assert (Input_ : nth s u (fun _ => 0%R) = signal g x input) by (apply (driven g x sources s (Of input)); exact Es).
-  assert (Z1 : forall m, conv AD z m = total N u m).
-  { intros m. unfold N, AD. rewrite total_add_rows, total_place, Input_, conv_scale, <- conv_total, !conv_mul, opp_IZR.
-    rewrite (conv_ext A (conv (under f) z)
-      (fun j => total (over f) u j + (- IZR (2 ^ frac_of g v)) * conv (under f) y j)%R).
-    - rewrite (conv_plus A (total (over f) u)), conv_multiple, (conv_comm A (under f) y).
-      rewrite (conv_ext (under f) (conv A y) (conv B (signal g x input))) by (intros; apply Y). reflexivity.
-    - intros j _. rewrite <- Form_. unfold z.
-      rewrite (conv_ext (under f) _ (fun i => signal g x v i + (- IZR (2 ^ frac_of g v)) * y i)%R) by (intros; ring).
-      rewrite (conv_plus (under f) (signal g x v)), conv_multiple. reflexivity. }
-  assert (R := range AD h K N (map (reach g) sources) (2 * q) (- most) most).
-  unfold range_holds in R. rewrite H6, H7 in R.
-  specialize (R eq_refl z u Z1).
-  assert (W : Forall2 within u (map (reach g) sources)).
-  { apply (sources_within g x sources); try assumption.
-    intros i m Hi. rewrite forallb_forall in S. apply (known_in_range first g x i m G Known). exact (S (Of i) Hi). }
-  specialize (R W n). assert (T := rounds_spec g x v out n G H1).
-  set (lo := IZR (low (nth out g blank))) in *. set (hi := IZR (high (nth out g blank))) in *.
-  assert (L := limited_near lo hi (IZR (code g x v n) / IZR (2 ^ frac_of g v)) (y n)).
-  assert (P : (0 < IZR (2 ^ frac_of g v))%R) by (apply IZR_lt, Z.pow_pos_nonneg; lia).
-  assert (Q : (0 < IZR q)%R) by (apply IZR_lt; lia).
-  assert (M : (Rabs (IZR (code g x v n) / IZR (2 ^ frac_of g v) - y n) <= IZR p / IZR q - 1 / 2)%R).
-  { unfold z, signal, most in R. rewrite opp_IZR, !mult_IZR, minus_IZR, mult_IZR in R.
-    set (c := IZR (2 ^ frac_of g v)) in *. set (a := IZR (code g x v n)) in *.
-    replace (a / c - y n)%R with ((a - c * y n) / c)%R by (field; lra).
-    replace (IZR p / IZR q - 1 / 2)%R with ((c * (2 * IZR p - IZR q)) / (2 * IZR q * c))%R by (field; lra).
-    set (d := (a - c * y n)%R) in *. set (m := (c * (2 * IZR p - IZR q))%R) in *.
-    assert (X : (0 < 2 * IZR q * c)%R) by (apply Rmult_lt_0_compat; lra).
-    replace (d / c)%R with ((2 * IZR q * d) / (2 * IZR q * c))%R by (field; lra).
-    apply Rabs_le. unfold Rdiv. rewrite Ropp_mult_distr_l.
-    split; (apply Rmult_le_compat_r; [left; apply Rinv_0_lt_compat; exact X|lra]). }
-  replace (IZR (code g x out n) - limited lo hi (y n))%R
-    with ((IZR (code g x out n) - limited lo hi (IZR (code g x v n) / IZR (2 ^ frac_of g v)))
-          + (limited lo hi (IZR (code g x v n) / IZR (2 ^ frac_of g v)) - limited lo hi (y n)))%R by ring.
-  eapply Rle_trans; [apply Rabs_triang|]. lra.
+  unfold at_most_, real. intros U H. apply andb_prop in H. destruct H as [H1 H2]. apply Z.ltb_lt in H1. apply Z.leb_le in H2.
+  apply IZR_le in H2. rewrite !mult_IZR in H2. assert (A : (0 < IZR unit)%R) by (apply IZR_lt; exact U).
+  assert (B : (0 < IZR (snd a))%R) by (apply IZR_lt; exact H1).
+  apply Rmult_le_reg_r with (IZR unit * IZR (snd a))%R; [apply Rmult_lt_0_compat; assumption|].
+  replace (IZR value / IZR unit * (IZR unit * IZR (snd a)))%R with (IZR value * IZR (snd a))%R by (field; lra).
+  replace (IZR (fst a) / IZR (snd a) * (IZR unit * IZR (snd a)))%R with (IZR (fst a) * IZR unit)%R by (field; lra). exact H2.
+Qed.
+Lemma part_small e value unit a : 0 < unit -> (Rabs (IZR unit * e) <= IZR value)%R -> at_most_ value unit a = true -> (Rabs e <= real a)%R.
+Proof.
+  intros U H A. apply Rle_trans with (2 := at_most_spec value unit a U A). assert (P : (0 < IZR unit)%R) by (apply IZR_lt; exact U).
+  rewrite Rabs_mult, (Rabs_pos_eq (IZR unit)) in H by lra. apply Rmult_le_reg_l with (IZR unit); [exact P|].
+  replace (IZR unit * (IZR value / IZR unit))%R with (IZR value) by (field; lra). exact H.
+Qed.
+
+Definition either (g : graph) (S : list source) (W : windows) (row : list (list Z)) : Z :=
+  Z.max (most_of g S W row) (most_of g S W (scale_rows (-1) row)).
+(* The parts as numbers, in units of 1 / (2^F 2^f K) but for the last one, which is in units of 1 / (2 2^F off_q). *)
+Record values := Values { input_ : Z; coefficients_ : Z; roundings_ : Z; start_ : Z; output_ : Z; unit_ : Z; unit_out : Z }.
+Definition parts_of (g : graph) (S : list source) (forms : list (option form)) (k : nat) (W : windows) (d : parts_)
+    (sections : list (list Z * list Z)) (lo hi off_p off_q : Z) : option values :=
+  match rounding_node g (out d) lo hi with
+  | None => None
+  | Some a =>
+    match op (nth a g blank), rows_of g S forms k (length g) (last_ d) (plan_ d) with
+    | Floor b, Some (row, R, K0) =>
+      let K := 2 ^ more d * K0 in
+      match affine g (last_ d) (held_ d) 100 b, exact_row sections (exact d) (least_ d * fine d) K with
+      | Some (alpha, beta, gamma), Some (E, Re) =>
+        let F := frac_of g b in
+        let f := frac_of g (taken d) in
+        let both := add_rows (scale_rows (2 ^ f * (2 ^ more d * alpha)) row) (place (entry d) (scale (- 2 ^ F) E)) in
+        let entering := place (entry d) (nth (entry d) both []) in
+        let others := without (entry d) both in
+        let from_first := if steady d
+          then Z.abs (2 ^ f * K * match held_ d with Some _ => beta | None => 0 end - 2 ^ F * sum E) * size g (taken d) else 0 in
+        if Nat.ltb (out d) (length g) && Nat.ltb a (length g) && Nat.ltb (last_ d) k && Nat.ltb (taken d) (length g)
+           && forallb (known_source g (length g)) (used S entering) && forallb (known_source g (length g)) (used S others)
+           && (frac_of g a =? 0) && (0 <=? F) && (0 <=? f) && (0 <? K) && (0 <? off_q) && (0 <? in_q d) && (0 <=? in_p d)
+           && (0 <? fine d) && (0 <=? more d)
+           && (steady d || match held_ d with None => true | Some _ => false end)
+        then Some (Values (2 ^ F * 2 ^ f * ((norm1 E * in_p d + in_q d - 1) / in_q d))
+               (either g S W entering + 2 ^ F * 2 ^ f * (Re / fine d + 1))
+               (either g S W others + 2 ^ f * (2 ^ more d * Z.abs alpha) * R) from_first
+               (Z.abs (2 * off_q * gamma - 2 ^ F * off_q + 2 * 2 ^ F * off_p) + 2 ^ F * off_q)
+               (2 ^ F * 2 ^ f * K) (2 * (2 ^ F * off_q)))
+        else None
+      | _, _ => None
+      end
+    | _, _ => None
+    end
+  end.
+Definition parts_hold (v : option values) (c : budget) : bool :=
+  match v with
+  | Some v => at_most_ (input_ v) (unit_ v) (of_input c) && at_most_ (coefficients_ v) (unit_ v) (of_coefficients c)
+      && at_most_ (roundings_ v) (unit_ v) (of_roundings c) && at_most_ (start_ v) (unit_ v) (of_start c)
+      && at_most_ (output_ v) (unit_out v) (of_output c)
+      && (close (input_ v) (unit_ v) (of_input c) && close (coefficients_ v) (unit_ v) (of_coefficients c)
+          && close (roundings_ v) (unit_ v) (of_roundings c) && close (start_ v) (unit_ v) (of_start c)
+          && close (output_ v) (unit_out v) (of_output c))
+  | None => false
+  end.
+
+(* The code is that of the exact filter and five errors, limited. *)
+Theorem error_parts g x S forms k W d sections lo hi off_p off_q bud (c : nat -> R) (w0 : Z) (c0 : R) :
+  ordered g = true -> closed k g = true -> every (fits_node g S forms) 0 (firstn k g) = true ->
+  parts_hold (parts_of g S forms k W d sections lo hi off_p off_q) bud = true ->
+  (forall n i, (i < length g)%nat -> in_range g x i n) -> window_holds g x W ->
+  (forall n, nth (entry d) (map (drive g x) S) (fun _ => 0%R) n = (IZR (code g x (taken d) n) - IZR w0)%R) ->
+  w0 = (if steady d then code g x (taken d) 0 else 0) -> c0 = (if steady d then c O else 0%R) ->
+  match held_ d with Some j => forall n, code g x j n = w0 | None => True end ->
+  (forall n, (Rabs (c n - IZR (code g x (taken d) n) / IZR (2 ^ frac_of g (taken d))%Z) <= IZR (in_p d) / IZR (in_q d))%R
+    /\ (Rabs (c n) <= IZR (least_ d))%R) ->
+  forall y, exact_filter sections (after c0 c) y ->
+  forall n, exists e, in_parts bud e
+    /\ IZR (code g x (out d) n) = limited (IZR lo) (IZR hi) (y (Z.of_nat n) - IZR off_p / IZR off_q + e).
+Proof.
+  intros G C E H Known Wh Entry W0 C0 Held Near y Y n. unfold parts_hold, parts_of in H.
+  destruct (rounding_node g (out d) lo hi) as [a|] eqn:Er; [|discriminate].
+  destruct (op (nth a g blank)) as [| | | | | | |b| | | | | |] eqn:Ea; try discriminate.
+  destruct (rows_of g S forms k (length g) (last_ d) (plan_ d)) as [[[row R] K1]|] eqn:Erow; [|discriminate].
+  set (K := 2 ^ more d * K1) in *.
+  destruct (affine g (last_ d) (held_ d) 100 b) as [[[alpha beta] gamma]|] eqn:Eaf; [|discriminate].
+  destruct (exact_row sections (exact d) (least_ d * fine d) K) as [[Ex Re]|] eqn:Eex; [|discriminate].
+  set (F := frac_of g b) in *. set (f := frac_of g (taken d)) in *.
+  set (both := add_rows (scale_rows (2 ^ f * (2 ^ more d * alpha)) row) (place (entry d) (scale (- 2 ^ F) Ex))) in *.
+  set (entering := place (entry d) (nth (entry d) both [])) in *. set (others := without (entry d) both) in *.
+  set (beta' := match held_ d with Some _ => beta | None => 0 end) in *.
+  set (from_first := if steady d then Z.abs (2 ^ f * K * beta' - 2 ^ F * sum Ex) * size g (taken d) else 0) in *.
+  set (cal := (norm1 Ex * in_p d + in_q d - 1) / in_q d) in *.
+  set (re := Re / fine d + 1) in *.
+  set (unit := 2 ^ F * 2 ^ f * K) in *.
+  match type of H with match (if ?b then _ else _) with Some _ => _ | None => _ end = _ => destruct b eqn:Hc; [|discriminate] end.
+  cbn [input_ coefficients_ roundings_ start_ output_ unit_ unit_out] in H.
+  apply andb_prop in H. destruct H as [H _]. apply andb_prop in H. destruct H as [H P5]. apply andb_prop in H. destruct H as [H P4].
+  apply andb_prop in H. destruct H as [H P3]. apply andb_prop in H. destruct H as [P1 P2].
+  rename Hc into H.
+  repeat match type of H with _ && _ = true => let X := fresh "X" in apply andb_prop in H; destruct H as [H X] end.
+  rename X0 into More. rename X1 into Fine. apply Z.leb_le in More. apply Z.ltb_lt in Fine.
+  apply Nat.ltb_lt in H. apply Nat.ltb_lt in X13. apply Nat.ltb_lt in X12. apply Nat.ltb_lt in X11. apply Z.eqb_eq in X8.
+  apply Z.leb_le in X7. apply Z.leb_le in X6. apply Z.ltb_lt in X5. apply Z.ltb_lt in X4. apply Z.ltb_lt in X3. apply Z.leb_le in X2.
+  assert (Lb : (b < a)%nat) by (apply (operands_before g G a b X13); rewrite Ea; left; reflexivity).
+  set (u := map (drive g x) S) in *.
+  (* The parts, all of them real numbers. *)
+  destruct (rows_spec g x S forms k (length g) G C E Known (last_ d) (plan_ d) row R K1 n X12 Erow
+    (fun m' _ => Known m' (last_ d) ltac:(pose proof (closed_length k g C); lia))) as [e1 [B1 H1]].
+  fold u in H1. set (v := trace g x (last_ d) n) in *.
+  set (mm := 2 ^ more d) in *. assert (M0 : 0 < mm) by (apply Z.pow_pos_nonneg; lia).
+  assert (m0 : (0 < IZR mm)%R) by (apply IZR_lt; exact M0).
+  assert (Kp : 0 < K) by assumption.
+  set (wcode := fun j => IZR (code g x (taken d) j)) in *.
+  set (ff := IZR (2 ^ f)) in *. set (FF := IZR (2 ^ F)).
+  assert (ff0 : (0 < ff)%R) by (apply IZR_lt, Z.pow_pos_nonneg; lia). assert (FF0 : (0 < FF)%R) by (apply IZR_lt, Z.pow_pos_nonneg; lia).
+  assert (K0 : (0 < IZR K)%R) by (apply IZR_lt; lia). assert (iq0 : (0 < IZR (in_q d))%R) by (apply IZR_lt; lia).
+  assert (ip0 : (0 <= IZR (in_p d) / IZR (in_q d))%R)
+    by (apply Rmult_le_pos; [apply IZR_le; lia|left; apply Rinv_0_lt_compat; exact iq0]).
+  assert (Least : forall j, (Rabs (after c0 c j) <= IZR (least_ d))%R).
+  { intros j. unfold after. destruct (j <? 0); [|apply Near]. rewrite C0. destruct (steady d); [apply Near|].
+    rewrite Rabs_R0. apply Rle_trans with (Rabs (c O)); [apply Rabs_pos|apply Near]. }
+  destruct (exact_row_fine sections (exact d) (least_ d) (fine d) K Ex Re (after c0 c) y Fine Eex Y Least (Z.of_nat n)) as [e2 [B2 H2]]. fold re in B2.
+  set (eps := fun j => (after c0 c j - after (IZR w0 / ff) (fun i => wcode i / ff) j)%R).
+  assert (Beps : forall j, (Rabs (eps j) <= IZR (in_p d) / IZR (in_q d))%R).
+  { intros j. unfold eps, after. destruct (j <? 0); [|apply Near]. rewrite C0, W0. destruct (steady d); [apply Near|].
+    replace (0 - 0 / ff)%R with 0%R by (field; lra). rewrite Rabs_R0. exact ip0. }
+  set (e3 := taps Ex eps (Z.of_nat n)).
+  assert (B3 : (Rabs e3 <= IZR cal)%R).
+  { unfold e3. apply Rle_trans with (IZR (norm1 Ex) * (IZR (in_p d) / IZR (in_q d)))%R; [apply taps_bound; [exact ip0|intros; apply Beps]|].
+    apply Rmult_le_reg_r with (IZR (in_q d)); [exact iq0|].
+    replace (IZR (norm1 Ex) * (IZR (in_p d) / IZR (in_q d)) * IZR (in_q d))%R with (IZR (norm1 Ex * in_p d)) by (rewrite mult_IZR; field; lra).
+    rewrite <- mult_IZR. apply IZR_le. unfold cal.
+    pose proof (Z.div_mod (norm1 Ex * in_p d + in_q d - 1) (in_q d) ltac:(lia)).
+    pose proof (Z.mod_pos_bound (norm1 Ex * in_p d + in_q d - 1) (in_q d) X3). lia. }
+  assert (H3 : (taps Ex (after c0 c) (Z.of_nat n) = (conv Ex (fun j => wcode j - IZR w0) n + IZR (sum Ex) * IZR w0) / ff + e3)%R).
+  { unfold e3.
+    rewrite (taps_ext Ex (after c0 c) (fun j => 1 * after (IZR w0 / ff) (fun i => wcode i / ff) j + eps j)%R)
+      by (intros; unfold eps; ring).
+    rewrite (taps_plus Ex (fun j => 1 * after (IZR w0 / ff) (fun i => wcode i / ff) j)%R), taps_multiple, taps_after.
+    rewrite (conv_ext Ex _ (fun j => / ff * (wcode j - IZR w0))%R) by (intros; field; lra). rewrite conv_multiple. field. lra. }
+  assert (Hb : (IZR (code g x b n) = IZR alpha * v + IZR beta' * IZR w0 + IZR gamma)%R).
+  { rewrite (affine_spec g x (last_ d) (held_ d) n G 100 b alpha beta gamma ltac:(lia) Eaf), !plus_IZR, !mult_IZR.
+    unfold v, trace, beta', code_if. destruct (held_ d) as [j|]; [rewrite Held; reflexivity|ring]. }
+  assert (Hboth : (total both u n = ff * (IZR mm * IZR alpha) * total row u n - FF * conv Ex (fun j => wcode j - IZR w0)%R n)%R).
+  { unfold both. rewrite total_add_rows, total_scale_rows, total_place, conv_scale, !mult_IZR, opp_IZR.
+    rewrite (conv_ext Ex (nth (entry d) u (fun _ => 0%R)) (fun j => wcode j - IZR w0)%R) by (intros; apply Entry). fold FF. fold ff. ring. }
+  assert (Apart : total both u n = (total others u n + total entering u n)%R).
+  { unfold others, entering. rewrite (total_without (entry d) both), total_place. ring. }
+  assert (Either : forall l, forallb (known_source g (length g)) (used S l) = true -> (Rabs (total l u n) <= IZR (either g S W l))%R).
+  { intros l Hl. pose proof (most_of_spec g x S (length g) W G Known Wh l n Hl) as U1.
+    pose proof (most_of_spec g x S (length g) W G Known Wh (scale_rows (-1) l) n) as U2.
+    rewrite used_scaled in U2. specialize (U2 Hl). rewrite total_scale_rows in U2. fold u in U1, U2.
+    assert (M1 : (IZR (most_of g S W l) <= IZR (either g S W l))%R) by (apply IZR_le; unfold either; lia).
+    assert (M2 : (IZR (most_of g S W (scale_rows (-1) l)) <= IZR (either g S W l))%R) by (apply IZR_le; unfold either; lia).
+    apply Rabs_le. lra. }
+  set (e4 := ((ff * IZR K * IZR beta' - FF * IZR (sum Ex)) * IZR w0)%R).
+  assert (B4 : (Rabs e4 <= IZR from_first)%R).
+  { unfold e4, from_first. rewrite W0. destruct (steady d) eqn:Es.
+    - rewrite mult_IZR, Rabs_mult, abs_IZR, minus_IZR, !mult_IZR. apply Rmult_le_compat_l; [apply Rabs_pos|].
+      pose proof (size_spec g x (taken d) 0) as Sz. apply Sz, Known, X11.
+    - rewrite Rmult_0_r, Rabs_R0. lra. }
+  set (s := (IZR (code g x b n) / FF)%R).
+  assert (Main : (FF * ff * IZR K * (s - IZR gamma / FF - y (Z.of_nat n))
+      = total both u n + e4 + ff * (IZR mm * IZR alpha) * e1 - FF * ff * (e3 + e2))%R).
+  { unfold s. rewrite Hb. unfold e4. rewrite Hboth.
+    replace (FF * ff * IZR K * ((IZR alpha * v + IZR beta' * IZR w0 + IZR gamma) / FF - IZR gamma / FF - y (Z.of_nat n)))%R
+      with (ff * IZR alpha * (IZR K * v) + ff * IZR K * IZR beta' * IZR w0 - FF * ff * (IZR K * y (Z.of_nat n)))%R by (field; lra).
+    assert (Hv : (IZR K * v = IZR mm * (total row u n + e1))%R) by (rewrite <- H1; unfold K; rewrite mult_IZR; ring).
+    rewrite Hv, H2, H3. field. lra. }
+  assert (R0 : (0 <= IZR R)%R) by (apply Rle_trans with (Rabs e1); [apply Rabs_pos|exact B1]).
+  assert (Unit : IZR unit = (FF * ff * IZR K)%R) by (unfold unit; rewrite !mult_IZR; reflexivity).
+  assert (unit0 : 0 < unit) by (unfold unit; apply Z.mul_pos_pos; [apply Z.mul_pos_pos; apply Z.pow_pos_nonneg; lia|exact Kp]).
+  assert (Unit0 : (0 < IZR unit)%R) by (apply IZR_lt; exact unit0).
+  assert (oq0 : (0 < IZR off_q)%R) by (apply IZR_lt; lia). assert (Pos : (0 < FF * ff)%R) by (apply Rmult_lt_0_compat; assumption).
+  set (ea := (- (FF * ff * e3) / IZR unit)%R). set (eb := ((total entering u n - FF * ff * e2) / IZR unit)%R).
+  set (er := ((total others u n + ff * (IZR mm * IZR alpha) * e1) / IZR unit)%R). set (es := (e4 / IZR unit)%R).
+  assert (Split : (s - IZR gamma / FF - y (Z.of_nat n) = ea + eb + er + es)%R).
+  { apply Rmult_eq_reg_l with (IZR unit); [|lra]. rewrite Unit at 1. rewrite Main, Apart. unfold ea, eb, er, es. field. lra. }
+  assert (Ba : (Rabs ea <= real (of_input bud))%R).
+  { apply (part_small ea _ unit _ unit0) with (2 := P1). replace (IZR unit * ea)%R with (- (FF * ff * e3))%R by (unfold ea; field; lra).
+    rewrite Rabs_Ropp, Rabs_mult, (Rabs_pos_eq (FF * ff)), !mult_IZR by lra. fold FF. fold ff. apply Rmult_le_compat_l; [lra|exact B3]. }
+  assert (Bb : (Rabs eb <= real (of_coefficients bud))%R).
+  { apply (part_small eb _ unit _ unit0) with (2 := P2).
+    replace (IZR unit * eb)%R with (total entering u n - FF * ff * e2)%R by (unfold eb; field; lra).
+    rewrite plus_IZR, !mult_IZR. fold FF. fold ff. unfold Rminus. eapply Rle_trans; [apply Rabs_triang|]. rewrite Rabs_Ropp.
+    apply Rplus_le_compat; [apply Either; exact X10|]. rewrite Rabs_mult, (Rabs_pos_eq (FF * ff)) by lra. apply Rmult_le_compat_l; [lra|exact B2]. }
+  assert (Br : (Rabs er <= real (of_roundings bud))%R).
+  { apply (part_small er _ unit _ unit0) with (2 := P3).
+    replace (IZR unit * er)%R with (total others u n + ff * (IZR mm * IZR alpha) * e1)%R by (unfold er; field; lra).
+    rewrite plus_IZR, !mult_IZR, abs_IZR. fold ff. fold mm. eapply Rle_trans; [apply Rabs_triang|].
+    apply Rplus_le_compat; [apply Either; exact X9|]. rewrite !Rabs_mult, (Rabs_pos_eq ff), (Rabs_pos_eq (IZR mm)) by lra.
+    apply Rmult_le_compat_l; [|exact B1]. apply Rmult_le_pos; [lra|apply Rmult_le_pos; [lra|apply Rabs_pos]]. }
+  assert (Bs : (Rabs es <= real (of_start bud))%R).
+  { apply (part_small es _ unit _ unit0) with (2 := P4). replace (IZR unit * es)%R with e4 by (unfold es; field; lra). exact B4. }
+  (* The last rounding. *)
+  assert (Ca : code g x a n = code g x b n / 2 ^ F).
+  { rewrite (code_spec g x G a n X13). unfold compute. rewrite Ea. change (frac (nth a g blank)) with (frac_of g a). rewrite X8.
+    fold F. rewrite Z.sub_0_r. reflexivity. }
+  assert (Rounded : (Rabs (IZR (code g x a n) - (s - 1 / 2)) <= 1 / 2)%R).
+  { rewrite Ca. unfold s, FF. apply floor_near. apply Z.pow_pos_nonneg; lia. }
+  assert (Out : IZR (code g x (out d) n) = limited (IZR lo) (IZR hi) (IZR (code g x a n))).
+  { rewrite <- limited_code. f_equal. unfold rounding_node in Er. pose proof (Known n (out d) H) as Ro. unfold in_range in Ro.
+    destruct (op (nth (out d) g blank)) as [| | | | | | |o'| | |o'| | |] eqn:Eo; try discriminate.
+    - destruct ((lo <=? low (nth (out d) g blank)) && (high (nth (out d) g blank) <=? hi)) eqn:Ec; [|discriminate]. injection Er as <-.
+      apply andb_prop in Ec. destruct Ec as [Ec1 Ec2]. apply Z.leb_le in Ec1. apply Z.leb_le in Ec2. lia.
+    - destruct ((low (nth (out d) g blank) =? lo) && (high (nth (out d) g blank) =? hi)) eqn:Ec; [|discriminate]. injection Er as <-.
+      apply andb_prop in Ec. destruct Ec as [Ec1 Ec2]. apply Z.eqb_eq in Ec1. apply Z.eqb_eq in Ec2.
+      rewrite (code_spec g x G (out d) n H). unfold compute. rewrite Eo, Ec1, Ec2. reflexivity. }
+  set (shift := (IZR gamma / FF - 1 / 2 + IZR off_p / IZR off_q)%R).
+  set (eo := (IZR (code g x a n) - (s - 1 / 2) + shift)%R).
+  assert (Bo : (Rabs eo <= real (of_output bud))%R).
+  { assert (o0 : 0 < 2 * (2 ^ F * off_q)) by (apply Z.mul_pos_pos; [lia|apply Z.mul_pos_pos; [apply Z.pow_pos_nonneg; lia|lia]]).
+    apply (part_small eo _ _ _ o0) with (2 := P5). rewrite plus_IZR, abs_IZR, plus_IZR, minus_IZR, !mult_IZR. fold FF.
+    set (h := (IZR (code g x a n) - (s - 1 / 2))%R) in *.
+    replace (2 * (FF * IZR off_q) * eo)%R with ((2 * (FF * IZR off_q)) * h
+      + (2 * IZR off_q * IZR gamma - FF * IZR off_q + 2 * FF * IZR off_p))%R by (unfold eo, shift; field; lra).
+    eapply Rle_trans; [apply Rabs_triang|]. rewrite Rplus_comm. apply Rplus_le_compat_l.
+    assert (W2 : (0 < FF * IZR off_q)%R) by (apply Rmult_lt_0_compat; assumption).
+    rewrite Rabs_mult, (Rabs_pos_eq (2 * (FF * IZR off_q))) by lra.
+    replace (FF * IZR off_q)%R with (2 * (FF * IZR off_q) * (1 / 2))%R at 2 by field. apply Rmult_le_compat_l; [lra|exact Rounded]. }
+  exists (ea + eb + er + es + eo)%R. split; [exists ea, eb, er, es, eo; repeat split; assumption|].
+  rewrite Out. f_equal. rewrite <- Split. unfold eo, shift. ring.
+Qed.
+
+(* So the code is within the sum of the parts of that of the exact filter. *)
+Theorem within_sum c code lo hi y e : in_parts c e -> code = limited lo hi (y + e) -> (Rabs (code - limited lo hi y) <= sum_of c)%R.
+Proof.
+  intros [a [b [r [s [o [-> [Ba [Bb [Br [Bs Bo]]]]]]]]]] ->. eapply Rle_trans; [apply limited_near|]. unfold sum_of.
+  replace (y + (a + b + r + s + o) - y)%R with (a + b + r + s + o)%R by ring.
+  eapply Rle_trans; [apply Rabs_triang|]. apply Rplus_le_compat; [|exact Bo].
+  eapply Rle_trans; [apply Rabs_triang|]. apply Rplus_le_compat; [|exact Bs].
+  eapply Rle_trans; [apply Rabs_triang|]. apply Rplus_le_compat; [|exact Br].
+  eapply Rle_trans; [apply Rabs_triang|]. apply Rplus_le_compat; [exact Ba|exact Bb].
 Qed.

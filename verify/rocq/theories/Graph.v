@@ -1,64 +1,10 @@
-(* A dataflow graph of integers, as a certificate lists it, and what it computes.
+(* Each code of a graph obeys the equation of its node's operation, and what holds at all earlier ones holds for ever. *)
+Require Import Bool ZArith List Lia. Import ListNotations.
+From Sosmith Require Import Definitions.
+Open Scope Z_scope.
 
-   A node is an operation on earlier nodes; a delay may take a later one. Every node has a code, an integer, and `frac`
-   fraction bits: its value is code / 2^frac. At each sample the nodes are computed in their order. *)
-Require Import Bool ZArith List Lia. Import ListNotations. Open Scope Z_scope.
-
-Inductive operation :=
-  | Input (port : nat)               (* the code at an input of the core *)
-  | Constant (code : Z)
-  | Add (a b : nat)                  (* binary points aligned *)
-  | Subtract (a b : nat)
-  | Multiply (a b : nat)
-  | Scale (a : nat) (by_ bits : Z)   (* times by_ / 2^bits *)
-  | Shift (a : nat) (by_ : Z)        (* times 2^by_: the same code with another binary point *)
-  | Floor (a : nat)                  (* rounds down to `frac` fraction bits *)
-  | Fraction (a : nat) (kept : Z)    (* what rounding down to `kept` fraction bits drops *)
-  | Truncate (a : nat)               (* rounds towards 0 to `frac` fraction bits *)
-  | Clamp (a : nat)                  (* limits to low .. high *)
-  | Bound (a : nat)                  (* the same, and claimed to be in low .. high *)
-  | Wire (a : nat)                   (* the same: the input of a stage *)
-  | Delay (a : nat).                 (* the code at the sample before; 0 at the first one *)
-
-Record node := Node { op : operation; frac : Z; low : Z; high : Z }.
-Definition graph := list node.
-Definition blank := Node (Constant 0) 0 0 0.
-Definition frac_of (g : graph) (i : nat) := frac (nth i g blank).
-
-(* The code of a node, from the codes of the nodes before it at this sample, of all nodes at the last one, and of the
-   inputs at this one. *)
-Definition compute (g : graph) (now last : list Z) (inputs : nat -> Z) (v : node) : Z :=
-  let code i := nth i now 0 in
-  let aligned i := code i * 2 ^ (frac v - frac_of g i) in
-  let dropped i := 2 ^ (frac_of g i - frac v) in
-  match op v with
-  | Input port => inputs port
-  | Constant c => c
-  | Add a b => aligned a + aligned b
-  | Subtract a b => aligned a - aligned b
-  | Multiply a b => code a * code b
-  | Scale a c _ => code a * c
-  | Shift a _ | Bound a | Wire a => code a
-  | Floor a => code a / dropped a
-  | Fraction a kept => code a mod 2 ^ (frac_of g a - kept)
-  | Truncate a => Z.quot (code a) (dropped a)
-  | Clamp a => Z.max (low v) (Z.min (high v) (code a))
-  | Delay a => nth a last 0
-  end.
-
-Fixpoint step (g : graph) (rest : list node) (now last : list Z) (inputs : nat -> Z) : list Z :=
-  match rest with
-  | [] => now
-  | v :: rest' => step g rest' (now ++ [compute g now last inputs v]) last inputs
-  end.
-Definition sample (g : graph) (last : list Z) (inputs : nat -> Z) : list Z := step g g [] last inputs.
-
-(* The codes of all nodes at sample n, for inputs x: x n p is the code at input p. Before the first sample all are 0. *)
-Fixpoint run (g : graph) (x : nat -> nat -> Z) (n : nat) : list Z :=
-  sample g (match n with O => [] | S m => run g x m end) (x n).
 Definition before (g : graph) (x : nat -> nat -> Z) (n : nat) : list Z :=
   match n with O => [] | S m => run g x m end.
-Definition code (g : graph) (x : nat -> nat -> Z) (i n : nat) : Z := nth i (run g x n) 0.
 
 (* Operands are before the node that takes them, but for a delay; binary points fit. Then each code obeys the equation
    of its operation. *)

@@ -8,7 +8,7 @@
    node by node, each against those of its operands (`fits_node`): what they leave of the equations then obeys the same
    equations without any source, from states of 0, and so is 0, by induction over time and graph. *)
 Require Import Bool ZArith Reals List Lia Lra. Import ListNotations.
-From Sosmith Require Import Streams PeakGain Graph Ranges.
+From Sosmith Require Import Definitions Streams Graph Ranges.
 Open Scope Z_scope.
 
 Inductive source :=
@@ -52,7 +52,7 @@ Definition reach (g : graph) (s : source) : Z * Z :=
 Definition proper (s : source) : bool := match s with Of _ => true | Rounding _ b | Truncation _ b => 0 <? b end.
 
 Record form := Form { under : list Z; over : list (list Z) }.
-Definition signal (g : graph) (x : nat -> nat -> Z) (i : nat) : sequence := fun n => IZR (code g x i n).
+Definition trace (g : graph) (x : nat -> nat -> Z) (i : nat) : sequence := fun n => IZR (code g x i n).
 
 (* Rows of numerators. *)
 Fixpoint add_rows (A B : list (list Z)) : list (list Z) :=
@@ -146,11 +146,9 @@ Fixpoint chain (g : graph) (fuel a : nat) : nat * nat :=
   end.
 Definition depth : nat := 8.
 
-(* Whether the form of a node follows from those of its operands. A wire may have its form multiplied by a polynomial. *)
+(* Whether the form of a node follows from those of its operands. *)
 Definition same_under (f h : form) : bool := same (under f) (under h).
-Definition factor (F : list (nat * list Z)) (i : nat) : list Z :=
-  match List.find (fun p => Nat.eqb i (fst p)) F with Some p => snd p | None => [1] end.
-Definition fits_node (g : graph) (sources : list source) (F : list (nat * list Z)) (forms : list (option form))
+Definition fits_node (g : graph) (sources : list source) (forms : list (option form))
     (i : nat) (v : node) : bool :=
   match nth i forms None with
   | None => true
@@ -174,11 +172,6 @@ Definition fits_node (g : graph) (sources : list source) (F : list (nat * list Z
            same_rows (over f) (add_rows (scale_rows (up a) (over h)) (scale_rows (- up b) (over k)))))
        | Scale a c _ => one a (fun h => same_rows (over f) (scale_rows c (over h)))
        | Shift a _ | Bound a => one a (fun h => same_rows (over f) (over h))
-       | Wire a => match nth a forms None with
-                   | Some h => same (under f) (mul (factor F i) (under h))
-                               && same_rows (over f) (map (mul (factor F i)) (over h))
-                   | None => false
-                   end
        | Delay a => one a (fun h => same_rows (over f) (map (cons 0) (over h)))
        | Floor a => rounded a Rounding
        | Truncate a => rounded a Truncation
@@ -188,11 +181,11 @@ Definition fits_node (g : graph) (sources : list source) (F : list (nat * list Z
   end.
 
 Section Forms.
-Variables (g : graph) (x : nat -> nat -> Z) (sources : list source) (F : list (nat * list Z)).
+Variables (g : graph) (x : nat -> nat -> Z) (sources : list source).
 Variables (forms : list (option form)) (k : nat).
 Hypothesis G : ordered g = true.
 Hypothesis C : closed k g = true.
-Hypothesis E : every (fits_node g sources F forms) 0 (firstn k g) = true.
+Hypothesis E : every (fits_node g sources forms) 0 (firstn k g) = true.
 
 Let u := map (drive g x) sources.
 
@@ -219,7 +212,7 @@ Proof.
   rewrite (code_spec g x G a n Ha). unfold compute. rewrite Eo, before_code. destruct n as [|m]; [exact F0|apply IH].
 Qed.
 
-Definition holds (f : form) (i n : nat) : Prop := conv (under f) (signal g x i) n = total (over f) u n.
+Definition holds (f : form) (i n : nat) : Prop := conv (under f) (trace g x i) n = total (over f) u n.
 
 Lemma two_terms d (y a b : sequence) p q n : (forall m, y m = p * a m + q * b m)%R ->
   conv d y n = (p * conv d a n + q * conv d b n)%R.
@@ -255,7 +248,7 @@ Proof.
     rewrite (same_rows_total _ _ T), total_place, (driven _ _ Es). reflexivity. }
   assert (One : forall a (test : form -> bool), In a (operands (op v)) ->
     match nth a forms None with Some h => same_under f h && test h | None => false end = true ->
-    exists h, test h = true /\ conv (under f) (signal g x a) n = total (over h) u n).
+    exists h, test h = true /\ conv (under f) (trace g x a) n = total (over h) u n).
   { intros a test Ha Ht. destruct (nth a forms None) as [h|] eqn:Eh; [|discriminate].
     apply andb_prop in Ht. destruct Ht as [H1 H2]. exists h. split; [exact H2|].
     rewrite (same_conv _ _ H1). apply (Now a (O a Ha) h Eh). }
@@ -284,12 +277,12 @@ Proof.
     assert (Ha : (a < length g)%nat) by (specialize (O a Ia); lia).
     rewrite (lost_term a (frac v) kind (fun z => IZR (rem z (2 ^ (frac_of g a - frac v)))) s (under f) n Ha) in H3;
       [|rewrite H0; reflexivity|intros; apply Hd|exact Es].
-    assert (H4 : conv (under f) (signal g x a) n = total (over h) u n)
+    assert (H4 : conv (under f) (trace g x a) n = total (over h) u n)
       by (rewrite (same_conv _ _ H1); apply (Now a (O a Ia) h Eh)).
-    assert (H5 : conv (under f) (signal g x a) n
-      = (IZR (2 ^ (frac_of g a - frac v))%Z * conv (under f) (signal g x i) n
+    assert (H5 : conv (under f) (trace g x a) n
+      = (IZR (2 ^ (frac_of g a - frac v))%Z * conv (under f) (trace g x i) n
          + 1 * conv (under f) (fun m => IZR (rem (code g x a m) (2 ^ (frac_of g a - frac v))%Z)) n)%R).
-    { apply two_terms. intros m. unfold signal. rewrite (Hc m) at 1. rewrite plus_IZR, mult_IZR. ring. }
+    { apply two_terms. intros m. unfold trace. rewrite (Hc m) at 1. rewrite plus_IZR, mult_IZR. ring. }
     assert (H6 : (0 < IZR (2 ^ (frac_of g a - frac v)))%R) by (apply IZR_lt; exact Hp).
     unfold holds. apply Rmult_eq_reg_l with (IZR (2 ^ (frac_of g a - frac v))); [|lra].
     rewrite H3, <- H4, H5. ring. }
@@ -298,16 +291,16 @@ Proof.
   - destruct (One a _ (or_introl eq_refl) T) as [h [T2 Ha]].
     destruct (One b _ (or_intror (or_introl eq_refl)) T2) as [h' [T3 Hb]].
     unfold holds. rewrite (same_rows_total _ _ T3), total_add_rows, !total_scale_rows, <- Ha, <- Hb.
-    apply two_terms. intros m. unfold signal. rewrite Code, plus_IZR, !mult_IZR. unfold code. ring.
+    apply two_terms. intros m. unfold trace. rewrite Code, plus_IZR, !mult_IZR. unfold code. ring.
   - destruct (One a _ (or_introl eq_refl) T) as [h [T2 Ha]].
     destruct (One b _ (or_intror (or_introl eq_refl)) T2) as [h' [T3 Hb]].
     unfold holds. rewrite (same_rows_total _ _ T3), total_add_rows, !total_scale_rows, <- Ha, <- Hb.
-    apply two_terms. intros m. unfold signal. rewrite Code, minus_IZR, opp_IZR, !mult_IZR. unfold code. ring.
+    apply two_terms. intros m. unfold trace. rewrite Code, minus_IZR, opp_IZR, !mult_IZR. unfold code. ring.
   - destruct (One a _ (or_introl eq_refl) T) as [h [T2 Ha]].
     unfold holds. rewrite (same_rows_total _ _ T2), total_scale_rows, <- Ha, <- conv_multiple.
-    apply conv_ext. intros m _. unfold signal. rewrite Code, mult_IZR. unfold code. ring.
+    apply conv_ext. intros m _. unfold trace. rewrite Code, mult_IZR. unfold code. ring.
   - destruct (One a _ (or_introl eq_refl) T) as [h [T2 Ha]].
-    unfold holds. rewrite (same_rows_total _ _ T2), <- Ha. apply conv_ext. intros m _. unfold signal. rewrite Code. reflexivity.
+    unfold holds. rewrite (same_rows_total _ _ T2), <- Ha. apply conv_ext. intros m _. unfold trace. rewrite Code. reflexivity.
   - apply Z.ltb_lt in P. assert (D : 0 < 2 ^ (frac_of g a - frac v)) by (apply Z.pow_pos_nonneg; lia).
     apply (Rounded a Rounding Z.modulo); try exact D; auto.
     + intros m. rewrite Code. unfold code. apply Z.div_mod. lia.
@@ -318,26 +311,19 @@ Proof.
     unfold holds. rewrite (same_rows_total _ _ T), total_place.
     rewrite (lost_term a kept Rounding (fun z => IZR (z mod 2 ^ (frac_of g a - kept))) s (under f) n Ha);
       [|reflexivity|reflexivity|exact Es].
-    apply conv_ext. intros m _. unfold signal. rewrite Code. reflexivity.
+    apply conv_ext. intros m _. unfold trace. rewrite Code. reflexivity.
   - apply Z.ltb_lt in P. assert (D : 0 < 2 ^ (frac_of g a - frac v)) by (apply Z.pow_pos_nonneg; lia).
     apply (Rounded a Truncation Z.rem); try exact D; auto.
     + intros m. rewrite Code. unfold code. apply Z.quot_rem. lia.
   - destruct (One a _ (or_introl eq_refl) T) as [h [T2 Ha]].
-    unfold holds. rewrite (same_rows_total _ _ T2), <- Ha. apply conv_ext. intros m _. unfold signal. rewrite Code. reflexivity.
-  - destruct (nth a forms None) as [h|] eqn:Eh; [|discriminate].
-    apply andb_prop in T. destruct T as [T1 T2]. unfold holds.
-    rewrite (same_conv _ _ T1), conv_mul, (same_rows_total _ _ T2), <- conv_total.
-    apply conv_ext. intros m Hm. rewrite (conv_ext (under h) (signal g x i) (signal g x a)).
-    + assert (Hia : (a < i)%nat) by (apply O; left; reflexivity).
-      destruct (Nat.eq_dec m n) as [->|]; [apply (Now a Hia h Eh)|apply (Past m a ltac:(lia) ltac:(lia) h Eh)].
-    + intros j _. unfold signal. rewrite Code. reflexivity.
+    unfold holds. rewrite (same_rows_total _ _ T2), <- Ha. apply conv_ext. intros m _. unfold trace. rewrite Code. reflexivity.
   - destruct (nth a forms None) as [h|] eqn:Eh; [|discriminate].
     apply andb_prop in T. destruct T as [T1 T2]. unfold holds.
     rewrite (same_rows_total _ _ T2), total_late, (same_conv _ _ T1).
-    rewrite (conv_ext (under h) (signal g x i) (fun m => match m with O => 0%R | S j => signal g x a j end)).
-    + rewrite (conv_late_one (under h) (signal g x a)). destruct n as [|m]; [reflexivity|].
+    rewrite (conv_ext (under h) (trace g x i) (fun m => match m with O => 0%R | S j => trace g x a j end)).
+    + rewrite (conv_late_one (under h) (trace g x a)). destruct n as [|m]; [reflexivity|].
       apply (Past m a ltac:(lia) (closed_spec k g i a C Hi Eo) h Eh).
-    + intros m _. unfold signal. rewrite Code, before_code. destruct m; reflexivity.
+    + intros m _. unfold trace. rewrite Code, before_code. destruct m; reflexivity.
 Qed.
 
 (* Sources stay in their ranges, where those that are codes of nodes do. *)
@@ -355,52 +341,10 @@ Proof.
   - simpl in Hp. apply andb_prop in Hp. destruct Hp as [_ Hp]. apply IH; [exact Hp|].
     intros i n Hi. apply Hr. right. exact Hi.
 Qed.
-
-(* Ranges by peak gains: with h from outside, every target stays within its node's range. *)
-Definition gains_hold (D h : list Z) (K : Z) (targets : list nat) : bool :=
-  let r := norm1 (rest D h K) in
-  let b := map (reach g) sources in
-  let below := map opposite b in
-  forallb proper sources && (r <? K)
-  && forallb (fun t =>
-       Nat.ltb t k
-       && match nth t forms None with
-          | Some f => same D (under f) && range_fits r K (map (mul h) (over f)) b below 1 (low (nth t g blank)) (high (nth t g blank))
-          | None => false
-          end) targets.
-
-Theorem ranges_by_gain (D h : list Z) (K : Z) (targets : list nat) :
-  gains_hold D h K targets = true -> (forall i n, In (Of i) sources -> in_range g x i n) ->
-  forall t n, In t targets -> in_range g x t n.
-Proof.
-  unfold gains_hold. intros H Hr t n Ht. apply andb_prop in H. destruct H as [H H3].
-  apply andb_prop in H. destruct H as [H1 H2].
-  rewrite forallb_forall in H3. specialize (H3 t Ht). apply andb_prop in H3. destruct H3 as [Htk H3].
-  apply Nat.ltb_lt in Htk.
-  destruct (nth t forms None) as [f|] eqn:Ef; [|discriminate].
-  apply andb_prop in H3. destruct H3 as [H4 H5].
-  assert (R := range D h K (over f) (map (reach g) sources) 1 (low (nth t g blank)) (high (nth t g blank))).
-  unfold range_holds in R. rewrite H2, H5 in R. specialize (R eq_refl (signal g x t) u).
-  assert (X : (IZR (low (nth t g blank)) <= 1 * signal g x t n <= IZR (high (nth t g blank)))%R).
-  { apply R; [|apply sources_within; assumption].
-    intros m. rewrite (same_conv _ _ H4). apply (forms_hold m t Htk f Ef). }
-  unfold in_range. unfold signal in X. rewrite Rmult_1_l in X. split; apply le_IZR; lra.
-Qed.
 End Forms.
 
-(* The same, of a graph whose first nodes are known to stay in their ranges. *)
-Definition known_source (g : graph) (k : nat) (s : source) : bool := match s with Of i => known g k i | _ => true end.
-Theorem ranges_of_targets (g : graph) (x : nat -> nat -> Z) sources F forms first k D h K targets :
-  ordered g = true -> closed k g = true -> every (fits_node g sources F forms) 0 (firstn k g) = true ->
-  forallb (known_source g first) sources = true -> gains_hold g sources forms k D h K targets = true ->
-  (forall n i, (i < first)%nat -> in_range g x i n) -> forall t n, In t targets -> in_range g x t n.
-Proof.
-  intros G C E S H B. apply (ranges_by_gain g x sources F forms k G C E D h K targets H).
-  intros i n Hi. rewrite forallb_forall in S. apply (known_in_range first g x i n G B). exact (S (Of i) Hi).
-Qed.
-
 (* Forms from those of states and sources: a help to write less, as every form is checked. *)
-Definition derived (g : graph) (sources : list source) (F : list (nat * list Z)) (W : list (nat * form))
+Definition derived (g : graph) (sources : list source) (W : list (nat * form))
     (forms : list (option form)) (i : nat) (v : node) : option form :=
   let got a := nth a forms None in
   let up a := 2 ^ (frac v - frac_of g a) in
@@ -421,16 +365,13 @@ Definition derived (g : graph) (sources : list source) (F : list (nat * list Z))
     | Subtract a b => both a b (-1)
     | Scale a c _ => match got a with Some f => Some (Form (under f) (scale_rows c (over f))) | None => None end
     | Shift a _ | Bound a => got a
-    | Wire a => match got a with
-                | Some f => Some (Form (mul (factor F i) (under f)) (map (mul (factor F i)) (over f)))
-                | None => None end
     | Floor a => rounded a Rounding
     | Truncate a => rounded a Truncation
     | _ => None end
   end.
-Fixpoint fill (g : graph) (sources : list source) (F : list (nat * list Z)) (W : list (nat * form))
+Fixpoint fill (g : graph) (sources : list source) (W : list (nat * form))
     (forms : list (option form)) (rest : list node) : list (option form) :=
   match rest with
   | [] => forms
-  | v :: rest' => fill g sources F W (forms ++ [derived g sources F W forms (length forms) v]) rest'
+  | v :: rest' => fill g sources W (forms ++ [derived g sources W forms (length forms) v]) rest'
   end.

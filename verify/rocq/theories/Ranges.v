@@ -3,11 +3,8 @@
    Most ranges follow from those of the operands by interval arithmetic: induction over time and graph. Where recursion
    makes intervals grow without end, a node's range is given from elsewhere (`given`): from a peak gain. *)
 Require Import Bool ZArith List Lia. Import ListNotations.
-From Sosmith Require Import Graph.
+From Sosmith Require Import Definitions Graph.
 Open Scope Z_scope.
-
-Definition in_range (g : graph) (x : nat -> nat -> Z) (i n : nat) : Prop :=
-  low (nth i g blank) <= code g x i n <= high (nth i g blank).
 
 (* The smallest and the largest code that an operation makes of codes within their ranges. *)
 Definition interval (g : graph) (ports : list (Z * Z)) (v : node) : Z * Z :=
@@ -31,8 +28,6 @@ Definition interval (g : graph) (ports : list (Z * Z)) (v : node) : Z * Z :=
   | Clamp _ => (low v, high v)
   | Delay a => (Z.min 0 (lo a), Z.max 0 (hi a))
   end.
-Definition inputs_within (ports : list (Z * Z)) (x : nat -> nat -> Z) : Prop :=
-  forall n p, (p < length ports)%nat -> fst (nth p ports (0, 0)) <= x n p <= snd (nth p ports (0, 0)).
 Definition has_port (ports : list (Z * Z)) (v : node) : bool :=
   match op v with Input p => Nat.ltb p (length ports) | _ => true end.
 Definition follows (g : graph) (ports : list (Z * Z)) (given : list nat) (i : nat) (v : node) : bool :=
@@ -143,6 +138,17 @@ Proof.
     unfold in_range in H. lia.
 Qed.
 
+(* The same, where the first nodes are known already. *)
+Theorem ranges_further (known k : nat) (g : graph) (ports : list (Z * Z)) (given : list nat) (x : nat -> nat -> Z) :
+  ordered g = true -> closed k g = true -> every (follows g ports (seq 0 known ++ given)) 0 (firstn k g) = true ->
+  inputs_within ports x -> (forall n i, (i < known)%nat -> in_range g x i n) ->
+  (forall i n, In i given -> in_range g x i n) ->
+  forall n i, (i < k)%nat -> in_range g x i n.
+Proof.
+  intros G C F X K Y. apply (ranges k g ports (seq 0 known ++ given) x G C F X).
+  intros i n H. apply in_app_or in H. destruct H as [H|H]; [apply in_seq in H; apply K; lia|apply Y, H].
+Qed.
+
 (* Nodes whose range needs nothing of the others: constants, and those that are known already, the first k. *)
 Definition known (g : graph) (k i : nat) : bool :=
   Nat.ltb i k
@@ -160,3 +166,25 @@ Proof.
   destruct (op (nth i g blank)); try discriminate. apply andb_prop in E. destruct E as [E1 E2].
   apply Z.leb_le in E1. apply Z.leb_le in E2. lia.
 Qed.
+
+(* That no range is wider than those of its operands make it: nothing that is proven of a filter rests on this. *)
+(* Delays may be wider where their source has all of its operand's range. *)
+Definition delay_is_tight (g : graph) (a : nat) (v : node) : bool :=
+  let s := nth a g blank in
+  let least := Z.min (low s) 0 in let most := Z.max (high s) 0 in
+  let plain := (low v =? least) && (high v =? most) in
+  let against i := let of := nth i g blank in
+    ((low v =? least) || ((low s =? low of) && (low v <=? least))) && ((high v =? most) || ((high s =? high of) && (most <=? high v))) in
+  match op s with
+  | Input _ | Wire _ | Delay _ => plain
+  | Bound b => against b
+  | _ => against a
+  end.
+Definition tight (g : graph) (ports : list (Z * Z)) (i : nat) (v : node) : bool :=
+  match op v with
+  | Bound a => (low (nth a g blank) <=? low v) && (high v <=? high (nth a g blank)) && (low v <=? high v)
+  | Clamp _ => low v <=? high v
+  | Delay a => delay_is_tight g a v
+  | _ => (low v =? fst (interval g ports v)) && (high v =? snd (interval g ports v)) && has_port ports v
+  end.
+Definition ranges_are_tight (g : graph) (ports : list (Z * Z)) : bool := every (tight g ports) 0 g.

@@ -119,14 +119,3 @@ Proof.
   destruct H as [|x y u b Hx H]; simpl; [lra|].
   rewrite prefix_add, plus_IZR. apply Rplus_le_compat; [apply conv_tops, Hx|apply IH, H].
 Qed.
-
-(* Among the first n + 1 values of a sequence one has the largest magnitude. *)
-Lemma argmax (u : sequence) n : exists m, (m <= n)%nat /\ forall k, (k <= n)%nat -> Rabs (u k) <= Rabs (u m).
-Proof.
-  induction n as [|n [m [Hm H]]].
-  { exists 0%nat; split; auto. intros k Hk; replace k with 0%nat by lia; lra. }
-  destruct (Rle_dec (Rabs (u m)) (Rabs (u (S n)))) as [L|L].
-  - exists (S n); split; auto. intros k Hk.
-    destruct (Nat.eq_dec k (S n)) as [->|]; [lra|]. apply Rle_trans with (2 := L), H; lia.
-  - exists m; split; [lia|]. intros k Hk. destruct (Nat.eq_dec k (S n)) as [->|]; [lra|]. apply H; lia.
-Qed.

@@ -100,7 +100,12 @@ def _length(name: str, text: str) -> float:
 
 
 def _options(
-    method: str, sensor_type: str | None, required_r: float | None, robust: bool, accept: float | None
+    method: str,
+    sensor_type: str | None,
+    required_r: float | None,
+    robust: bool,
+    accept: float | None,
+    order: int | None,
 ) -> FitOptions:
     from sosmith.interface.instrument.calibration_store import FitOptions
 
@@ -110,6 +115,7 @@ def _options(
         required_r=required_r,
         robust=robust,
         accept=accept,
+        order=order,
     )
 
 
@@ -152,6 +158,12 @@ _ACCEPT = click.option(
     help="Largest acceptable 95 % interval of a reading's clearance, such as 0.2mm for +-0.2 mm, wherever there are "
     "measurements.",
 )
+_ORDER = click.option(
+    "--order",
+    type=click.IntRange(2, 8),
+    help="With --method bayes: highest order in the voltage of the polynomial of a day with measurements of its own; "
+    "kept for later fits. The hardware must have room for it.  [default: unchanged; 2 for a new sensor]",
+)
 _VERSION = click.option("--version", "number", type=int, help="Version number.  [default: the newest]")
 
 
@@ -171,6 +183,7 @@ _VERSION = click.option("--version", "number", type=int, help="Version number.  
 @_range("temperature", "degC", DEFAULT_RANGES[2])
 @_METHOD
 @_TYPE
+@_ORDER
 @_ACCEPT
 @_REQUIRED_R
 @_ROBUST
@@ -187,6 +200,7 @@ def add_command(
     temperature_range: _Range | None,
     method: str,
     sensor_type: str | None,
+    order: int | None,
     accept: float | None,
     required_r: float | None,
     robust: bool,
@@ -207,7 +221,7 @@ def add_command(
     """
     from sosmith.interface.instrument.calibration_store import CalibrationStore
 
-    options = _options(method, sensor_type, required_r, robust, accept)
+    options = _options(method, sensor_type, required_r, robust, accept, order)
     with show_progress() as step:
         added = CalibrationStore(store).add(
             sensor,
@@ -265,6 +279,7 @@ def _note_addition(file: Path, store: Path, added: Added) -> None:
     help="Standard uncertainty of a target's clearance, where TARGETS has no column uncertainty_mm.",
 )
 @click.option("--surprising", is_flag=True, help="Store readings that look like a slip.")
+@_ORDER
 @_STORE
 @_SENSOR
 @_DATE
@@ -274,6 +289,7 @@ def reference_command(
     readings: tuple[tuple[float, float, float], ...],
     uncertainty: float,
     surprising: bool,
+    order: int | None,
     store: Path,
     sensor: str,
     date: str,
@@ -301,6 +317,7 @@ def reference_command(
             date,
             uncertainty=uncertainty,
             surprising=surprising,
+            order=order,
             progress=step,
         )
     if as_json:
@@ -317,6 +334,7 @@ def reference_command(
 @_DATE
 @_METHOD
 @_TYPE
+@_ORDER
 @_ACCEPT
 @_REQUIRED_R
 @_ROBUST
@@ -327,6 +345,7 @@ def fit_command(
     date: str,
     method: str,
     sensor_type: str | None,
+    order: int | None,
     accept: float | None,
     required_r: float | None,
     robust: bool,
@@ -344,7 +363,7 @@ def fit_command(
     """
     from sosmith.interface.instrument.calibration_store import CalibrationStore
 
-    options = _options(method, sensor_type, required_r, robust, accept)
+    options = _options(method, sensor_type, required_r, robust, accept, order)
     with show_progress() as step:
         fitted = CalibrationStore(store).fit(sensor, date, options, step)
     _warn(fitted)
@@ -511,6 +530,11 @@ def plot_command(store: Path, sensor: str, number: int | None, output: Path | No
     "[default: lowest, middle and highest one measured]",
 )
 @click.option("--most", type=click.IntRange(1, 1000), default=60, show_default=True, help="Most measurements.")
+@click.option(
+    "--uncertainty",
+    callback=_millimetres,
+    help="Standard uncertainty of what is measured, as of reference targets.  [default: it scatters as before]",
+)
 @_STORE
 @_SENSOR
 @_DATE
@@ -520,6 +544,7 @@ def advise_command(
     within: float,
     temperatures: tuple[float, ...],
     most: int,
+    uncertainty: float | None,
     store: Path,
     sensor: str,
     date: str,
@@ -532,13 +557,20 @@ def advise_command(
 
     \b
         sosmith calibrate advise 2mm 3mm 4mm --sensor left --within 0.2mm
+        sosmith calibrate advise 2mm 3mm 4mm --sensor left --within 0.1mm --uncertainty 0.02mm
     """
     from sosmith.interface.instrument.calibration_store import CalibrationStore
 
     with show_progress() as step:
         step(f"fitting {sensor}")
         advised = CalibrationStore(store).advice(
-            sensor, date, clearances, temperatures=temperatures, within=within, most=most
+            sensor,
+            date,
+            clearances,
+            temperatures=temperatures,
+            within=within,
+            most=most,
+            uncertainty=uncertainty or 0.0,
         )
     if as_json:
         print_json(advised.as_dict())

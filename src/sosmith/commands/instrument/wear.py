@@ -23,6 +23,7 @@ same comparisons as the wear flags of the hardware.
 \b
     sosmith wear days.csv --initial 1.5 --limit 9 --warning 7
     sosmith wear days.csv --spec my.toml --plot wear.svg
+    sosmith wear days.csv --spec my.toml --risk 0.05
 """
 
 
@@ -49,6 +50,18 @@ same comparisons as the wear flags of the hardware.
 @click.option("--block", type=float, help="Length of a block in days.  [default: 1, less for a short record]")
 @click.option("--window", type=float, help="Estimate the rate from this many days at the end.  [default: all]")
 @click.option("--confidence", type=float, default=0.95, show_default=True, help="Confidence level of the intervals.")
+@click.option(
+    "--risk",
+    type=float,
+    help="Follow level and rate over the days, tell jumps and changes of the rate, and call wear critical from this "
+    "probability of being past the limit on, such as 0.05.",
+)
+@click.option(
+    "--day-error",
+    type=float,
+    help="With --risk: standard uncertainty in mm of what is new each day in a reading.  [default: that of SPEC, or "
+    "the scatter of the days]",
+)
 @plot_option("SVG or PNG file for a plot.")
 @JSON_OPTION
 def wear_command(
@@ -63,6 +76,8 @@ def wear_command(
     block: float | None,
     window: float | None,
     confidence: float,
+    risk: float | None,
+    day_error: float | None,
     plot: Path | None,
     as_json: bool,
 ) -> None:
@@ -89,6 +104,8 @@ def wear_command(
             block=block,
             window=window,
             confidence=confidence,
+            risk=risk,
+            day_error=day_error,
             progress=step,
         )
         drawn = None

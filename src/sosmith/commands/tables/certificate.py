@@ -18,7 +18,9 @@ def print_proof(certificate: Entries, proof: Proof) -> None:
         console.print(f"[bold green]as specified[/]: {_agreement(proof.agreement)}")
     if proof.files:
         console.print(f"[bold green]unchanged[/]: {proof.files} files and the certificate itself, by their SHA-256")
-    programs = [found.instructions for found in (proof.calibration, proof.program) if isinstance(found, ProgramVerdict)]
+    programs = [
+        verdict.instructions for verdict in (proof.calibration, proof.program) if isinstance(verdict, ProgramVerdict)
+    ]
     if programs:
         both = len(programs) > 1
         unproven = f"; the unit{'s' * both} that run{'s' * (not both)} them {'are' if both else 'is'} not part of it"
@@ -31,17 +33,17 @@ def print_proof(certificate: Entries, proof: Proof) -> None:
     if proof.hardware is not None:
         _print_hardware(console, "hardware", proof.hardware)
     if proof.decimator is not None and certificate.decimation is not None:
-        entry, around = certificate.decimation, proof.decimator
-        held = f"; each result leaves {around.copies} times" if around.copies > 1 else ""
+        entry, decimator = certificate.decimation, proof.decimator
+        repeated = f"; each result leaves {decimator.copies} times" if decimator.copies > 1 else ""
         parts = f"{entry.stages} integrators, {entry.stages} combs and"
-        if around.channels > 1:
-            parts = f"an adder for {entry.stages} sums and differences of each of {around.channels} channels and"
+        if decimator.channels > 1:
+            parts = f"an adder for {entry.stages} sums and differences of each of {decimator.channels} channels and"
         before = ""
-        if entry.calibration is not None and around.channels == 1:
+        if entry.calibration is not None and decimator.channels == 1:
             before = "; the first sample goes through the calibration once"
         console.print(
-            f"[bold green]decimator[/]: {around.registers} registers around the core are {parts} what moves "
-            f"one sample of {entry.factor} on, for all inputs, stalls and resets{before}{held}"
+            f"[bold green]decimator[/]: {decimator.registers} registers around the core are {parts} what moves "
+            f"one sample of {entry.factor} on, for all inputs, stalls and resets{before}{repeated}"
         )
     online = certificate.claims.online
     if online is not None:
@@ -66,11 +68,11 @@ def _print_scope(console: TableConsole, proof: Proof) -> None:
             console.print(f"[bold {colour}]{part.state.value.replace('_', ' ')}[/]: {name}: {escape(plain(part.why))}")
 
 
-def _print_hardware(console: TableConsole, what: str, found: HardwareVerdict) -> None:
-    memories = f" and {found.memories} memories" if found.memories else ""
+def _print_hardware(console: TableConsole, what: str, verdict: HardwareVerdict) -> None:
+    memories = f" and {verdict.memories} memories" if verdict.memories else ""
     console.print(
-        f"[bold green]{what}[/]: the SystemVerilog computes these graphs, each sample {found.latency} clocks "
-        f"later, in {found.registers} registers{memories}, {found.states} of them states: for all inputs, stalls "
+        f"[bold green]{what}[/]: the SystemVerilog computes these graphs, each sample {verdict.latency} clocks "
+        f"later, in {verdict.registers} registers{memories}, {verdict.states} of them states: for all inputs, stalls "
         "and resets"
     )
 

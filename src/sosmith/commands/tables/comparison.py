@@ -47,11 +47,11 @@ class _Column(NamedTuple):
         return min(max(longest, -(-cell_len(self.title) // _HEADER_LINES)), _MAX_WIDTH)
 
 
-def _print_differences(console: TableConsole, found: Sequence[Difference], names: Sequence[str]) -> None:
-    if not found:
+def _print_differences(console: TableConsole, differences: Sequence[Difference], names: Sequence[str]) -> None:
+    if not differences:
         console.print("Specification, trace, datapath and tools are the same.\n", highlight=False)
         return
-    columns = [_Column(f"{one.group}: {one.title}", one.cells) for one in found]
+    columns = [_Column(f"{one.group}: {one.title}", one.cells) for one in differences]
     _print_columns(console, "What differs", columns, names)
 
 

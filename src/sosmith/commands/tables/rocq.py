@@ -22,5 +22,7 @@ def print_rocq(checked: RocqVerdict | None, written: Sequence[Path]) -> None:
         console.print(f"[bold green]checked by Rocq[/]: {name}: {escape(words)}")
     axioms = ", ".join(checked.axioms) or "none"
     console.print(f"[bold green]axioms[/]: {escape(axioms)}; Rocq {escape(checked.version)}")
+    for part in checked.given:
+        console.print(f"[bold green]taken as given[/]: {escape(part)}")
     for part in checked.unchecked:
         console.print(f"[bold yellow]not checked by Rocq[/]: {escape(part)}")

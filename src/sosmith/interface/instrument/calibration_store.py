@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
@@ -35,11 +35,10 @@ from sosmith.instrument.calibration.calibration_tables import (
 )
 from sosmith.instrument.calibration.health.health_report import health_json
 from sosmith.instrument.calibration.health.monitoring import Health
-from sosmith.instrument.calibration.measurement_store import Source, Version, open_store
+from sosmith.instrument.calibration.measurement_store import MeasurementStore, Source, Version, open_store
 from sosmith.instrument.calibration.self_updating import (
     Addition,
     Calibration,
-    Withdrawn,
     add,
     advice_for,
     calibration_of,
@@ -47,12 +46,11 @@ from sosmith.instrument.calibration.self_updating import (
     health_for,
     refit,
     refused_first_file,
-    sources_of,
-    withdraw,
 )
 from sosmith.instrument.calibration.sensor_type_file import sensor_type_named
 from sosmith.instrument.calibration.store.measurement_files import Refusal, parse_date
 from sosmith.instrument.calibration.store.reference import Morning, by_hand, reference
+from sosmith.instrument.calibration.store.withdrawing import Withdrawn, sources_of, withdraw
 from sosmith.interface.certificate import Progress
 from sosmith.model.errors import ShortfallError, SpecificationError
 
@@ -73,6 +71,9 @@ class FitOptions:
         With "paper": give outliers less weight (Huber).
     accept : float or None
         Largest half-width in mm of the 95 % interval of a reading's clearance; None if not limited.
+    order : int or None
+        With "bayes": highest order in the voltage of a day's polynomial from now on, 2 to 8; None for that of the type.
+        The hardware must have room for it.
     """
 
     method: Method = "bayes"
@@ -80,20 +81,32 @@ class FitOptions:
     required_r: float | None = None
     robust: bool = False
     accept: float | None = None
+    order: int | None = None
 
-    def settings(self) -> dict[str, Any]:
-        """Return them checked; raises SpecificationError if they do not go together."""
-        if self.method != "paper":
-            for name, given in (("--required-r", self.required_r is not None), ("--robust", self.robust)):
-                if given:
-                    raise SpecificationError(f"{name} must go with --method paper, not with --method {self.method}")
+    def settings(self, store: MeasurementStore, sensor: str) -> dict[str, Any]:
+        """Return them checked, for a sensor of a store; raises SpecificationError if they do not go together."""
+        self.check()
+        kind = None if self.sensor_type is None else sensor_type_named(self.sensor_type)
+        if self.order is not None:
+            kind = replace(kind or store.sensor_type(sensor), order=self.order)
         return {
             "method": self.method,
-            "sensor_type": None if self.sensor_type is None else sensor_type_named(self.sensor_type),
+            "sensor_type": kind,
             "required_r": REQUIRED_R if self.required_r is None else self.required_r,
             "robust": self.robust,
             "accept": self.accept,
         }
+
+    def check(self) -> None:
+        """Raise SpecificationError if they do not go together, or a type is none."""
+        if self.method == "paper" and self.order is not None:
+            raise SpecificationError("--order must go with --method bayes, not with --method paper")
+        if self.sensor_type is not None:
+            sensor_type_named(self.sensor_type)
+        if self.method != "paper":
+            for name, given in (("--required-r", self.required_r is not None), ("--robust", self.robust)):
+                if given:
+                    raise SpecificationError(f"{name} must go with --method paper, not with --method {self.method}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -361,7 +374,8 @@ class CalibrationStore:
         progress : callable
             Called with the name of each step, and how far it is.
         """
-        source, settings = Path(fspath(file)), options.settings()
+        source = Path(fspath(file))
+        options.check()
         progress(f"adding {source}", 0, 0)
         if not self.path.exists():
             refused = refused_first_file(sensor, source, date, ranges=ranges, keep_good=keep_good)
@@ -378,7 +392,7 @@ class CalibrationStore:
                 keep_good=keep_good,
                 surprising=surprising,
                 progress=told,
-                **settings,
+                **options.settings(store, sensor),
             )
         return Added(addition)
 
@@ -390,9 +404,11 @@ class CalibrationStore:
         progress: Progress = lambda step, done, total: None,
     ) -> Fitted:
         """Fit to all measurements of a sensor; raises ShortfallError if no polynomial is good enough."""
-        settings, step = options.settings(), f"fitting {sensor}"
+        options.check()
+        step = f"fitting {sensor}"
         with open_store(self.path) as store:
             progress(step, 0, 0)
+            settings = options.settings(store, sensor)
             return Fitted(refit(store, sensor, date, progress=_told(progress, step), **settings))
 
     def reference(
@@ -403,6 +419,7 @@ class CalibrationStore:
         *,
         uncertainty: float = 0.02,
         surprising: bool = False,
+        order: int | None = None,
         progress: Progress = lambda step, done, total: None,
     ) -> Referenced:
         """Add readings of reference targets, and calibrate for their day.
@@ -419,6 +436,8 @@ class CalibrationStore:
             Standard uncertainty in mm of a target's clearance, where the file states none.
         surprising : bool
             As for `add`.
+        order : int or None
+            As in `FitOptions`.
         progress : callable
             Called with the name of each step, and how far it is.
         """
@@ -429,8 +448,17 @@ class CalibrationStore:
             path, content = by_hand(date, targets)
         with open_store(self.path) as store:
             told = _told(progress, "fitting")
+            kind = FitOptions(order=order).settings(store, sensor)["sensor_type"]
             morning = reference(
-                store, sensor, path, date, uncertainty, content=content, surprising=surprising, progress=told
+                store,
+                sensor,
+                path,
+                date,
+                uncertainty,
+                content=content,
+                surprising=surprising,
+                sensor_type=kind,
+                progress=told,
             )
         return Referenced(morning)
 
@@ -530,6 +558,7 @@ class CalibrationStore:
         temperatures: tuple[float, ...] = (),
         within: float = 0.2,
         most: int = 60,
+        uncertainty: float = 0.0,
     ) -> Advised:
         """Say what to measure on a day, to know these clearances in mm within an interval in mm.
 
@@ -545,9 +574,11 @@ class CalibrationStore:
             Wanted half-width of the 95 % interval, in mm.
         most : int
             Most measurements.
+        uncertainty : float
+            Standard uncertainty in mm of what is measured, as of reference targets; 0 if it scatters as before.
         """
         with open_store(self.path) as store:
-            found = advice_for(store, sensor, date, clearances, temperatures, within, most)
+            found = advice_for(store, sensor, date, clearances, temperatures, within, most, uncertainty)
         return Advised(sensor, date, within, found)
 
     def health(self, sensor: str, since: str | None = None) -> Checked:

@@ -11,7 +11,9 @@ from typing import Any
 from sosmith.gen.facts.table import Table, View
 from sosmith.instrument.uncertainty.instrument_budget import instrument_of
 from sosmith.instrument.wear.assessment import WearLimits, WearReport, judge
+from sosmith.instrument.wear.over_days import OverDays, over_days
 from sosmith.instrument.wear.record_file import WearRecord, moment_text, read_wear_record
+from sosmith.instrument.wear.state_space import Happening, Told, WearModel
 from sosmith.interface.certificate import Progress
 from sosmith.interface.specification import Specification
 from sosmith.model.errors import SpecificationError
@@ -31,11 +33,14 @@ class Wear(View):
         What they say.
     channel : int
         The channel that was read.
+    over_days : OverDays or None
+        Level and rate as a state over days, if it was asked for.
     """
 
     record: WearRecord = field(repr=False)
     report: WearReport
     channel: int
+    over_days: OverDays | None = None
 
     @classmethod
     def of(
@@ -48,6 +53,8 @@ class Wear(View):
         block: float | None = None,
         window: float | None = None,
         confidence: float = 0.95,
+        risk: float | None = None,
+        day_error: float | None = None,
         progress: Progress = lambda step, done, total: None,
     ) -> Wear:
         """Judge the record in a CSV file.
@@ -66,6 +73,12 @@ class Wear(View):
             Days of a block of readings, and of the record's end that the rate is taken from.
         confidence : float
             Probability of the intervals, between 0 and 1.
+        risk : float
+            Probability of being past the limit from which wear is critical: follows level and rate over the days, and
+            tells jumps and changes of the rate. Without, they are not followed.
+        day_error : float
+            With `risk`: standard uncertainty in mm of what is new each day in a reading. By default that of a
+            specification that states it, else the scatter of the days.
         progress : callable
             Called with the name of each step, 0 and 0.
 
@@ -74,7 +87,9 @@ class Wear(View):
         SpecificationError
             If the file cannot be read, or the limits do not fit.
         """
-        worth, known = None, limits
+        if day_error is not None and risk is None:
+            raise SpecificationError("--day-error must go with --risk, not without it")
+        worth, known, instrument = None, limits, None
         if isinstance(known, Specification):
             asked, known = known, _limits_of(known, channel)
             instrument = instrument_of(asked.checked)
@@ -94,7 +109,24 @@ class Wear(View):
             confidence=confidence,
             uncertainty=worth,
         )
-        return cls(record, report, channel)
+        followed = None
+        if risk is not None:
+            progress("wear over days", 0, 0)
+            model = WearModel()
+            if instrument is not None:
+                model = WearModel(shared=instrument.shared(report.clearance))
+                day_error = day_error or instrument.known.systematic or None
+            followed = over_days(
+                record.time,
+                record.clearance,
+                known,
+                block=block,
+                day_error=day_error,
+                model=model,
+                risk=risk,
+                confidence=confidence,
+            )
+        return cls(record, report, channel, followed)
 
     def picture(self, file_format: str) -> bytes:
         """Draw the record with its rate, as "svg" or "png"."""
@@ -105,7 +137,10 @@ class Wear(View):
     def tables(self) -> list[Table]:
         """Return wear, rate and remaining life, with their intervals."""
         rows = list(_rows(self.record, self.report, self.channel))
-        return [Table(f"Wear by {self.record.path.name}: {self.report.state}", rows)]
+        tables = [Table(f"Wear by {self.record.path.name}: {self.report.state}", rows)]
+        if self.over_days is not None:
+            tables.append(Table("Over days", list(_rows_over_days(self.record, self.over_days))))
+        return tables
 
     def as_dict(self) -> dict[str, Any]:
         """Return all results in JSON types, with the unit in each key."""
@@ -141,6 +176,7 @@ class Wear(View):
                 "at_warning_or_beyond": report.warnings,
                 "critical": report.criticals,
             },
+            "over_days": None if self.over_days is None else _over_days_json(self.over_days),
         }
 
 
@@ -218,3 +254,55 @@ def _life(report: WearReport) -> str:
     low = "0" if report.life_low is None else f"{report.life_low:.4g}"
     high = "no end in sight" if report.life_high is None else f"{report.life_high:.4g}"
     return f"{report.life:.4g} days ({low} to {high}), if wear continues at this rate"
+
+
+def _rows_over_days(record: WearRecord, found: OverDays) -> Iterator[tuple[str, str]]:
+    """Level, rate, risk and what was told, by the state over days."""
+    share, (low, high) = f"at {100 * found.confidence:g} %", found.interval
+    yield "clearance", f"{found.now.level()[0]:.4g} mm ({low:.4g} to {high:.4g} {share})"
+    rate, slow, fast = found.rate
+    yield "rate", f"{rate:.3g} mm a day ({slow:.3g} to {fast:.3g})"
+    by = "as stated" if found.stated else "by the scatter of the days"
+    yield "error of a day", f"{found.day_error:.2g} mm, {by}"
+    half, soon, late = ("no end in sight" if days is None else f"{days:.4g}" for days in found.life)
+    yield "remaining life", f"{half} days ({soon} to {late})" if found.life[0] is not None else half
+    what = "critical" if found.critical else "not critical"
+    yield "past the limit", f"with a probability of {found.past:.2g}: {what} at a risk of {found.risk:g}"
+    for one in found.told:
+        yield "told", _told(record, one)
+
+
+def _told(record: WearRecord, one: Told) -> str:
+    def when(days: float) -> str:
+        return moment_text(days) if record.dated else f"day {days:.4g}"
+
+    what = f"{one.size:+.2g} mm" if one.event.what is Happening.JUMP else f"to {one.size:.2g} mm a day"
+    return (
+        f"a {one.event.what} of about {what} at {when(one.event.time)}"
+        if one.event.what is Happening.JUMP
+        else f"a {one.event.what} {what} at about {when(one.event.time)}"
+    ) + f", seen at {when(one.at)} with a probability of {one.probability:.2g}"
+
+
+def _over_days_json(found: OverDays) -> dict[str, Any]:
+    (level, spread), (low, high), (rate, slow, fast) = found.now.level(), found.interval, found.rate
+    half, soon, late = found.life
+    return {
+        "clearance_mm": {"value": level, "standard": spread, "low": low, "high": high},
+        "rate_mm_per_day": {"value": rate, "low": slow, "high": fast},
+        "day_error_mm": found.day_error,
+        "life_days": {"value": half, "low": soon, "high": late},
+        "probability_past_the_limit": found.past,
+        "risk": found.risk,
+        "critical": found.critical,
+        "told": [
+            {
+                "what": str(one.event.what),
+                "days": one.event.time,
+                "seen_days": one.at,
+                "probability": one.probability,
+                "size": one.size,
+            }
+            for one in found.told
+        ],
+    }

@@ -14,7 +14,7 @@ from sosmith.gen.facts.table import Table
 from sosmith.gen.filter.decimation import SAMPLED
 from sosmith.gen.output.core_facts import CoreFacts, SectionFacts
 from sosmith.gen.output.decimation_facts import DecimationFacts, RateCosts
-from sosmith.gen.quantity import quantity
+from sosmith.gen.quantity import count, quantity
 from sosmith.gen.specification.specification import Specification
 from sosmith.gen.specification.wear_limits import WearSpec
 from sosmith.instrument.calibration.uncertainty import of_polynomial
@@ -46,8 +46,12 @@ def design_tables(design: Design, *, details: bool = False) -> list[Table]:
         tables.append(uncertainty_table(budget_json(design.uncertainty)))
     if facts.sections:
         tables += [_sections(facts.sections), limit_cycles_table(facts.limit_cycles, facts)]
-    ahead = design.core.architecture.ahead
-    before = None if ahead is None or ahead.program is None else _schedule(ahead.program, " in the calibration")
+    calibration = design.core.architecture.calibration
+    before = (
+        None
+        if calibration is None or calibration.program is None
+        else _schedule(calibration.program, " in the calibration")
+    )
     own = None if facts.program is None else _schedule(facts.program)
     return tables + [table for table in (before, own) if table is not None]
 
@@ -73,9 +77,9 @@ def _overview(design: Design) -> Rows:
     return rows
 
 
-def _decimation(found: DecimationFacts, unit: str) -> Iterator[tuple[str, str]]:
+def _decimation(decimation: DecimationFacts, unit: str) -> Iterator[tuple[str, str]]:
     """Say what stands before the filter, and what it lets through."""
-    before = found.calibration
+    before = decimation.calibration
     if before is not None:
         yield (
             "into the decimator",
@@ -84,25 +88,26 @@ def _decimation(found: DecimationFacts, unit: str) -> Iterator[tuple[str, str]]:
         )
     yield (
         "decimator",
-        f"{found.stages} integrators and combs of {found.width} bits, {found.width - found.dropped} bits leave, at "
-        f"{found.sample_rate:,.6g} Hz",
+        f"{count(decimation.stages, 'integrator')} and {count(decimation.stages, 'comb')} of {decimation.width} bits, "
+        f"{decimation.width - decimation.dropped} bits leave, at "
+        f"{decimation.sample_rate:,.6g} Hz",
     )
-    if found.held:
-        yield "results", f"each {found.factor} times, at the rate of the samples"
-    most = max(band.gain_db for band in found.aliasing)
+    if decimation.held:
+        yield "results", f"each {decimation.factor} times, at the rate of the samples"
+    most = max(band.gain_db for band in decimation.aliasing)
     yield (
         "aliasing into the pass band",
-        f"at most {most:.1f} dB, {quantity(found.worst_aliasing, unit)} of a sine over the whole range of "
+        f"at most {most:.1f} dB, {quantity(decimation.worst_aliasing, unit)} of a sine over the whole range of "
         f"{'the input' if before is None else 'that result'}",
     )
     yield (
-        f"anything from {found.sample_rate / 2:,.6g} Hz on",
-        f"at most {found.largest_db:.1f} dB, {quantity(found.largest, unit)}, wherever it folds; "
-        f"{found.direct_largest_db:.1f} dB without a decimator",
+        f"anything from {decimation.sample_rate / 2:,.6g} Hz on",
+        f"at most {decimation.largest_db:.1f} dB, {quantity(decimation.largest, unit)}, wherever it folds; "
+        f"{decimation.direct_largest_db:.1f} dB without a decimator",
     )
     yield (
         "gain in the pass band",
-        f"within {found.deviation_db:.2g} dB of that without a decimator, at {SAMPLED} frequencies",
+        f"within {decimation.deviation_db:.2g} dB of that without a decimator, at {SAMPLED} frequencies",
     )
 
 
@@ -117,19 +122,21 @@ def _rates(costs: Mapping[str, RateCosts], unit: str, channels: int) -> Table:
         ("error bound", *(quantity(one.bound, unit) for one in each)),
         ("delay", *(quantity(one.delay, "s") for one in each)),
     ]
+    if "direct" not in costs:
+        rows.append(("without a decimator", "no word lengths meet the specification"))
     return Table("The same filter without a decimator", rows, ("", *costs))
 
 
 def _calibration(design: Design) -> Iterator[tuple[str, str]]:
     """Say where the calibration comes from, and what a reading is worth."""
-    made, polynomial, worth = design.core, design.core.quantized.polynomial, design.uncertainty
+    core, polynomial, worth = design.core, design.core.quantized.polynomial, design.uncertainty
     if polynomial is None:
         return
     m, n = polynomial.orders
     orders = f"orders {m} in voltage, {n} in temperature"
-    if made.fit is not None:
-        yield "calibration", f"fitted: {orders}, adjusted r {made.fit.adjusted_r:.4f}"
-        yield "its measurements", _worth(made.spec, made.fit)
+    if core.fit is not None:
+        yield "calibration", f"fitted: {orders}, adjusted r {core.fit.adjusted_r:.4f}"
+        yield "its measurements", _worth(core.spec, core.fit)
     else:
         yield "calibration", f"given: {orders}"
     yield "reading", UNKNOWN if worth is None else worth.summary
@@ -139,9 +146,9 @@ def _worth(spec: Specification, fitted: Fit) -> str:
     """Return what a fitted calibration is worth, in the unit of its measurements: the proof covers arithmetic only."""
     assert spec.calibration is not None
     assert spec.calibration.data is not None
-    found = of_polynomial(read_measurements(spec.calibration.data), fitted)
-    low, high = found.limits
-    missed = f"; {found.lack.warning}" if found.lack.structured else ""
+    uncertainty = of_polynomial(read_measurements(spec.calibration.data), fitted)
+    low, high = uncertainty.limits
+    missed = f"; {uncertainty.lack.warning}" if uncertainty.lack.structured else ""
     return f"hold 95 % of the clearances within ±{low:.3g} to ±{high:.3g} mm of the polynomial{missed}"
 
 
@@ -159,8 +166,8 @@ def _wear_text(wear: WearSpec, output: Port) -> str:
 
 def _all_hardware_rows(architecture: Architecture) -> list[tuple[str, str]]:
     """Return the resources of the hardware, those of a program before a decimator first."""
-    ahead = architecture.ahead
-    apart = [] if ahead is None or ahead.program is None else _hardware_rows(ahead)
+    calibration = architecture.calibration
+    apart = [] if calibration is None or calibration.program is None else _hardware_rows(calibration)
     return [*((f"{name}, calibration", value) for name, value in apart), *_hardware_rows(architecture)]
 
 

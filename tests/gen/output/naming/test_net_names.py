@@ -49,6 +49,16 @@ def test_nets_have_names_but_for_some_glue(kind: str) -> None:
     assert len(nameless) <= GLUE < len(names) / 10
 
 
+@pytest.mark.parametrize("protect", ["detect", "correct"])
+def test_a_check_bit_is_one_parity(protect: str) -> None:
+    """Not a chain of nets, each with a bit more."""
+    options = f'hardware.architecture = "parallel"\nhardware.protect = "{protect}"\n'
+    design = design_core(from_text("channels = 4\n" + STEADY + options, Path("spec.toml")))
+    text = generated(design)[f"{design.spec.name}.sv"]
+    nets = [name for module in read_source(text).modules.values() for name in module.widths]
+    assert len([name for name in nets if re.search(r"_part(_\d+)?$|^n\d+$", name)]) < len(nets) / 4
+
+
 def test_each_stage_has_its_module_with_its_comment() -> None:
     design, text = designed("parallel"), written("parallel")
     for stage in design.datapath.stages:

@@ -251,7 +251,11 @@ def test_a_convention_that_is_asked_for_has_to_be_stable(tmp_path: Path) -> None
         ("f.npz", packed(bytes(5 << 20)), "arrays must be at most 4194304 bytes unpacked, not longer"),
         ("f.mat", shifted(mat(SOS=SOS)), "the filter must be a MAT file, not a damaged one or another kind"),
         ("f.mat", b"MATLAB 5.0 MAT-file", "the filter must be a MAT file, not a damaged one or another kind"),
-        ("f.mat", mat(x=SOS), "variables must be SOS, with or without G, b and a, z, p and k, or Num, h or b alone, not only x"),
+        (
+            "f.mat",
+            mat(x=SOS),
+            "variables must be SOS, with or without G, b and a, z, p and k, or Num, h or b alone, not only x",
+        ),
         ("f.toml", "poles = [-1e31]\ngain = 1\n", "poles[0] must be a finite number within reason, not -1E+31"),
         ("f.toml", f"poles = [-{10**40}]\ngain = 1\n", "poles[0] must be a finite number within reason, not -1000"),
         ("f.json", "{", "the filter must be JSON, not something else"),

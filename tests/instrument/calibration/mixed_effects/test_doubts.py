@@ -9,8 +9,10 @@ from sosmith.gen.calibration.fit import Measurements
 DAYS, EACH = 6, 25
 
 
-def measured(seed: int, *, correlation: float = 2.0, lasting: float = 0.0, days: int = DAYS) -> Measurements:
-    """Days whose error of 0.1 mm is a Gaussian process over the clearance, beside one that stays; scatter 0.03 mm."""
+def measured(
+    seed: int, *, correlation: float = 2.0, lasting: float = 0.0, days: int = DAYS, scatter: float = 0.03
+) -> Measurements:
+    """Days whose error of 0.1 mm is a Gaussian process over the clearance, beside one that stays."""
     chance = np.random.default_rng(seed)
     columns = []
     for day in range(days):
@@ -18,7 +20,7 @@ def measured(seed: int, *, correlation: float = 2.0, lasting: float = 0.0, days:
         d = TRUE(V, T) + lasting * np.sin(2 * np.pi * TRUE(V, T) / 6.0)
         covariance = np.exp(-(np.subtract.outer(d, d) ** 2) / (2 * correlation**2)) + 1e-9 * np.eye(EACH)
         d = d + 0.1 * np.linalg.cholesky(covariance) @ chance.normal(size=EACH)
-        columns.append([np.maximum(d + chance.normal(0, 0.03, EACH), 0), V, T, np.full(EACH, FIRST + day)])
+        columns.append([np.maximum(d + chance.normal(0, scatter, EACH), 0), V, T, np.full(EACH, FIRST + day)])
     d, V, T, day = np.concatenate(columns, axis=1)
     return Measurements(d, V, T, "m.csv", tuple(day.astype(int).tolist()))
 
@@ -48,3 +50,12 @@ def test_an_error_that_stays() -> None:
         "error of a day stays, and the intervals do not know that",
     )
     assert fitted(measured(1, lasting=0.2, days=2)).doubts == ()  # too few days
+
+
+def test_too_few_measurements_to_tell_over_which_clearance_a_day_errs() -> None:
+    rows = measured(4, scatter=0.3)
+    assert fitted(rows).doubts == (
+        "the measurements are too few to tell over which clearance the errors of a day vary: if that is 0.5 mm, not 2 "
+        "mm as of the type equation_5a, the curve of the day is less certain than its intervals say",
+    )
+    assert fitted(rows, max(rows.days) + 1).doubts == ()  # the day's own curve is in no polynomial

@@ -21,7 +21,7 @@ from sosmith.gen.output.decimation_facts import direct_design, rate_costs
 from sosmith.gen.output.manifest import manifest
 from sosmith.gen.specification.specification import from_text, from_tree
 from sosmith.gen.word_lengths import decimator as decimator_module
-from sosmith.gen.word_lengths.ahead import calibration_ahead
+from sosmith.gen.word_lengths.calibration import calibration_before_decimator
 from sosmith.gen.word_lengths.quantized import CALIBRATION, DECIMATION
 from sosmith.instrument.scenarios.traces import traces_for
 from sosmith.instrument.uncertainty.instrument_budget import instrument_of
@@ -71,7 +71,7 @@ def test_a_constant_is_there_from_the_first_result_on() -> None:
 
 def test_the_calibration_is_a_row_of_the_budget() -> None:
     made = whole()
-    quantized, ahead, output = made.quantized, made.quantized.ahead, made.datapath.output
+    quantized, ahead, output = made.quantized, made.quantized.calibration, made.datapath.output
     assert ahead is not None
     port = ahead.datapath.output
     # The filter's peak gain is between one and two.
@@ -87,7 +87,7 @@ def test_nothing_is_limited_before_the_decimator() -> None:
     tree = tomllib.loads(INSTRUMENT.format(extra=""), parse_float=Decimal)
     tree["calibration"]["coefficients"] = [[Decimal(-30), Decimal("0.5")], [Decimal(9)], [Decimal("-1.5")]]
     made = design_core(from_tree(tree, Path("slight.toml")))
-    ahead, output = made.datapath.ahead, made.datapath.output
+    ahead, output = made.datapath.calibration, made.datapath.output
     assert ahead is not None
     assert not [node for stage in ahead.stages for node in stage.graph.nodes if node.op is Op.CLAMP]
     assert ahead.output.signed
@@ -106,7 +106,7 @@ def test_nothing_is_limited_before_the_decimator() -> None:
 def test_the_locomotive_costs_less_than_without() -> None:
     made = whole()
     ours, theirs = rate_costs(made), rate_costs(direct_design(made))
-    ahead, behind = made.architecture.ahead, made.architecture
+    ahead, behind = made.architecture.calibration, made.architecture
     assert ahead is not None
     assert ours.architecture == theirs.architecture == "folded"
     assert ours.clocks_per_sample == ahead.cycles_per_sample  # which is the slower of the two
@@ -123,7 +123,7 @@ def test_the_locomotive_costs_less_than_without() -> None:
 def test_facts_for_programs() -> None:
     made = whole()
     tree = manifest(core_facts(made))
-    found, ahead = tree["decimation"], made.architecture.ahead
+    found, ahead = tree["decimation"], made.architecture.calibration
     assert ahead is not None
     told = found["calibration"]
     assert told["architecture"] == "folded"
@@ -142,7 +142,7 @@ def test_facts_for_programs() -> None:
 
 def test_what_folds_is_counted_over_the_calibrations_range() -> None:
     made = whole()
-    ahead, found = made.datapath.ahead, manifest(core_facts(made))["decimation"]
+    ahead, found = made.datapath.calibration, manifest(core_facts(made))["decimation"]
     assert ahead is not None
     low, high = ahead.result_range
     span = float((high - low) * ahead.output.lsb)
@@ -159,8 +159,8 @@ def at_clock(clock: int, **changes: Any) -> CoreDesign:
 def test_each_has_the_smallest_architecture_that_keeps_up() -> None:
     """The filter has four times as long as the calibration."""
     made = at_clock(3500, realization="df2t")
-    assert made.architecture.ahead is not None
-    assert (made.architecture.ahead.name, made.architecture.name) == ("parallel", "folded")
+    assert made.architecture.calibration is not None
+    assert (made.architecture.calibration.name, made.architecture.name) == ("parallel", "folded")
     assert made.reasons["calibration before the decimator"] == (
         "parallel: before the decimator, the folded architecture takes 41 clocks a sample: at a clock of 3,500 Hz the "
         "sample rate must be at most 85.3658 Hz, not 100 Hz"
@@ -180,9 +180,9 @@ def test_each_has_the_smallest_architecture_that_keeps_up() -> None:
 def test_multipliers_are_shared_out() -> None:
     """Of a single multiplier block the calibration takes all there is, so that the filter shifts and adds."""
     made = at_clock(12_000_000, multipliers=1)
-    assert made.architecture.ahead is not None
-    assert made.architecture.ahead.name == "folded"
-    assert made.architecture.ahead.multiplier_blocks == 1
+    assert made.architecture.calibration is not None
+    assert made.architecture.calibration.name == "folded"
+    assert made.architecture.calibration.multiplier_blocks == 1
     assert made.architecture.name == "serial"
     both = at_clock(12_000_000, multipliers=2)
     assert (both.architecture.name, both.architecture.multiplier_blocks) == ("folded", 1)
@@ -196,13 +196,13 @@ def test_a_result_too_wide_for_a_port() -> None:
     inputs = [Port.from_range(name, 16, Fraction(0), Fraction(1)) for name in ("voltage", "temperature")]
     output = Port.from_range("y", 16, Fraction(0), Fraction(1), unit="mm")
     polynomial = Polynomial.from_numbers([["5000", "0"], ["-7000"]])
-    made = calibration_ahead("wide", inputs, polynomial, output, Fraction(1, 2))
+    made = calibration_before_decimator("wide", inputs, polynomial, output, Fraction(1, 2))
     assert made.datapath.output.bits == 31
     with refused(
         "what the calibration gives to the decimator must have at most 32 bits, not 33: raise output.max_error or "
         "narrow the ranges of the inputs"
     ):
-        calibration_ahead("wide", inputs, polynomial, output, Fraction(1, 8))
+        calibration_before_decimator("wide", inputs, polynomial, output, Fraction(1, 8))
 
 
 def test_registers_too_wide_for_the_models() -> None:
@@ -220,7 +220,7 @@ def test_wear_is_judged_behind_the_filter(hold: bool) -> None:
     text = locomotive_text(architecture="folded", hold=hold) + wear
     made = design_core(from_text(text, Path("locomotive.toml")))
     assert len(made.datapath.wear) == 1
-    ahead, decimator = made.datapath.ahead, made.datapath.decimator
+    ahead, decimator = made.datapath.calibration, made.datapath.decimator
     assert ahead is not None
     assert decimator is not None
     assert not ahead.wear
@@ -265,14 +265,14 @@ def test_another_calibration_exceeds_the_bound() -> None:
     """A coefficient that is half an LSB wrong is found by the exact reference."""
     made = small()
     quantized, datapath = made.quantized, made.datapath
-    assert quantized.ahead is not None
+    assert quantized.calibration is not None
     assert quantized.polynomial is not None
     codes = np.random.default_rng(4).integers(0, 1 << 10, (4000, 2))
     assert worst_error(made, codes) <= float(quantized.bound)
     (first, *more), *rows = quantized.polynomial.coefficients
     wrong = Polynomial(((first + datapath.output.lsb / 2, *more), *rows))
-    other = calibration_ahead("slight_ahead", datapath.inputs, wrong, datapath.output, Fraction(1, 16))
-    ahead = replace(other.datapath, output=quantized.ahead.datapath.output)
+    other = calibration_before_decimator("slight_ahead", datapath.inputs, wrong, datapath.output, Fraction(1, 16))
+    ahead = replace(other.datapath, output=quantized.calibration.datapath.output)
     assert other.datapath.output.lsb == ahead.output.lsb
     changed = replace(quantized, datapath=replace(datapath, ahead=ahead))
     assert worst_error(replace(made, quantized=changed), codes) > float(quantized.bound)
@@ -282,10 +282,10 @@ def test_a_fitted_calibration_says_what_is_outside_of_it() -> None:
     """The codes that its measurements covered are judged before the decimator, of every sample."""
     text = re.sub(r"calibration\.coefficients = .*", 'calibration.data = "april.csv"', INSTRUMENT.format(extra=""))
     made = design_core(from_text(text, EXAMPLES / "measurements" / "slight.toml"))
-    ahead, datapath = made.datapath.ahead, made.datapath
+    ahead, datapath = made.datapath.calibration, made.datapath
     assert ahead is not None
-    assert made.architecture.ahead is not None
-    assert made.architecture.ahead.datapath == ahead
+    assert made.architecture.calibration is not None
+    assert made.architecture.calibration.datapath == ahead
     assert ahead.calibrated == datapath.calibrated != ((0, 1023), (0, 1023))
     (_, highest), (_, warmest) = datapath.calibrated
     assert highest < 1023 or warmest < 1023

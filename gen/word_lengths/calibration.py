@@ -22,7 +22,7 @@ _WIDEST = 32
 """Bits of the widest port."""
 
 
-def calibration_ahead(
+def calibration_before_decimator(
     name: str, inputs: Sequence[Port], polynomial: Polynomial, output: Port, allowed: Fraction
 ) -> Quantized:
     """Choose formats of a calibration before a decimator, and prove its error.
@@ -60,8 +60,8 @@ def calibration_ahead(
         polynomial=polynomial,
         realization=next(iter(REALIZATIONS)),
     )
-    made = prove(planned)
-    graph = made.datapath.stages[-1].graph
+    widest = prove(planned)
+    graph = widest.datapath.stages[-1].graph
     # Where the port is too narrow, the stage limits its result to it.
     (result,) = (graph.nodes[i] for i in graph.outputs)
     unlimited = graph.nodes[result.operands[0]] if (result.low, result.high) == (port.lowest, port.highest) else result

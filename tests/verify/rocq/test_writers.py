@@ -1,0 +1,116 @@
+"""What is written for Rocq, without Rocq: responses, limits and plans that its theories follow."""
+
+import random
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from flint import fmpz_poly
+from tests.verify.rocq.small import calibrated, small
+
+from sosmith.gen.realizations.registry import REALIZATIONS
+from sosmith.verify.certificate_file import Certificate
+from sosmith.verify.graph import RejectedError
+from sosmith.verify.rocq.bound import bound_claims
+from sosmith.verify.rocq.calibration import calibration_of
+from sosmith.verify.rocq.cascade import Cascade, cascade_of
+from sosmith.verify.rocq.exact import exact_row, sections_of
+from sosmith.verify.rocq.flat import flattened
+from sosmith.verify.rocq.ranges import negative, windows_of
+from sosmith.verify.rocq.responses import divide, impulse, split
+from sosmith.verify.rocq.start import start_of
+
+
+def left(bits: int, tail: list[int], values: list[int], over: list[int]) -> int:
+    """Sum of the magnitudes of ``values * [2**bits, *tail] - over``."""
+    difference = fmpz_poly(values) * fmpz_poly([1 << bits, *tail]) - fmpz_poly(over)
+    return sum(abs(int(value)) for value in difference.coeffs())
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_response_leaves_no_more_than_it_says(seed: int) -> None:
+    rng = random.Random(seed)
+    bits, tail = 12, [rng.randint(-2000, 2000), rng.randint(-2000, 2000)]
+    over = [rng.randint(-(1 << 40), 1 << 40) for _ in range(50)]
+    for made, of in ((impulse(bits, tail, 1 << 30), [1 << 30 + bits]), (divide(bits, tail, over), over)):
+        assert left(bits, tail, made.values, of) <= made.rest <= len(made.values) << bits + 2
+
+
+def test_a_response_that_does_not_die_away_is_refused() -> None:
+    with pytest.raises(RejectedError, match=r"^a response must die away within 262144 samples$"):
+        impulse(4, [-16], 1 << 20)
+
+
+def test_a_denominator_that_begins_with_another_number_is_refused() -> None:
+    with pytest.raises(RejectedError, match=r"^a denominator must begin with a power of two, not 3$"):
+        split([3, 1])
+
+
+def last_rows(made: Certificate) -> tuple[Cascade, int]:
+    """Return the cascade of a certificate and the node that its last stage takes."""
+    graph = flattened(made)
+    return cascade_of(graph), graph.feeds[-1][0]
+
+
+@pytest.mark.sweep(3)
+@pytest.mark.parametrize("realization", REALIZATIONS)
+def test_plans_prove_the_range_of_every_target(realization: str) -> None:
+    made = small(realization, steady=True)
+    cascade, _ = last_rows(made)
+    windows = windows_of(cascade, start_of(cascade.graph))
+    for index, section in enumerate(cascade.sections):
+        for target in section.targets:
+            node = cascade.graph.node(target)
+            rows = cascade.rows(index, target, max(abs(node.low), abs(node.high)).bit_length() + 24)
+            assert windows.most(rows.row) + rows.rest <= rows.whole * node.high
+            assert windows.most(negative(rows.row)) + rows.rest <= -rows.whole * node.low
+
+
+def test_the_windows_are_those_of_a_difference() -> None:
+    cascade, _ = last_rows(small(steady=True))
+    windows = windows_of(cascade, start_of(cascade.graph))
+    entry = windows.entry
+    assert entry is not None
+    assert windows.span == (1 << 16) - 1
+    assert windows.most({entry: fmpz_poly([3, -2])}) == 3 * windows.span  # with the first window; 2 with the other
+
+
+def test_the_exact_filter_in_near_sections_is_the_exact_one() -> None:
+    sections = sections_of(small().ideal.sections)
+    whole, bits = 1 << 200, 100
+    made = exact_row(sections, 1 << 15, whole, bits)
+    response, recent = [1.0] + [0.0] * 40, [1.0] + [0.0] * 40
+    for over, under in sections:
+        response = []
+        for n in range(41):
+            value = sum(b * recent[n - k] for k, b in enumerate(over) if k <= n)
+            value -= sum(a * response[n - k] for k, a in enumerate(under) if 0 < k <= n)
+            response.append(value / under[0])
+        recent = response
+    found = [int(value) / whole for value in made.row.coeffs()[:41]]
+    assert np.abs(np.array(found) - np.array(response)).max() < 1e-14
+    assert 0 < made.rest < whole >> 40
+
+
+def test_the_error_of_a_calibration_holds_for_random_codes() -> None:
+    made = calibrated()
+    graph = flattened(made)
+    start = start_of(graph)
+    assert start is not None
+    found = calibration_of(made, graph, start.sample)
+    assert found.error < Fraction(1, 2)
+    assert made.claims.budget["calibration"] >= found.error
+    assert found.most < 1 << 16
+
+
+def test_the_theorem_says_what_the_certificate_claims() -> None:
+    made = calibrated()
+    cascade, _ = last_rows(made)
+    claims = {claim.name: claim.text for claim in bound_claims(made, cascade, start_of(cascade.graph))}
+    bound = made.claims.bound
+    assert f"<= IZR {bound.numerator} / IZR {bound.denominator})%R." in claims["error_is_bounded"]
+    assert "(from_first (fun n => calibrated (x n)))" in claims["error_is_bounded"]
+    assert "(y (Z.of_nat n) - IZR (-1024) / IZR 1)" in claims["error_is_bounded"]
+    assert "(from_zero (fun n => calibrated (x n)))" in "".join(
+        claim.text for claim in bound_claims(small(), last_rows(small())[0], None)
+    )

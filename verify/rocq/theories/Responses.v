@@ -1,0 +1,153 @@
+(* Responses of recursions as polynomials, rounded, and what the rounding leaves.
+
+   `divide` makes a polynomial Q with D' Q = P + r, sample by sample, each rounded down; |r| is at most what it counts.
+   Here D' = [2^k; a1; a2; ...], and D and B are nearly multiples of D' and B': s D = c D' + .., s B = c B' + .. . Then
+   D * y = B * x gives P * y = (B' Q) * x + e with a small e (`through`). No series is summed, and no limit is taken. *)
+Require Import Bool ZArith Reals List Lia Lra. Import ListNotations.
+From Sosmith Require Import Definitions Streams.
+Open Scope Z_scope.
+
+(* Polynomials act on sequences over all times as they should. *)
+Lemma taps_ext l : forall u v k, (forall j, j <= k -> u j = v j) -> taps l u k = taps l v k.
+Proof.
+  induction l as [|c l IH]; intros u v k H; simpl; [reflexivity|].
+  rewrite (H k) by lia. rewrite (IH u v); [reflexivity|]. intros; apply H; lia.
+Qed.
+Lemma taps_zero l : forall k, taps l (fun _ => 0%R) k = 0%R.
+Proof. induction l as [|c l IH]; intros k; simpl; [reflexivity|]. rewrite IH; ring. Qed.
+Lemma taps_plus l : forall u v k, taps l (fun j => u j + v j)%R k = (taps l u k + taps l v k)%R.
+Proof. induction l as [|c l IH]; intros u v k; simpl; [ring|]. rewrite IH; ring. Qed.
+Lemma taps_multiple l : forall x u k, taps l (fun j => x * u j)%R k = (x * taps l u k)%R.
+Proof. induction l as [|c l IH]; intros x u k; simpl; [ring|]. rewrite IH; ring. Qed.
+Lemma taps_late l : forall u k, taps l (fun j => u (j - 1)) k = taps l u (k - 1).
+Proof. induction l as [|c l IH]; intros u k; simpl; [reflexivity|]. rewrite IH. reflexivity. Qed.
+Lemma taps_add a : forall b u k, taps (add a b) u k = (taps a u k + taps b u k)%R.
+Proof. induction a as [|x a IH]; intros [|y b] u k; simpl; try ring. rewrite plus_IZR, IH; ring. Qed.
+Lemma taps_scale c b : forall u k, taps (scale c b) u k = (IZR c * taps b u k)%R.
+Proof. induction b as [|y b IH]; intros u k; simpl; [ring|]. fold (scale c b). rewrite mult_IZR, IH; ring. Qed.
+Lemma taps_mul a : forall b u k, taps (mul a b) u k = taps a (taps b u) k.
+Proof.
+  induction a as [|x a IH]; intros b u k; simpl; [reflexivity|].
+  rewrite taps_add, taps_scale. simpl. rewrite IH. ring.
+Qed.
+Lemma taps_swap a : forall b u k, taps a (taps b u) k = taps b (taps a u) k.
+Proof.
+  induction a as [|c a IH]; intros b u k; simpl; [symmetry; apply taps_zero|].
+  rewrite (taps_plus b (fun j => IZR c * u j)%R (fun j => taps a u (j - 1))), taps_multiple, taps_late, <- IH. reflexivity.
+Qed.
+Lemma taps_bound l : forall u k M, (0 <= M)%R -> (forall j, j <= k -> (Rabs (u j) <= M)%R) ->
+  (Rabs (taps l u k) <= IZR (norm1 l) * M)%R.
+Proof.
+  induction l as [|c l IH]; intros u k M HM H; simpl; [rewrite Rabs_R0; lra|].
+  rewrite plus_IZR, abs_IZR, Rmult_plus_distr_r. eapply Rle_trans; [apply Rabs_triang|]. apply Rplus_le_compat.
+  - rewrite Rabs_mult. apply Rmult_le_compat_l; [apply Rabs_pos|apply H; lia].
+  - apply IH; [exact HM|]. intros; apply H; lia.
+Qed.
+
+(* Sequences that begin at sample 0. *)
+Lemma after_at p u n : after p u (Z.of_nat n) = u n.
+Proof. unfold after. destruct (Z.of_nat n <? 0) eqn:E; [apply Z.ltb_lt in E; lia|]. rewrite Nat2Z.id. reflexivity. Qed.
+Lemma after_before p u k : k < 0 -> after p u k = p.
+Proof. intros H. unfold after. apply Z.ltb_lt in H. rewrite H. reflexivity. Qed.
+Lemma taps_silent l : forall u k, (forall j, j <= k -> u j = 0%R) -> taps l u k = 0%R.
+Proof. intros u k H. rewrite (taps_ext l u (fun _ => 0%R)) by exact H. apply taps_zero. Qed.
+Lemma taps_conv l : forall u n, taps l (from_zero u) (Z.of_nat n) = conv l u n.
+Proof.
+  induction l as [|c l IH]; intros u n; [reflexivity|].
+  cbn [taps conv]. unfold from_zero at 1. rewrite after_at. f_equal. destruct n as [|m].
+  - apply taps_silent. intros j Hj. apply after_before. simpl in Hj. lia.
+  - replace (Z.of_nat (S m) - 1) with (Z.of_nat m) by lia. apply IH.
+Qed.
+Lemma from_zero_conv l u k : from_zero (conv l u) k = taps l (from_zero u) k.
+Proof.
+  destruct (Z.ltb_spec k 0) as [H|H].
+  - unfold from_zero. rewrite after_before by exact H. symmetry. apply taps_silent. intros j Hj. apply after_before. lia.
+  - rewrite <- (Z2Nat.id k H). unfold from_zero at 1. rewrite after_at. symmetry. apply taps_conv.
+Qed.
+Fixpoint sum (l : list Z) : Z := match l with [] => 0 | c :: l' => c + sum l' end.
+Lemma taps_constant l c : forall k, taps l (fun _ => c) k = (IZR (sum l) * c)%R.
+Proof. induction l as [|x l IH]; intros k; cbn [taps sum]; [ring|]. rewrite IH, plus_IZR. ring. Qed.
+Lemma taps_after l p u n : taps l (after p u) (Z.of_nat n) = (conv l (fun m => u m - p)%R n + IZR (sum l) * p)%R.
+Proof.
+  rewrite <- (taps_conv l), <- (taps_constant l p (Z.of_nat n)), <- (taps_plus l). apply taps_ext. intros j _.
+  unfold from_zero, after. destruct (j <? 0); ring.
+Qed.
+
+(* What the samples so far, the last one first, still owe to the coming ones. *)
+Fixpoint weighted (a past : list Z) : Z :=
+  match a, past with x :: a', y :: past' => x * y + weighted a' past' | _, _ => 0 end.
+Fixpoint owed (a past : list Z) : list Z := match a with [] => [] | _ :: a' => weighted a past :: owed a' past end.
+Fixpoint response (samples : nat) (k : Z) (a past P : list Z) : list Z * Z :=
+  match samples with
+  | O => ([], norm1 (add (owed a past) (scale (-1) P)))
+  | S m =>
+      let y := Z.shiftr (hd 0 P - weighted a past) k in
+      let (Q, r) := response m k a (y :: past) (tl P) in (y :: Q, r + 2 ^ k)
+  end.
+
+Definition monic (k : Z) (a : list Z) : list Z := 2 ^ k :: a.
+Lemma owed_next a : forall y past u k, taps (owed a (y :: past)) u k = (IZR y * taps a u k + taps (owed (tl a) past) u k)%R.
+Proof.
+  induction a as [|x a IH]; intros y past u k; [simpl; ring|].
+  cbn [owed weighted taps tl]. rewrite plus_IZR, mult_IZR.
+  destruct a as [|x' a']; [simpl; ring|].
+  rewrite IH. cbn [tl owed taps]. ring.
+Qed.
+Lemma taps_first P u k : taps P u k = (IZR (hd 0%Z P) * u k + taps (tl P) u (k - 1))%R.
+Proof. destruct P; simpl; ring. Qed.
+
+Lemma response_spec (k : Z) (a : list Z) : 0 <= k -> forall samples past P Q r,
+  response samples k a past P = (Q, r) ->
+  exists rr, norm1 rr <= r /\ forall u t,
+    (taps Q (taps (monic k a) u) t = taps P u t - taps (owed a past) u t + taps rr u t)%R.
+Proof.
+  intros K. induction samples as [|m IH]; intros past P Q r; cbn [response]; intros E.
+  - injection E as <- <-. exists (add (owed a past) (scale (-1) P)). split; [lia|]. intros u t.
+    rewrite taps_add, taps_scale. change (taps [] (taps (monic k a) u) t) with 0%R. change (IZR (-1)) with (-1)%R. ring.
+  - set (v := hd 0 P - weighted a past) in *. set (y := Z.shiftr v k) in *.
+    destruct (response m k a (y :: past) (tl P)) as [Q' r'] eqn:E'. injection E as <- <-.
+    destruct (IH _ _ _ _ E') as [rr [N H]].
+    assert (Y : exists e, y * 2 ^ k = v + e /\ Z.abs e <= 2 ^ k).
+    { exists (y * 2 ^ k - v). split; [lia|]. unfold y. rewrite Z.shiftr_div_pow2 by exact K.
+      assert (0 < 2 ^ k) by (apply Z.pow_pos_nonneg; lia).
+      pose proof (Z.div_mod v (2 ^ k) ltac:(lia)). pose proof (Z.mod_pos_bound v (2 ^ k) ltac:(lia)). lia. }
+    destruct Y as [e [Y Be]]. exists (e :: rr). split; [simpl; lia|]. intros u t.
+    assert (W : (taps (owed a past) u t = IZR (weighted a past) * u t + taps (owed (tl a) past) u (t - 1))%R).
+    { destruct a as [|x a']; [simpl; ring|reflexivity]. }
+    rewrite W, (taps_first P). cbn [taps]. rewrite H, owed_next.
+    unfold monic. cbn [taps].
+    assert (V : (IZR y * IZR (2 ^ k)%Z = IZR (hd 0%Z P) - IZR (weighted a past) + IZR e)%R)
+      by (rewrite <- mult_IZR, Y; unfold v; rewrite plus_IZR, minus_IZR; ring).
+    rewrite Rmult_plus_distr_l, <- Rmult_assoc, V. ring.
+Qed.
+
+(* P / D', and one / D' from `one` on, of which the first residual is 0. *)
+Definition divide (samples : N) (k : Z) (a P : list Z) : list Z * Z := response (N.to_nat samples) k a [] P.
+Definition impulse (samples : N) (k : Z) (a : list Z) (one : Z) : list Z * Z :=
+  let (Q, r) := response (N.to_nat samples) k a [one] [] in (one :: Q, r).
+
+Lemma divide_spec samples k a P Q r : 0 <= k -> divide samples k a P = (Q, r) ->
+  exists rr, norm1 rr <= r /\ forall u t, (taps Q (taps (monic k a) u) t = taps P u t + taps rr u t)%R.
+Proof.
+  intros K E. destruct (response_spec k a K _ _ _ _ _ E) as [rr [N H]]. exists rr. split; [exact N|]. intros u t. rewrite H.
+  assert (Z0 : taps (owed a []) u t = 0%R).
+  { generalize t. clear. induction a as [|x a IH]; intros t; cbn [owed taps]; [reflexivity|].
+    rewrite IH. destruct a; simpl; ring. }
+  rewrite Z0. ring.
+Qed.
+Lemma impulse_spec samples k a one Q r : 0 <= k -> impulse samples k a one = (Q, r) ->
+  exists rr, norm1 rr <= r /\ forall u t,
+    (taps Q (taps (monic k a) u) t = IZR (one * 2 ^ k)%Z * u t + taps rr u (t - 1))%R.
+Proof.
+  intros K. unfold impulse. destruct (response (N.to_nat samples) k a [one] []) as [Q' r'] eqn:E'. intros E.
+  injection E as <- <-. destruct (response_spec k a K _ _ _ _ _ E') as [rr [N H]]. exists rr. split; [exact N|].
+  intros u t. cbn [taps]. rewrite H, owed_next. unfold monic. cbn [taps].
+  assert (Z0 : forall b t', taps (owed b []) u t' = 0%R).
+  { induction b as [|x b IH]; intros t'; cbn [owed taps]; [reflexivity|]. rewrite IH. destruct b; simpl; ring. }
+  rewrite Z0, mult_IZR. ring.
+Qed.
+
+(* A recursion whose coefficients are replaced by others that are nearly in proportion: s D = c D' + .., s B = c B' + .. *)
+Definition drift (s c : Z) (l l' : list Z) : list Z := add (scale s l) (scale (- c) l').
+Lemma drift_spec s c l l' u t : (IZR s * taps l u t = IZR c * taps l' u t + taps (drift s c l l') u t)%R.
+Proof. unfold drift. rewrite taps_add, !taps_scale, opp_IZR. ring. Qed.
