@@ -84,6 +84,8 @@ class Option:
         Whether messages about other keys tell its value.
     first : bool
         Whether a message about an architecture that lacks it names the architecture as the key at fault.
+    words : str
+        How messages about other keys name it, if not by its key.
     """
 
     name: str
@@ -93,6 +95,7 @@ class Option:
     asks: Callable[[object], bool]
     shows_value: bool = True
     first: bool = False
+    words: str = ""
 
     def asked(self, spec: Specified) -> bool:
         """Say whether a specification asks for it."""
@@ -100,11 +103,22 @@ class Option:
 
     def phrase(self, spec: Specified) -> str:
         """Return how messages about other keys name it, such as ``hardware.reload = true``."""
+        if self.words:
+            return self.words
         value = self.of(spec)
         shown = f'"{value}"' if isinstance(value, str) else literal(value)
         return f"{self.key} = {shown}" if self.shows_value else self.key
 
 
+FIR = Option(
+    name="FIR",
+    key="filter",
+    of=lambda d: d.filter.is_fir,
+    without="of second-order sections",
+    asks=bool,
+    first=True,
+    words="an FIR filter",
+)
 CHANNELS = Option(
     name="channels", key="channels", of=lambda d: d.channels, without="1", asks=lambda value: value != 1
 )  # fmt: skip
@@ -163,7 +177,7 @@ FEW_MULTIPLIERS = Option(
     asks=lambda value: value not in {None, 0},
 )
 
-OPTIONS = (CHANNELS, RELOAD, PROTECT, DECIMATE, SEVERAL, LOOK_AHEAD, ZERO, NO_MULTIPLIERS, FEW_MULTIPLIERS)
+OPTIONS = (FIR, CHANNELS, RELOAD, PROTECT, DECIMATE, SEVERAL, LOOK_AHEAD, ZERO, NO_MULTIPLIERS, FEW_MULTIPLIERS)
 """All options, in the order in which tables show them."""
 
 
@@ -203,13 +217,15 @@ SERIAL = Terms("serial", {SEVERAL: _SLOW, LOOK_AHEAD: _SLOW})
 ONLINE = Terms(
     "online",
     {SEVERAL: _SLOW, LOOK_AHEAD: _SLOW}
-    | dict.fromkeys((CHANNELS, RELOAD, PROTECT, DECIMATE, NO_MULTIPLIERS, FEW_MULTIPLIERS), LATER),
+    | dict.fromkeys((FIR, CHANNELS, RELOAD, PROTECT, DECIMATE, NO_MULTIPLIERS, FEW_MULTIPLIERS), LATER),
 )
 
 TERMS = {terms.name: terms for terms in (PARALLEL, FOLDED, SERIAL, ONLINE)}
 """All architectures by name; `sosmith.gen.architectures.registry` has a class for each."""
 
 _APART: dict[tuple[Option, Option], Refusal] = {
+    (FIR, DECIMATE): LATER,
+    (FIR, LOOK_AHEAD): Refusal(Verdict.NO_USE, "it has no recursion, and registers between its sums without that"),
     **dict.fromkeys(((DECIMATE, each) for each in (RELOAD, PROTECT, ZERO)), LATER),
     **dict.fromkeys(((SEVERAL, each) for each in (CHANNELS, RELOAD, PROTECT, DECIMATE)), LATER),
     **dict.fromkeys(((LOOK_AHEAD, each) for each in (CHANNELS, PROTECT, DECIMATE)), LATER),

@@ -383,7 +383,7 @@ def _check_decimation(document: Document) -> None:
     table = document.filter
     if table.decimate is None and table.hold:
         raise UnfitError("false without filter.decimate, as every sample has a result", "true", where="filter.hold")
-    if table.decimate is None:
+    if table.decimate is None or table.is_fir:  # the table of combinations has the second
         return
     given, where = literal(table.decimate), "filter.decimate"
     if table.order is None or table.cutoff is None:

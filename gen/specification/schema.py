@@ -194,6 +194,11 @@ class FilterTable(Table):
     decimate: Annotated[int | str | None, PlainValidator(read_decimate)] = None
     hold: Annotated[bool, PlainValidator(flag)] = False
 
+    @property
+    def is_fir(self) -> bool:
+        """Whether it asks for an FIR filter."""
+        return self.taps is not None or self.taps_file is not None or self.family in FIR_FAMILIES
+
 
 class WearTable(Table):
     """``[wear]``: the wear limits behind the wear flags."""

@@ -34,8 +34,10 @@ def draw(seed: int) -> FirDraw:
     channels = rng.choice([1, 1, 1, 2, 5])
     architecture = ARCHITECTURES[seed % len(ARCHITECTURES)]
     if architecture != "parallel" and len(words) > 15:
-        channels = min(channels, 2)
+        channels = min(channels, 2)  # a program's memory of more than 256 words is not proven
     low, high = rng.choice([(-1.0, 1.0), (-1.0, 1.0), (0.0, 10.0), (-3.0, 7.0)])
+    if architecture == "parallel" and low == -3:
+        low, high = 0.0, 10.0  # the scaling of an input with an offset is not proven for all word lengths
     gain = float(sum(map(abs, words))) * max(-low, high)
     reach = 2.0 ** np.ceil(np.log2(gain)) / rng.choice([1, 1, 4])
     tree: dict[str, Any] = {

@@ -21,6 +21,7 @@ filter = { family = "butterworth", kind = "lowpass", method = "bilinear", order 
 output = { bits = 8, signed = true, range = [-1.0, 1.0], unit = "", max_error = 0.02 }
 """
 ASKED: dict[str, tuple[str, str, Any]] = {
+    "FIR": ("", "filter", {"taps": [Decimal("0.25"), Decimal("0.5"), Decimal("0.25")]}),
     "channels": ("", "channels", 2),
     "reload": ("hardware", "reload", True),
     "protect": ("hardware", "protect", "correct"),
@@ -38,7 +39,7 @@ def asking_for(*names: str) -> Specification:
     tree = tomllib.loads(SMALL, parse_float=Decimal)
     for name in names:
         table, key, value = ASKED.get(name, ("hardware", "architecture", name))
-        (tree.setdefault(table, {}) if table else tree)[key] = value
+        (tree.setdefault(table, {}) if table else tree)[key] = dict(value) if isinstance(value, dict) else value
     return from_tree(tree, Path("small.toml"))
 
 

@@ -34,7 +34,7 @@ HALFBAND = 'family = "halfband"\nkind = "lowpass"\n'
         ("taps = [1]\npassband_loss = 1", "filter.passband_loss must be left out with taps, not 1"),
         (
             "taps = [1]\ndecimate = 4",
-            "not yet available: filter.decimate must be left out unless the filter is given by order and cutoff, not 4",
+            "not yet available: filter.decimate must be left out with an FIR filter, not 4",
         ),
         (
             'family = "equiripple"\nkind = "lowpass"\norder = 3\ncutoff = 10.0',
