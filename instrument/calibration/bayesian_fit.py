@@ -43,7 +43,7 @@ from sosmith.instrument.calibration.mixed_effects.model import (
 )
 from sosmith.instrument.calibration.mixed_effects.systematic_error import SystematicCurves
 from sosmith.instrument.calibration.rails import Rails, rails_of
-from sosmith.instrument.calibration.sensor_type import DEVIATIONS, SYSTEMATIC_FACTOR, SensorType
+from sosmith.instrument.calibration.sensor_type import DEVIATIONS, MOST_ORDER, SYSTEMATIC_FACTOR, SensorType
 from sosmith.model.arrays import Values
 from sosmith.model.errors import SpecificationError
 from sosmith.model.polynomial import Polynomial
@@ -56,6 +56,10 @@ MAX_ROUNDS = 10
 
 SURPRISING, SYSTEMATIC_SURPRISING = 4.0, 2.0
 """Deviations beyond this many tolerances, and systematic errors beyond this many standard deviations, are told."""
+
+MISSED, SOME = 1.0, 16
+"""What a polynomial may miss of the day's curve, relative to the standard uncertainty of that, rms, before it is told;
+and one of how many points of the covered region is looked at."""
 
 MOST_REJECTED = 0.25
 """Share of outliers above which it is the sensor that is not of the type."""
@@ -102,6 +106,22 @@ class BayesianFit:
     def doubts(self) -> tuple[str, ...]:
         """Sentences about what explains the measurements far better than the type's errors of a day do."""
         return doubts_of(self.model, self.posterior.curves, self.clearance, self.given, of_day=not self.plain)
+
+    @property
+    def missed(self) -> str:
+        """A sentence if the polynomial follows the day's curve much worse than that is known, else empty."""
+        posterior, order = self.posterior, self.fit.orders[0]
+        if self.plain or posterior.sensor_type.order == MOST_ORDER:
+            return ""
+        V, T = (values[::SOME] for values in self.region.points())
+        mean, variance = (posterior.scatters.mean_of(values) for values in posterior.predicted(V, T))
+        off = (self.fit.polynomial(V, T) - mean) ** 2
+        if float(np.mean(off / variance)) <= MISSED**2:
+            return ""
+        return (
+            f"the polynomial of orders {order}, 1 misses the curve of the day by {math.sqrt(float(np.mean(off))):.2g} "
+            "mm rms, by which its intervals are wider: a higher --order follows it, where the hardware has room"
+        )
 
     @property
     def given(self) -> Values:

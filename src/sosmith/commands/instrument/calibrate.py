@@ -2,24 +2,38 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
+from sosmith.commands.instrument.calibrate_options import (
+    ACCEPT,
+    DATE,
+    METHOD,
+    ORDER,
+    REQUIRED,
+    ROBUST,
+    SENSOR,
+    STORE,
+    TYPE,
+    VERSION,
+    Range,
+    fit_options,
+    lengths,
+    millimetres,
+    on_optional_day,
+    range_of,
+)
 from sosmith.commands.options import print_tables
-from sosmith.interface.choices import DEFAULT_RANGES, FIT_METHODS, REQUIRED_R, picture_format
+from sosmith.interface.choices import DEFAULT_RANGES, picture_format
 from sosmith.interface.files import write_file
 from sosmith.model.errors import ShortfallError, SpecificationError
 from sosmith.output_paths import output_option, plot_option
 from sosmith.terminal import JSON_OPTION, note, print_json, show_progress
 
 if TYPE_CHECKING:
-    from sosmith.interface.instrument.calibration_store import Added, FitOptions, Fitted, Referenced
-
-_Range = tuple[float, float]
+    from sosmith.interface.instrument.calibration_store import Added, Fitted, Referenced
 
 _SHOWN = 20
 """Number of refused lines that are printed; JSON has all of them."""
@@ -48,145 +62,26 @@ def calibrate() -> None:
     """Group the calibration commands."""
 
 
-def _day(ctx: click.Context, parameter: click.Parameter, text: str | None) -> str:
-    from sosmith.interface.instrument.calibration_store import day_of
-
-    return day_of(text)
-
-
-def _optional_day(ctx: click.Context, parameter: click.Parameter, text: str | None) -> str | None:
-    return None if text is None else _day(ctx, parameter, text)
-
-
-def _range(quantity: str, unit: str, usual: _Range) -> Callable[[Any], Any]:
-    return click.option(
-        f"--{quantity}-range",
-        nargs=2,
-        type=float,
-        metavar="LOW HIGH",
-        callback=_check_range,
-        help=f"Valid range of the {quantity} in {unit}, kept for later additions.  "
-        f"[default: unchanged; {usual[0]:g} {usual[1]:g} for a new sensor]",
-    )
-
-
-def _check_range(ctx: click.Context, parameter: click.Parameter, given: _Range | None) -> _Range | None:
-    if given is not None and not -1e9 <= given[0] < given[1] <= 1e9:
-        raise SpecificationError(
-            f"{parameter.opts[0]} must be two numbers, the lower one first, not {given[0]:g} {given[1]:g}"
-        )
-    return given
-
-
-def _check_required_r(ctx: click.Context, parameter: click.Parameter, given: float | None) -> float | None:
-    if given is not None and not 0 <= given < 1:  # NaN too
-        raise SpecificationError(f"--required-r must be 0 or more and less than 1, not {given:g}")
-    return given
-
-
-def _millimetres(ctx: click.Context, parameter: click.Parameter, text: str | None) -> float | None:
-    return None if text is None else _length(parameter.opts[0], text)
-
-
-def _lengths(ctx: click.Context, parameter: click.Parameter, texts: tuple[str, ...]) -> tuple[float, ...]:
-    return tuple(_length("CLEARANCE", text) for text in texts)
-
-
-def _length(name: str, text: str) -> float:
-    number = re.fullmatch(r"(\d+(?:\.\d+)?) ?mm", text.strip())
-    if number is None or not 0 < float(number[1]) <= 1000:
-        raise SpecificationError(f"{name} must be a length such as 0.2mm, not {text[:60]!r}")
-    return float(number[1])
-
-
-def _options(
-    method: str,
-    sensor_type: str | None,
-    required_r: float | None,
-    robust: bool,
-    accept: float | None,
-    order: int | None,
-) -> FitOptions:
-    from sosmith.interface.instrument.calibration_store import FitOptions
-
-    return FitOptions(
-        method="paper" if method == "paper" else "bayes",
-        sensor_type=sensor_type,
-        required_r=required_r,
-        robust=robust,
-        accept=accept,
-        order=order,
-    )
-
-
-_STORE = click.option(
-    "--store",
-    type=click.Path(path_type=Path),
-    default=Path("calibration.db"),
-    show_default=True,
-    help="SQLite file that holds the measurements.",
-)
-_SENSOR = click.option("--sensor", default="sensor", show_default=True, help="Name of the sensor.")
-_DATE = click.option(
-    "--date", callback=_day, metavar="YYYY-MM-DD", help="Date of the measurements or of the fit.  [default: today]"
-)
-_REQUIRED_R = click.option(
-    "--required-r",
-    type=float,
-    callback=_check_required_r,
-    help=f"With --method paper: required adjusted r; orders are raised until it is reached.  [default: {REQUIRED_R:g}]",
-)
-_ROBUST = click.option("--robust", is_flag=True, help="With --method paper: give outliers less weight (Huber).")
-_METHOD = click.option(
-    "--method",
-    type=click.Choice(FIT_METHODS),
-    default=FIT_METHODS[0],
-    show_default=True,
-    help="How to fit the measurements.",
-)
-_TYPE = click.option(
-    "--type",
-    "sensor_type",
-    metavar="NAME|FILE",
-    help="With --method bayes: type of the sensor, equation_5a, equation_4 or a TOML file; kept for later fits.  "
-    "[default: unchanged; equation_5a for a new sensor]",
-)
-_ACCEPT = click.option(
-    "--accept",
-    callback=_millimetres,
-    metavar="LENGTH",
-    help="Largest acceptable 95 % interval of a reading's clearance, such as 0.2mm for +-0.2 mm, wherever there are "
-    "measurements.",
-)
-_ORDER = click.option(
-    "--order",
-    type=click.IntRange(2, 8),
-    help="With --method bayes: highest order in the voltage of the polynomial of a day with measurements of its own; "
-    "kept for later fits. The hardware must have room for it.  [default: unchanged; 2 for a new sensor]",
-)
-_VERSION = click.option("--version", "number", type=int, help="Version number.  [default: the newest]")
-
-
 @calibrate.command("add")
 @click.argument("file", type=click.Path(path_type=Path))
-@_STORE
-@_SENSOR
-@_DATE
+@STORE
+@SENSOR
+@DATE
 @click.option("--keep-good", is_flag=True, help="Keep the valid rows of a file that also has invalid ones.")
 @click.option(
     "--surprising",
     is_flag=True,
     help="Store a file that looks like a slip: other units, swapped columns, another sensor.",
 )
-@_range("clearance", "mm", DEFAULT_RANGES[0])
-@_range("voltage", "V", DEFAULT_RANGES[1])
-@_range("temperature", "degC", DEFAULT_RANGES[2])
-@_METHOD
-@_TYPE
-@_ORDER
-@_ACCEPT
-@_REQUIRED_R
-@_ROBUST
+@range_of("clearance", "mm", DEFAULT_RANGES[0])
+@range_of("voltage", "V", DEFAULT_RANGES[1])
+@range_of("temperature", "degC", DEFAULT_RANGES[2])
+@METHOD
+@TYPE
+@ORDER
+@ACCEPT
+@REQUIRED
+@ROBUST
 @JSON_OPTION
 def add_command(
     file: Path,
@@ -195,9 +90,9 @@ def add_command(
     date: str,
     keep_good: bool,
     surprising: bool,
-    clearance_range: _Range | None,
-    voltage_range: _Range | None,
-    temperature_range: _Range | None,
+    clearance_range: Range | None,
+    voltage_range: Range | None,
+    temperature_range: Range | None,
     method: str,
     sensor_type: str | None,
     order: int | None,
@@ -221,7 +116,7 @@ def add_command(
     """
     from sosmith.interface.instrument.calibration_store import CalibrationStore
 
-    options = _options(method, sensor_type, required_r, robust, accept, order)
+    options = fit_options(method, sensor_type, required_r, robust, accept, order)
     with show_progress() as step:
         added = CalibrationStore(store).add(
             sensor,
@@ -275,14 +170,14 @@ def _note_addition(file: Path, store: Path, added: Added) -> None:
     "--uncertainty",
     default="0.02mm",
     show_default=True,
-    callback=_millimetres,
+    callback=millimetres,
     help="Standard uncertainty of a target's clearance, where TARGETS has no column uncertainty_mm.",
 )
 @click.option("--surprising", is_flag=True, help="Store readings that look like a slip.")
-@_ORDER
-@_STORE
-@_SENSOR
-@_DATE
+@ORDER
+@STORE
+@SENSOR
+@DATE
 @JSON_OPTION
 def reference_command(
     targets: Path | None,
@@ -329,15 +224,15 @@ def reference_command(
 
 
 @calibrate.command("fit")
-@_STORE
-@_SENSOR
-@_DATE
-@_METHOD
-@_TYPE
-@_ORDER
-@_ACCEPT
-@_REQUIRED_R
-@_ROBUST
+@STORE
+@SENSOR
+@DATE
+@METHOD
+@TYPE
+@ORDER
+@ACCEPT
+@REQUIRED
+@ROBUST
 @JSON_OPTION
 def fit_command(
     store: Path,
@@ -363,7 +258,7 @@ def fit_command(
     """
     from sosmith.interface.instrument.calibration_store import CalibrationStore
 
-    options = _options(method, sensor_type, required_r, robust, accept, order)
+    options = fit_options(method, sensor_type, required_r, robust, accept, order)
     with show_progress() as step:
         fitted = CalibrationStore(store).fit(sensor, date, options, step)
     _warn(fitted)
@@ -374,8 +269,8 @@ def fit_command(
 
 
 @calibrate.command("files")
-@_STORE
-@_SENSOR
+@STORE
+@SENSOR
 @JSON_OPTION
 def files_command(store: Path, sensor: str, as_json: bool) -> None:
     """List the files that a sensor's measurements came from, and which of them were withdrawn, by whom and why.
@@ -396,9 +291,9 @@ def files_command(store: Path, sensor: str, as_json: bool) -> None:
 @click.argument("file")
 @click.option("--reason", required=True, help="Why the file does not count.")
 @click.option("--author", required=True, help="Who withdraws it.")
-@_STORE
-@_SENSOR
-@_DATE
+@STORE
+@SENSOR
+@DATE
 @JSON_OPTION
 def withdraw_command(file: str, reason: str, author: str, store: Path, sensor: str, date: str, as_json: bool) -> None:
     """Withdraw FILE, and refit without it.
@@ -425,8 +320,8 @@ def withdraw_command(file: str, reason: str, author: str, store: Path, sensor: s
 
 
 @calibrate.command("history")
-@_STORE
-@_SENSOR
+@STORE
+@SENSOR
 @click.option("--verify", is_flag=True, help="Refit every version from its measurements, and compare bit by bit.")
 @JSON_OPTION
 def history_command(store: Path, sensor: str, verify: bool, as_json: bool) -> None:
@@ -453,9 +348,9 @@ def history_command(store: Path, sensor: str, verify: bool, as_json: bool) -> No
 
 
 @calibrate.command("export")
-@_STORE
-@_SENSOR
-@_VERSION
+@STORE
+@SENSOR
+@VERSION
 @click.option(
     "--format",
     "file_format",
@@ -496,9 +391,9 @@ def export_command(store: Path, sensor: str, number: int | None, file_format: st
 
 
 @calibrate.command("plot")
-@_STORE
-@_SENSOR
-@_VERSION
+@STORE
+@SENSOR
+@VERSION
 @output_option("SVG or PNG file to write.  [default: calibration.svg]")
 def plot_command(store: Path, sensor: str, number: int | None, output: Path | None) -> None:
     """Plot coverage, residuals, leverage and history.
@@ -519,8 +414,8 @@ def plot_command(store: Path, sensor: str, number: int | None, output: Path | No
 
 
 @calibrate.command("advise")
-@click.argument("clearances", nargs=-1, required=True, metavar="CLEARANCE...", callback=_lengths)
-@click.option("--within", default="0.2mm", show_default=True, callback=_millimetres, help="Wanted 95 % interval, +-.")
+@click.argument("clearances", nargs=-1, required=True, metavar="CLEARANCE...", callback=lengths)
+@click.option("--within", default="0.2mm", show_default=True, callback=millimetres, help="Wanted 95 % interval, +-.")
 @click.option(
     "--temperature",
     "temperatures",
@@ -532,12 +427,12 @@ def plot_command(store: Path, sensor: str, number: int | None, output: Path | No
 @click.option("--most", type=click.IntRange(1, 1000), default=60, show_default=True, help="Most measurements.")
 @click.option(
     "--uncertainty",
-    callback=_millimetres,
+    callback=millimetres,
     help="Standard uncertainty of what is measured, as of reference targets.  [default: it scatters as before]",
 )
-@_STORE
-@_SENSOR
-@_DATE
+@STORE
+@SENSOR
+@DATE
 @JSON_OPTION
 def advise_command(
     clearances: tuple[float, ...],
@@ -581,11 +476,11 @@ def advise_command(
 
 
 @calibrate.command("health")
-@_STORE
-@_SENSOR
+@STORE
+@SENSOR
 @click.option(
     "--since",
-    callback=_optional_day,
+    callback=on_optional_day,
     metavar="YYYY-MM-DD",
     help="Begin the charts at this date: what was before is known, and raises no alarm.  [default: the first day]",
 )
