@@ -79,7 +79,9 @@ def test_the_factors_are_those_of_the_fit() -> None:
     for architecture, families in fitted(rows_of(recorded())).items():
         for family, targets in families.items():
             for target, factors in targets.items():
-                assert factors == pytest.approx(told[architecture][family][target], abs=0.01)
+                recorded_factors = told[architecture][family][target]
+                for name in factors.keys() | recorded_factors.keys():  # another machine may leave one at 0
+                    assert factors.get(name, 0.0) == pytest.approx(recorded_factors.get(name, 0.0), abs=0.01), name
 
 
 def with_every_quantity() -> list[Recorded]:
