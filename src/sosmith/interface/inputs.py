@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from numbers import Real
-from os import PathLike, fspath
+from os import PathLike
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from sosmith.gen.core import CoreDesign
+from sosmith.interface.specification import path_of
 from sosmith.model.arrays import Codes
 from sosmith.model.errors import SpecificationError
 from sosmith.model.suggestion import did_you_mean
@@ -126,19 +127,6 @@ def traces_of(
         first = one(lambda array: array)
         return tuple(first.delayed(k) for k in range(channels))
     return tuple(one(lambda array, k=k: array[:, k]) for k in range(channels))  # type: ignore[misc]
-
-
-def path_of(source: str | PathLike[str], what: str) -> str:
-    """Return a path as text; `what` begins the sentence that refuses other things."""
-    try:
-        return fspath(source)
-    except TypeError:
-        raise SpecificationError(f"{what}, not {_kind(source)}") from None
-
-
-def _kind(value: object) -> str:
-    plain = value is None or isinstance(value, int | float)
-    return repr(value) if plain else f"something of type {type(value).__name__}"
 
 
 def _in_one_shape(design: CoreDesign, inputs: Mapping[str, npt.ArrayLike]) -> list[npt.NDArray[np.generic]]:

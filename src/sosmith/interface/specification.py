@@ -24,7 +24,6 @@ from sosmith.gen.specification.combinations import Combination, combinations
 from sosmith.gen.specification.exact_values import exact
 from sosmith.gen.specification.specification import Specification as Checked
 from sosmith.gen.specification.specification import example, from_text, from_tree, load
-from sosmith.interface.inputs import path_of, real_numbers
 from sosmith.interface.quantity import Quantity
 from sosmith.model.errors import SpecificationError
 
@@ -196,6 +195,8 @@ class Specification(View):
         clock = 12000000.0
         <BLANKLINE>
         """
+        from sosmith.interface.inputs import real_numbers  # numpy, which a specification from a file does without
+
         return cls.load(
             {
                 "name": name,
@@ -387,6 +388,19 @@ class Specification(View):
 def specification_of(source: Specification | str | PathLike[str] | Mapping[str, Any]) -> Specification:
     """Return `source` itself if it is a specification, otherwise load it with `Specification.load`."""
     return source if isinstance(source, Specification) else Specification.load(source)
+
+
+def path_of(source: str | PathLike[str], what: str) -> str:
+    """Return a path as text; `what` begins the sentence that refuses other things."""
+    try:
+        return fspath(source)
+    except TypeError:
+        raise SpecificationError(f"{what}, not {_kind(source)}") from None
+
+
+def _kind(value: object) -> str:
+    plain = value is None or isinstance(value, int | float)
+    return repr(value) if plain else f"something of type {type(value).__name__}"
 
 
 def _float(value: float, name: str) -> float:
