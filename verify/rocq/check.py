@@ -147,12 +147,12 @@ def theorems(certificate: Certificate) -> Theorems:
     RejectedError
         If its claims cannot be written as theorems.
     """
+    graph = flattened(certificate)
     claims = list(gain_claims(certificate))
     unchecked = list(_beside(certificate))
     why = _why_no_ranges(certificate.stages)
     if why is not None:
         return Theorems("", claims, (f"ranges: {why}", "error bound: no ranges are proven", *unchecked))
-    graph = flattened(certificate)
     cascade = cascade_of(graph) if certificate.claims.sections else None
     start = start_of(graph)
     claims.append(tight_claim())

@@ -57,16 +57,26 @@ def gain_claims(certificate: Certificate) -> Iterator[Claim]:
         model = LinearStage(section)
         where = f"section {index}"
         first = [[Fraction(1)]]
-        yield _gain(f"recursion_gain_{index}", f"{where}: gain of its recursion", model, first, claim.recursion_gain)
-        for place, output in enumerate(section.outputs):
-            if not passes_by(section, output):
-                over = [
-                    _in_values(section, model, output, source)
-                    for source in range(len(section.nodes))
-                    if section.nodes[source].op is Operation.INPUT
-                ]
-                words = f"{where}: gain from its inputs to output {place}"
-                yield _gain(f"peak_gain_{index}_{place}", words, model, over, claim.peak_gain)
+        yield _Gain(model, first, claim.recursion_gain).claim(
+            f"recursion_gain_{index}", f"{where}: gain of its recursion", close=True
+        )
+        made = {
+            place: _Gain(model, _from_inputs(section, model, output), claim.peak_gain)
+            for place, output in enumerate(section.outputs)
+            if not passes_by(section, output)
+        }
+        largest = max((gain.proven for gain in made.values()), default=Fraction(0))
+        for place, gain in made.items():
+            words = f"{where}: gain from its inputs to output {place}"
+            yield gain.claim(f"peak_gain_{index}_{place}", words, close=gain.proven == largest)
+
+
+def _from_inputs(section: StageEntry, model: LinearStage, output: int) -> list[list[Fraction]]:
+    return [
+        _in_values(section, model, output, source)
+        for source, node in enumerate(section.nodes)
+        if node.op is Operation.INPUT
+    ]
 
 
 def passes_by(section: StageEntry, output: int) -> bool:
@@ -80,26 +90,37 @@ def _in_values(section: StageEntry, model: LinearStage, node: int, source: int) 
     return [value * unit for value in model.numerator(node, ("node", source, 0))]
 
 
-def _gain(name: str, words: str, model: LinearStage, over: Sequence[Sequence[Fraction]], claimed: Fraction) -> Claim:
-    scale = common_denominator([model.denominator, *over])
-    under, numerators = integers(model.denominator, scale), [integers(one, scale) for one in over]
-    text = f"""\
-Theorem {name} : gain_at_most {numbers(under)} {rows(numerators)} {number(claimed.numerator)} {claimed.denominator}.
+class _Gain:
+    """A gain, and the shortest response that proves it, or that with the highest precision.
+
+    Attributes
+    ----------
+    proven : Fraction
+        What the response proves.
+    """
+
+    def __init__(self, model: LinearStage, over: Sequence[Sequence[Fraction]], claimed: Fraction) -> None:
+        scale = common_denominator([model.denominator, *over])
+        self._under, self._over = integers(model.denominator, scale), [integers(one, scale) for one in over]
+        self._claimed = claimed
+        exponent, tail = split(self._under)
+        for bits in _BITS:
+            made = impulse(exponent, tail, 1 << bits)
+            response = fmpz_poly(made.values)
+            total = sum(sum(abs(int(value)) for value in (fmpz_poly(one) * response).coeffs()) for one in self._over)
+            self.proven = Fraction(total, (1 << bits + exponent) - made.rest)
+            self._witness = f"Witness {made.samples} {exponent} {numbers(tail)} 1 1 (2 ^ {bits})"
+            if 0 <= self.proven <= claimed:
+                break
+
+    def claim(self, name: str, words: str, *, close: bool) -> Claim:
+        """Write the theorem; if `close`, one that is refused as well if it claims more than follows."""
+        statement = f"{numbers(self._under)} {rows(self._over)} {number(self._claimed.numerator)}"
+        text = f"""\
+Theorem {name} : gain_at_most {statement} {self._claimed.denominator}.
 Proof.
-  apply (claimed_gain _ _ ({_decided(under, numerators, claimed)})).
+  apply ({"claimed_gain" if close else "gain"} _ _ ({self._witness})).
   vm_cast_no_check (eq_refl true).
 Qed.
 """
-    return Claim(name, f"{words} at most {float(claimed):.9g}", text)
-
-
-def _decided(under: Sequence[int], over: Sequence[Sequence[int]], claimed: Fraction) -> str:
-    """Return a witness that proves a claim, or that with the highest precision."""
-    exponent, tail = split(under)
-    for bits in _BITS:
-        made = impulse(exponent, tail, 1 << bits)
-        response = fmpz_poly(made.values)
-        total = sum(int(sum(map(abs, (fmpz_poly(list(one)) * response).coeffs()))) for one in over)
-        if total <= claimed * ((1 << bits + exponent) - made.rest):
-            break
-    return f"Witness {made.samples} {exponent} {numbers(tail)} 1 1 (2 ^ {bits})"
+        return Claim(name, f"{words} at most {float(self._claimed):.9g}", text)

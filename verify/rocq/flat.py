@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from sosmith.verify.certificate_file import Certificate, NodeEntry, Operation, StageEntry
-from sosmith.verify.graph import inputs_of, require
+from sosmith.verify.graph import inputs_of, label, require
 from sosmith.verify.rocq.polynomials import number
 
 
@@ -71,11 +71,13 @@ def flattened(certificate: Certificate) -> FlatGraph:
     Raises
     ------
     RejectedError
-        If a stage has not as many inputs as the one before it has outputs, or the first one as there are.
+        If a stage has not as many inputs as the one before it has outputs, or the first one as there are; or an operand
+        is no node of its stage.
     """
     offsets: list[int] = [0]
     feeds: list[list[int]] = [[]]
     for index, stage in enumerate(certificate.stages):
+        _check_places(stage)
         if index:
             before = certificate.stages[index - 1]
             taken = [offsets[-2] + output for output in before.outputs]
@@ -84,6 +86,22 @@ def flattened(certificate: Certificate) -> FlatGraph:
             feeds.append(taken)
         offsets.append(offsets[-1] + len(stage.nodes))
     return FlatGraph(certificate.stages, offsets, feeds, _ports(certificate))
+
+
+def _check_places(stage: StageEntry) -> None:
+    """Check that operands and outputs are nodes of the stage, as many as each operation takes."""
+    for index, node in enumerate(stage.nodes):
+        count = {Operation.INPUT: 0, Operation.CONSTANT: 0, **dict.fromkeys(_TWO, 2)}.get(node.op, 1)
+        found = len(node.operands)
+        require(found == count, f"{label(stage, index)} must have {count} operands, not {found}")
+        last = len(stage.nodes) if node.op is Operation.DELAY else index
+        places = node.operands
+        require(max(places, default=-1) < last, f"{label(stage, index)} must have operands before it, not {places}")
+    outputs = stage.outputs
+    require(max(outputs) < len(stage.nodes), f"outputs of {stage.name} must be nodes of it, not {outputs}")
+
+
+_TWO = (Operation.ADD, Operation.SUBTRACT, Operation.MULTIPLY)
 
 
 def _ports(certificate: Certificate) -> list[tuple[int, int]]:

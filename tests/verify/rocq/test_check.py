@@ -107,7 +107,7 @@ def other_product(tree: Any) -> None:
 
 def other_filter(tree: Any) -> None:
     """Compare with another filter."""
-    coefficients = tree["ideal"]["sections"][0]["denominator"]
+    coefficients = next(one["denominator"] for one in tree["ideal"]["sections"] if len(one["denominator"]) > 1)
     coefficients[1] = str(Fraction(coefficients[1]) + Fraction(1, 1 << 12))
 
 
