@@ -33,8 +33,9 @@ def draw(seed: int) -> FirDraw:
     bits, output_bits = rng.randint(8, 24), rng.randint(8, 24)
     channels = rng.choice([1, 1, 1, 2, 5])
     architecture = ARCHITECTURES[seed % len(ARCHITECTURES)]
-    if architecture != "parallel" and len(words) > 15:
-        channels = min(channels, 2)  # a program's memory of more than 256 words is not proven
+    if architecture != "parallel":
+        # What a unit moves is not yet proven for memories of many words: `sosmith verify` rejects it, of any filter.
+        channels = min(channels, 2 if len(words) < 20 else 1)
     low, high = rng.choice([(-1.0, 1.0), (-1.0, 1.0), (0.0, 10.0), (-3.0, 7.0)])
     if architecture == "parallel" and low == -3:
         low, high = 0.0, 10.0  # the scaling of an input with an offset is not proven for all word lengths
