@@ -56,8 +56,6 @@ def draw(seed: int) -> FirDraw:
     }
     if rng.random() < 0.5:
         tree["output"]["max_error"] = round(2 * reach / 2**output_bits * rng.uniform(0.6, 3), 12)
-    if architecture == "serial" and len(words) > 40:
-        tree["hardware"]["start"] = "zero"  # differences from the first sample take twice as many words
     if architecture == "parallel" and rng.random() < 0.3:
         tree["hardware"]["multipliers"] = 0
     return FirDraw(sosmith.Specification.load(tree), tuple(map(Fraction, words)), shape)
