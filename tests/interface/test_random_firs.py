@@ -17,7 +17,7 @@ SEEDS = range(60)
 FEW = (5, 15, 25)
 SAMPLES = 300
 REJECTED = {56}
-"""A program with a memory of 512 words, of which `sosmith verify` wrongly rejects what the unit moves, of any filter."""
+"""A program with 512 words of memory: `sosmith verify` wrongly rejects what the unit moves, of any filter."""
 
 
 def marks_of(seed: int) -> list[pytest.MarkDecorator]:
