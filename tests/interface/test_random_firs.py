@@ -16,17 +16,10 @@ import sosmith
 SEEDS = range(60)
 FEW = (5, 15, 25)
 SAMPLES = 300
-REJECTED = {56}
-"""A program with 512 words of memory: `sosmith verify` wrongly rejects what the unit moves, of any filter."""
+CASES = [pytest.param(seed, marks=[] if seed in FEW else pytest.mark.slow) for seed in SEEDS]
 
 
-def marks_of(seed: int) -> list[pytest.MarkDecorator]:
-    """Return the marks of the proof of a filter's files."""
-    wrong = [pytest.mark.xfail(reason="a large memory is rejected", strict=True)] if seed in REJECTED else []
-    return wrong + ([] if seed in FEW else [pytest.mark.slow])
-
-
-@pytest.mark.parametrize("seed", [pytest.param(seed, marks=[] if seed in FEW else pytest.mark.slow) for seed in SEEDS])
+@pytest.mark.parametrize("seed", CASES)
 def test_no_error_exceeds_the_bound(seed: int) -> None:
     drawn = draw(seed)
     made = sosmith.design(drawn.specification)
@@ -37,7 +30,7 @@ def test_no_error_exceeds_the_bound(seed: int) -> None:
     assert 0 < largest_error(results, codes, drawn) <= bound
 
 
-@pytest.mark.parametrize("seed", [pytest.param(seed, marks=marks_of(seed)) for seed in SEEDS])
+@pytest.mark.parametrize("seed", CASES)
 def test_certificate_and_files_are_proven(seed: int, tmp_path: Path) -> None:
     drawn = draw(seed)
     made = sosmith.design(drawn.specification)

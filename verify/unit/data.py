@@ -164,10 +164,17 @@ class Data:
         return Subject(name, self._contexts.loads(name), kind, check)
 
     def _held(self, forms: Forms) -> dict[str, Form]:
-        """Return what the cut nets and registers hold: words, sums and factors, with their signs."""
+        """Return what the cut nets and registers hold: words, sums and factors, with their signs.
+
+        The slices that a word is read in are its bits, as `check_nets` proves.
+        """
         widths = {ADDED: self._width, READ: self._word, "moved": self._word, "operand": self._word}
         widths |= {"data": self._word, "factor": self._word, "product": 2 * self._word}
-        return {name: self._signed(forms, name, width) for name, width in widths.items()}
+        contents = {name: self._signed(forms, name, width) for name, width in widths.items()}
+        for name, port in zip(self._control.words, self._control.reads, strict=True):
+            above = forms.floor(shifted(contents[READ], -int(name[5:])))
+            contents[port.register] = forms.unsigned(above, self._netlist.memories[name].width)
+        return contents
 
     @staticmethod
     def _signed(forms: Forms, name: str, width: int) -> Form:

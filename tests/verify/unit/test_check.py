@@ -37,6 +37,13 @@ def test_small_cores(spec: str, architecture: str, channels: int) -> None:
     assert found.pace.interval == cycles_per_sample(program, serial=serial, channels=channels)
 
 
+@pytest.mark.parametrize("architecture", ["folded", "serial"])
+def test_words_in_slices(architecture: str) -> None:
+    core = unit(STEADY, architecture, 24)
+    assert len(re.findall(r"reg \[\d+:0\] words\d+ \[", core.text)) > 1
+    assert core.check().cases > 20
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("channels", [1, 2, 5])
 @pytest.mark.parametrize("architecture", ["folded", "serial"])
