@@ -97,8 +97,8 @@ def _decimation(decimation: DecimationFacts, unit: str) -> Iterator[tuple[str, s
     most = max(band.gain_db for band in decimation.aliasing)
     yield (
         "aliasing into the pass band",
-        f"at most {most:.1f} dB, {quantity(decimation.worst_aliasing, unit)} of a sine over the whole range of "
-        f"{'the input' if before is None else 'that result'}",
+        f"at most {most:.1f} dB behind the decimator, {quantity(decimation.worst_aliasing, unit)} of a sine over the "
+        f"whole range of {'the input' if before is None else 'that result'}",
     )
     yield (
         f"anything from {decimation.sample_rate / 2:,.6g} Hz on",
