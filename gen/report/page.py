@@ -310,9 +310,9 @@ def _decimation_caption(decimation: DecimationFacts, unit: str) -> str:
         f"integrators and combs of {decimation.width} bits, and the filter works at {rate}. A sine over the whole "
         f"range of {what} in one of the bands on the right leaves the decimator in the pass band with an amplitude of "
         f"at most {worst}; one at any frequency from half that rate on leaves the filter, wherever it folds, with at "
-        f"most {_amount(decimation.largest, unit)} ({decibels(decimation.largest_db)}), where a filter without a decimator "
-        f"has {decibels(decimation.direct_largest_db)}. At {SAMPLED} frequencies in the pass band the gain is "
-        f"within {plain_number(decimation.deviation_db)} dB of that without a decimator, and decimator and "
+        f"most {_amount(decimation.largest, unit)} ({decibels(decimation.largest_db)}), where a filter without a "
+        f"decimator has {decibels(decimation.direct_largest_db)}. At {SAMPLED} frequencies in the pass band the gain "
+        f"is within {plain_number(decimation.deviation_db)} dB of that without a decimator, and decimator and "
         f"filter together delay by {_amount(decimation.delay, 's')}."
     )
 
