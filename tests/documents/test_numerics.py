@@ -28,7 +28,7 @@ def test_the_numerics_show_a_refusal_as_such(monkeypatch: pytest.MonkeyPatch) ->
 
     only = {"df1": Realization(terms=RealizationTerms("df1", ""), build=refuse)}
     monkeypatch.setitem(REALIZATIONS, "df1", only["df1"])
-    monkeypatch.setattr(numerics, "REALIZATIONS", only)
+    monkeypatch.setattr(numerics, "SECTIONS", only)
     monkeypatch.setattr(numerics, "others", lambda _: [])
     *_, head, _, row = numerics.table("audio_lowpass").splitlines()
     advice = 'hardware.realization = "df1_ef2" meets the specification as it is'

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from sosmith.gen.specification.choices import MAX_TAPS
 from sosmith.gen.specification.coefficients.arrays import read_array_file
-from sosmith.gen.specification.coefficients.content import Content
+from sosmith.gen.specification.coefficients.content import Content, TransferFunction
 from sosmith.gen.specification.coefficients.prototype_file import read_prototype
 from sosmith.gen.specification.coefficients.text import read_text_file
 from sosmith.model.errors import SpecificationError
@@ -31,8 +32,16 @@ def read_filter_file(path: Path) -> Content:
     Raises
     ------
     SpecificationError
-        If the file cannot be read or holds no filter that can be recognized.
+        If the file cannot be read, holds no filter that can be recognized, or one of too many taps.
     """
+    content = _content(path)
+    taps = content.taps if isinstance(content, TransferFunction) else None
+    if taps is not None and len(taps) > MAX_TAPS:
+        raise SpecificationError(f"{path}: the filter must have at most {MAX_TAPS} taps, not {len(taps):,}")
+    return content
+
+
+def _content(path: Path) -> Content:
     suffix = path.suffix.lower()
     if suffix in OTHER_KINDS:
         raise SpecificationError(f"{path}: the filter must be a file of coefficients, not {OTHER_KINDS[suffix]}")

@@ -197,13 +197,15 @@ class Specification(View):
         """
         from sosmith.interface.inputs import real_numbers  # numpy, which a specification from a file does without
 
+        real_numbers(sos, "sos")  # which may be decimals of more digits
+
         return cls.load(
             {
                 "name": name,
                 "sample_rate": _float(sample_rate, "sample_rate"),
                 "channels": channels,
                 "input": {"x": _format(input_bits, input_range)},
-                "filter": {"sos": real_numbers(sos, "sos")},
+                "filter": {"sos": sos},
                 "output": _format(output_bits or input_bits, output_range or input_range)
                 | {"unit": unit, "max_error": max_error},
                 "hardware": {"realization": realization, "architecture": architecture, "clock": _float(clock, "clock")},

@@ -23,7 +23,7 @@ ARCHITECTURES = ("parallel", "folded", "serial")
 def made_in(name: str, before: str = "", *, hold: bool = False) -> Architecture:
     """Return the small instrument, with measurements of its calibration, which may have another architecture."""
     made = small(f"[hardware]\narchitecture = '{name}'\n").architecture
-    other = small(f"[hardware]\narchitecture = '{before or name}'\n").architecture.ahead
+    other = small(f"[hardware]\narchitecture = '{before or name}'\n").architecture.calibration
     assert other is not None
     ahead = replace(other, datapath=replace(other.datapath, calibrated=LIMITS))
     return replace(

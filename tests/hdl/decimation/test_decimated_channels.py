@@ -25,7 +25,7 @@ def made_in(name: str, before: str = "", *, core: str = "instrument", hold: bool
     made = small(extra(CHANNELS, name), core).architecture
     if core == "filter":
         return made
-    other = small(extra(CHANNELS, before or name), core).architecture.ahead
+    other = small(extra(CHANNELS, before or name), core).architecture.calibration
     assert other is not None
     ahead = replace(other, datapath=replace(other.datapath, calibrated=LIMITS))
     return replace(

@@ -9,7 +9,7 @@ from tests.verify.parallel.rejections import NODE, rejection, sweep
 from tests.verify.small_specifications import INSTRUMENT, PLAIN, STEADY_INSTRUMENT, UNSIGNED
 
 from sosmith.gen.core import design_core
-from sosmith.gen.realizations.registry import REALIZATIONS
+from sosmith.gen.realizations.registry import SECTIONS
 from sosmith.hdl.plan.parallel_clocks import latency_cycles
 from sosmith.verify.certificate_file import AboutEntry
 from sosmith.verify.graph import RejectedError
@@ -23,13 +23,13 @@ def test_examples(name: str) -> None:
     accept(made(parallel_design(name, realization="df1_ef2")))
 
 
-@pytest.mark.parametrize("realization", REALIZATIONS)
+@pytest.mark.parametrize("realization", SECTIONS)
 def test_every_realization(realization: str) -> None:
     accept(small(ODD if realization == "lattice_wdf" else PLAIN, realization))
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("realization", REALIZATIONS)
+@pytest.mark.parametrize("realization", SECTIONS)
 def test_every_realization_behind_a_calibration(realization: str) -> None:
     accept(small(INSTRUMENT, realization))
 
@@ -45,7 +45,7 @@ def test_an_output_that_saturates_far_from_its_ends() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("channels", [2, 3, 16, 17, 64])
-@pytest.mark.parametrize("realization", REALIZATIONS)
+@pytest.mark.parametrize("realization", SECTIONS)
 def test_every_realization_for_several_channels(realization: str, channels: int) -> None:
     accept(small(ODD if realization == "lattice_wdf" else PLAIN, realization, channels))
 
