@@ -62,7 +62,10 @@ def on_page_markdown(markdown: str, page: Any, files: Files, **_: Any) -> str:
 
 _MENDED = (
     # What belongs to no landmark is skipped by whoever goes from one to the next.
-    (re.compile(r'<div class="rst-versions" role="note" aria-label="Versions">'), '<nav class="rst-versions" aria-label="Pages">'),
+    (
+        re.compile(r'<div class="rst-versions" role="note" aria-label="Versions">'),
+        '<nav class="rst-versions" aria-label="Pages">',
+    ),
     (re.compile(r"(</span>\s*)</div>(?=\s*<script)"), r"\1</nav>"),
     (re.compile(r"<footer>"), '<footer role="contentinfo">'),
     (re.compile(r'<div role="contentinfo">'), "<div>"),
