@@ -145,9 +145,8 @@ def test_another_structure_is_refused() -> None:
     higher = design(replace(hardware.spec.filter, order=hardware.spec.filter.order + 2), 48000.0)
     with pytest.raises(
         ShortfallError,
-        match=r"^the filter's sections must have the coefficients A1 and A1, A2 and A1, A2, not A1 and A1, A2 and A1, A2 and "
-        r"A1, A2: "
-        r"what is loaded are values, and the core stays as it is$",
+        match=r"^the filter's sections must have the coefficients A1 and A1, A2 and A1, A2, not A1 and "
+        r"A1, A2 and A1, A2 and A1, A2: what is loaded are values, and the core stays as it is$",
     ):
         other_set(hardware, ideal=higher)
     bench = hardware_in("folded", "flange_wear_bench.toml")
