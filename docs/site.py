@@ -1,5 +1,7 @@
 """What the site adds to docs/: README, CHANGELOG and executed notebooks, links only to what it has, a search on disk.
 
+It also mends what axe-core finds in the pages of the theme.
+
 A hook of MkDocs, named in mkdocs.yml.
 """
 
@@ -56,6 +58,33 @@ def on_page_markdown(markdown: str, page: Any, files: Files, **_: Any) -> str:
         return f"{link['image']}[{link['text']}]({target}{link['anchor'] or ''})"
 
     return _LINK.sub(linked, markdown)
+
+
+_MENDED = (
+    # What belongs to no landmark is skipped by whoever goes from one to the next.
+    (
+        re.compile(r'<div class="rst-versions" role="note" aria-label="Versions">'),
+        '<nav class="rst-versions" aria-label="Pages">',
+    ),
+    (re.compile(r"(</span>\s*)</div>(?=\s*<script)"), r"\1</nav>"),
+    (re.compile(r"<footer>"), '<footer role="contentinfo">'),
+    (re.compile(r'<div role="contentinfo">'), "<div>"),
+    # What is wider than a phone scrolls, and has to with the keys alone.
+    (re.compile(r"<(pre><code|table)\b"), r'<\1 tabindex="0"'),
+)
+"""What is written otherwise than in the theme."""
+
+
+def on_post_page(output: str, **_: Any) -> str:
+    """Let a page be read with a screen reader and with the keys alone."""
+    for pattern, text in _MENDED:
+        output = pattern.sub(text, output)
+    return output
+
+
+def on_post_template(output_content: str, **_: Any) -> str:
+    """Do the same for the pages that have no source: that of results, and the one for a wrong address."""
+    return on_post_page(output_content)
 
 
 def on_post_build(config: Any) -> None:

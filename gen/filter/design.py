@@ -24,7 +24,7 @@ from sosmith.gen.filter.minimum_order import least_order
 from sosmith.gen.filter.prototypes import Prototype, prototype
 from sosmith.gen.filter.sections import Row, rounded, sections
 from sosmith.gen.filter.transformations import bilinear, unwarped, warped
-from sosmith.gen.quantity import frequency
+from sosmith.gen.quantity import count, frequency
 from sosmith.gen.specification.choices import FIR, FIR_FAMILIES, MAX_DECIMATION
 from sosmith.gen.specification.specification import FilterSpec
 from sosmith.model.arithmetic.correct_rounding import evaluate, nearest_double, sign
@@ -126,10 +126,12 @@ class Filter:
     def describe(self) -> str:
         """One-line description: family, kind, order, cutoff, sample rate, and what else is not the default."""
         if self.is_fir:
-            method = "" if self.family == FIR else f"{self.family} ".replace("_", " ")
-            return f"{method}FIR {self.kind}, {self.order + 1} taps at {frequency(self.sample_rate)}"
+            taps, rate = count(self.order + 1, "tap"), frequency(self.sample_rate)
+            if self.family == FIR:  # its kind is where its gain is largest, which misleads of a pure gain or a comb
+                return f"FIR of {taps} given at {rate}"
+            return f"{self.family} FIR {self.kind}, {taps} at {rate}".replace("_", " ")
         if self.cutoff is None:
-            return f"{len(self.rows)} given section{'s' * (len(self.rows) > 1)} at {frequency(self.sample_rate)}"
+            return f"{count(len(self.rows), 'given section')} at {frequency(self.sample_rate)}"
         method = "" if self.aliasing is None else ", impulse-invariant"
         filter_ = f"{self.family.capitalize()} {self.kind}, order {self.order}"
         decimated = f", decimated by {self.decimated}" if self.decimated > 1 else ""

@@ -24,6 +24,8 @@ from sosmith.model.sections.horner import HornerPolynomial, HornerStep, Variable
 
 _DOUBLE = 53
 """Significant bits of a number in double precision."""
+_SPELT = 6
+"""Most coefficients of a section that a message names one by one."""
 
 
 def with_constants(
@@ -154,13 +156,25 @@ def _lifted(formats: Sequence[SectionFormat], bits: int) -> list[SectionFormat]:
     ]
 
 
+def _spelt(sections: Sequence[Sequence[str]]) -> str:
+    """Return the names of coefficients, section by section; of an FIR filter with many, the ends and how many."""
+    short = (
+        f"{names[0]}, {names[1]}, ..., {names[-1]} ({len(names)} in all)" if len(names) > _SPELT else ", ".join(names)
+        for names in sections
+    )
+    return " and ".join(short)
+
+
 def _with_coefficients_of(ideal: Filter, formats: Sequence[SectionFormat], realization: str) -> list[SectionFormat]:
     """Return `formats` with the coefficients of another filter, rounded to the same fraction bits."""
     nearest = [SectionFormat(coefficient_bits=_DOUBLE)] * len(parts_of(ideal, realization))
     exact = stages_of(ideal, realization, nearest, unknown_range(0))
     names, wanted = ([list(f.coefficients) for f in formats], [list(stage.coefficients) for stage in exact])
     if names != wanted:
-        raise ShortfallError(f"the filter's sections must have the coefficients {names}, not {wanted}")
+        raise ShortfallError(
+            f"the filter's sections must have the coefficients {_spelt(names)}, not {_spelt(wanted)}: "
+            "what is loaded are values, and the core stays as it is"
+        )
     result = []
     for old, stage in zip(formats, exact, strict=True):
         coefficients = {}

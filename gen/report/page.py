@@ -15,7 +15,7 @@ import numpy as np
 from sosmith.gen.facts.design_tables import ErrorUnit, budget_table, limit_cycles_table, uncertainty_table
 from sosmith.gen.facts.table import Table
 from sosmith.gen.filter.decimation import SAMPLED
-from sosmith.gen.filter.response import FilterFacts
+from sosmith.gen.filter.response import FilterFacts, poles
 from sosmith.gen.filter.step_response import SETTLED, StepResponse
 from sosmith.gen.fpga.synthesis import Netlist
 from sosmith.gen.output.core_facts import CoreFacts
@@ -379,11 +379,17 @@ def _filter_figures(core: CoreFacts, facts: FilterFacts, decimation: DecimationF
         "plane": Figure(
             title="Poles and zeros",
             drawing=plots.pole_zero_figure(facts),
-            caption="Crosses are poles, rings are zeros; inside the unit circle a pole is stable. "
-            "Where blue covers orange, rounding has not moved it.",
+            caption=f"{_marks(facts)} Where blue covers orange, rounding has not moved it.",
             legend=[("golden", "", "ideal filter"), ("hardware", "", "integer coefficients")],
         ),
     }
+
+
+def _marks(facts: FilterFacts) -> str:
+    """Return what the marks in the z plane are."""
+    if len(poles(facts.quantized_sos)):
+        return "Crosses are poles, rings are zeros; inside the unit circle a pole is stable."
+    return "Rings are zeros. All poles are at 0, where they are stable, and are not drawn."
 
 
 def _step_figure(step: StepResponse) -> Figure:

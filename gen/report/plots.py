@@ -34,7 +34,7 @@ from sosmith.gen.filter.response import (
     zeros,
 )
 from sosmith.gen.picture import settled, svg_text
-from sosmith.gen.quantity import quantity, scale
+from sosmith.gen.quantity import count, quantity, scale
 from sosmith.gen.report.evidence import Evidence
 from sosmith.gen.report.run import Instants
 from sosmith.model.reference.accuracy import error_statistics, peak
@@ -50,6 +50,8 @@ SERIES = tuple(f"series{k}" for k in range(8))
 ROLES = ("ink", "muted", "grid", "truth", "unfiltered", "golden", "hardware", "limit", "asked", *SERIES)
 COLOUR = {role: f"#0000{index:02x}" for index, role in enumerate(ROLES, start=1)}
 PANEL_HEIGHT = 350
+_FARTHEST = 3.0
+"""Half width of the part of the z plane that is drawn at most: beyond it the unit circle would be small."""
 
 IDEAL_LINE: dict[str, Any] = {"lw": 3.6}
 REAL_LINE: dict[str, Any] = {"lw": 2.0, "ls": (0, (3.0, 1.6))}
@@ -609,18 +611,31 @@ def _paint_multiplicity(axes: Axes, facts: FilterFacts) -> None:
             )
 
 
+def plane_frame(facts: FilterFacts) -> tuple[float, int]:
+    """Half width of the square around 0 that shows all zeros, as far as it goes, and how many lie outside.
+
+    Half of the zeros of an FIR filter with linear phase, which are not on the unit circle, lie outside of it.
+    """
+    own = zeros(facts.quantized_sos)
+    farthest = np.array([max(abs(zero.real), abs(zero.imag)) for zero in (*own, *zeros(facts.ideal_sos))])
+    half = min(max(1.25, 1.1 * float(max(farthest, default=0.0))), _FARTHEST)
+    return half, int(np.sum(farthest[: len(own)] > half))
+
+
 def pole_zero_figure(facts: FilterFacts) -> str:
-    """Poles and zeros in the z plane: the whole unit circle, and a close-up of the poles."""
+    """Poles and zeros in the z plane: all of the unit circle and the zeros around it, and a close-up of the poles."""
 
     def paint(figure: Figure) -> None:
         real, imag, half = _zoom_box(facts)
         panels = figure.subplots(1, 2 if half < 0.6 else 1, squeeze=False)[0]
-        _paint_plane(panels[0], facts, (0.0, 0.0), 1.25)
+        whole, outside = plane_frame(facts)
+        _paint_plane(panels[0], facts, (0.0, 0.0), whole)
         _paint_multiplicity(panels[0], facts)
         panels[0].set_xticks([-1, 0, 1])
         panels[0].set_yticks([-1, 0, 1])
         panels[0].set_ylabel("imaginary part")
-        panels[0].set_title("unit circle", fontsize=12)
+        beyond = f", {count(outside, 'zero')} farther out" if outside else ""
+        panels[0].set_title(f"unit circle{beyond}", fontsize=12)
         if len(panels) > 1:
             _paint_plane(panels[1], facts, (real, imag), half)
             panels[1].set_title("close-up of the poles", fontsize=12)

@@ -6,11 +6,12 @@ the messages about unknown and missing keys follow from that.
 
 from __future__ import annotations
 
+import sys
 from fractions import Fraction
 from functools import partial
 from typing import Annotated, Any, cast
 
-from pydantic import BaseModel, ConfigDict, Field, PlainValidator, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, PlainValidator, ValidationError, ValidationInfo
 from pydantic_core import ErrorDetails
 
 from sosmith.gen.specification.choices import (
@@ -172,13 +173,19 @@ class CalibrationTable(Table):
     uncertainty: CoefficientsTable | None = Field(default=None, description="a table [calibration.uncertainty]")
 
 
+def _order(value: object, info: ValidationInfo) -> int:
+    """Read the order of a filter with poles; one of FIR filters is refused by its key, not as too large."""
+    largest = sys.maxsize if info.data.get("family") in FIR_FAMILIES else MAX_ORDER
+    return whole(1, largest)(value)
+
+
 class FilterTable(Table):
     """``[filter]``: given by order and cutoff, by edges and losses, by sections, or by taps."""
 
     family: Annotated[str | None, PlainValidator(choice((*FAMILIES, *FIR_FAMILIES), FAMILY_HINTS))] = None
     kind: Annotated[str | None, PlainValidator(choice(KINDS, KIND_HINTS))] = None
     method: Annotated[str | None, PlainValidator(choice(METHODS))] = None
-    order: Annotated[int | None, PlainValidator(whole(1, MAX_ORDER))] = None
+    order: Annotated[int | None, PlainValidator(_order)] = None
     cutoff: Edges = None
     passband_edge: Edges = None
     stopband_edge: Edges = None

@@ -5,6 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 from pathlib import Path
 
+from sosmith.gen.quantity import count
 from sosmith.gen.specification.choices import MAX_TAPS
 from sosmith.gen.specification.coefficients.content import TransferFunction
 from sosmith.gen.specification.coefficients.filter_file import read_filter_file
@@ -33,4 +34,4 @@ def taps_of(path: Path) -> tuple[tuple[Fraction, ...], str]:
         raise SpecificationError(f"{path}: taps must be at most {MAX_TAPS}, not {len(read.taps)}")
     if not any(read.taps):
         raise SpecificationError(f"{path}: taps must not all be 0")
-    return read.taps, f"{len(read.taps)} taps from {read.format}"
+    return read.taps, f"{count(len(read.taps), 'tap')} from {read.format}"

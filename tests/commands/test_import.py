@@ -28,7 +28,7 @@ def test_a_list_of_biquads_becomes_a_specification(tmp_path: Path) -> None:
     result = command.good(str(tmp_path / "8 bands.txt"), "--sample-rate", "1000", "--unit", "V", "-o", str(output))
     assert result.stdout == f"{output}\n"
     assert result.stderr == (
-        "sosmith: 1 second-order sections from a list of biquads as from Room EQ Wizard and miniDSP, read with the "
+        "sosmith: 1 second-order section from a list of biquads as from Room EQ Wizard and miniDSP, read with the "
         "signs of a1 and a2 negated: with scipy's signs of a1 and a2 it would be unstable\n"
         "sosmith: gain 1 at 0 Hz, 0 at 500 Hz\n"
     )
@@ -111,7 +111,7 @@ def test_a_file_of_sections_says_how_it_was_read(tmp_path: Path) -> None:
     path = in_file(tmp_path, "f.npy", array())
     spec = sosmith.Specification.load(path).checked
     assert spec.filter.origin == (
-        "1 second-order sections from a NumPy file .npy of b0, b1, b2, a0, a1, a2, read with scipy's signs of a1 and "
+        "1 second-order section from a NumPy file .npy of b0, b1, b2, a0, a1, a2, read with scipy's signs of a1 and "
         "a2: with the signs of a1 and a2 negated it would be unstable"
     )
 

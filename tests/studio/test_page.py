@@ -84,6 +84,23 @@ def asked(session: Session, key: str) -> Any:
     return state(session)["preview"]["spec"]["filter"][key]
 
 
+def test_zeros_outside_of_the_unit_circle_are_shown(tab: Tab, page: Session) -> None:
+    """Some at 1.41 are drawn; those at 4.1 are told."""
+    shown = "[...document.querySelectorAll('#plane .zero')].every(zero => { const [, , width, height] = "
+    shown += "zero.closest('svg').getAttribute('viewBox').split(' ').map(Number), x = Number(zero.getAttribute('cx')), "
+    shown += "y = Number(zero.getAttribute('cy')); return x > 0 && x < width && y > 0 && y < height; })"
+    head, _, rest = TEXT.partition("[filter]")
+    _, _, tail = rest.partition("\n[")
+    for taps, all_shown, told in (
+        ("0.3, 0.0, -0.75, 0.0, 0.3", True, ""),
+        ("0.1, 0.0, 1.7, 0.0, 0.1", False, "2 zeros farther out"),
+    ):
+        page.handle({"do": "text", "text": f"{head}[filter]\ntaps = [{taps}]\n\n[{tail}"}, "test")
+        tab.until("document.getElementById('describe').textContent.startsWith('FIR of 5 taps')")
+        tab.until(f"document.getElementById('poles').textContent === '{told}'")
+        assert tab.value(shown) == all_shown
+
+
 def typed(tab: Tab, field: str, text: str) -> None:
     """Type into a field."""
     tab.value(f"(() => {{ const field = document.querySelector({field!r}); field.focus(); field.select(); }})()")

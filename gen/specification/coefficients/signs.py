@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
+from sosmith.gen.quantity import count
 from sosmith.gen.specification.coefficients.content import Row, Signs, StatedSections
 from sosmith.model.errors import SpecificationError
 
@@ -93,7 +94,8 @@ def sentence(stated: StatedSections, sections: SettledSections) -> str:
     """Say what the file is and in which convention it was read, and why."""
     other = _OTHER[sections.signs]
     why = f"with {_WORDS[other]} it would be unstable" if sections.certain else "as its format says; both are stable"
-    return f"{len(sections.rows)} second-order sections from {stated.format}, read with {_WORDS[sections.signs]}: {why}"
+    read = count(len(sections.rows), "second-order section")
+    return f"{read} from {stated.format}, read with {_WORDS[sections.signs]}: {why}"
 
 
 def response(rows: Sequence[Row], z: int) -> Fraction:

@@ -76,7 +76,10 @@ class Reload(View):
             settling = core.quantized.settling
             flagged = f"from zero; it flags {settling:,} samples as settling, {settling / rate:.3g} s"
             rows.append(("the core restarts", flagged if settling else "in the steady state of its next sample"))
-        rows.append(("states", f"use at most {100 * float(swap.use):.3g} % of their range"))
+        if swap.use:
+            rows.append(("states", f"use at most {100 * float(swap.use):.3g} % of their range"))
+        elif quantized.filter is not None:
+            rows.append(("states", "hold past inputs only"))
         crc = tree["writes"][-1][1]
         rows.append(("load", f"version {tree['version']}, {tree['words']:,} words, CRC 0x{crc:08X}"))
         rows.append(("for the design", f"0x{tree['design']:08X}"))

@@ -347,11 +347,16 @@ function delay() {
   shown(where, to, `Group delay over frequency, in ${unit}`);
 }
 
+// Half of what is shown around 0: with the zeros of an FIR filter outside the unit circle, as far as it stays to be seen.
+function frame(zeros) {
+  return Math.min(Math.max(1.1, ...zeros.map(([re, im]) => 1.1 * Math.max(Math.abs(re), Math.abs(im)))), 3);
+}
+
 // The unit circle, or its neighbourhood of z = 1 where the poles of a low cutoff would fall into one spot.
 function plane() {
   const { poles, zeros } = known.preview.plane, where = byId("plane"), width = Math.max(where.clientWidth, 240);
   const distance = Math.max(...poles.map(([re, im]) => Math.hypot(re - 1, im)), 1e-9);
-  const near = poles.length > 0 && distance < 0.3, centre = near ? 1 : 0, half = near ? 1.25 * distance : 1.1;
+  const near = poles.length > 0 && distance < 0.3, centre = near ? 1 : 0, half = near ? 1.25 * distance : frame(zeros);
   const height = 230, middle = [width / 2, height / 2], radius = (height / 2 - 6) / half;
   const spot = ([re, im]) => [middle[0] + radius * (re - centre), middle[1] - radius * im];
   const svg = drawn("svg", { viewBox: `0 0 ${width} ${height}`, width, height, role: "img", "aria-label": `${poles.length} poles and ${zeros.length} zeros in the z-plane` });
@@ -368,7 +373,8 @@ function plane() {
   where.replaceChildren(svg);
   const far = poles.length ? Math.max(...poles.map(([re, im]) => Math.hypot(re, im))) : 0;
   const radii = poles.length ? `radius up to ${far > 0.999 ? `1 − ${short(1 - far, 3)}` : short(far, 4)}` : "";
-  say("poles", near ? `${radii}, near z = 1` : radii);
+  const outside = near ? 0 : zeros.filter(([re, im]) => Math.max(Math.abs(re), Math.abs(im)) > half).length;
+  say("poles", near ? `${radii}, near z = 1` : [radii, outside ? `${counted(outside, "zero")} farther out` : ""].filter(Boolean).join(", "));
 }
 
 // ---- What the proof says

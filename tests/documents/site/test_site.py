@@ -106,3 +106,19 @@ def test_the_search_works_from_a_disk(site: Path, tmp_path: Path) -> None:
         tab.value(f"({typed})('xyzzyqq')")
         assert tab.value("document.getElementById('mkdocs-search-results').textContent") == "No results found"
         assert tab.said == []
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(BROWSER is None, reason="needs Chromium")
+@pytest.mark.parametrize(("width", "dark"), [(1280, False), (390, True)])
+def test_a_page_can_be_read_by_everyone(site: Path, tmp_path: Path, width: int, dark: bool) -> None:
+    """By the rules of axe-core, and without a page that is wider than the screen."""
+    pages = [path for path in sorted(site.rglob("*.html")) if path.name != "404.html"]  # its addresses need a server
+    found: list[str] = []
+    with browser(tmp_path / "profile") as tab:
+        for page in pages:
+            tab.show(page, width, dark=dark)
+            inside = tab.value("document.documentElement.scrollWidth <= innerWidth")
+            found += [f"{page.relative_to(site)}: {fault}" for fault in tab.faults() + ["too wide"] * (not inside)]
+    assert len(pages) > 40
+    assert found == []

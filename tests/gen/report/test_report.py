@@ -384,6 +384,17 @@ def test_poles_and_zeros_leave_out_the_origin() -> None:
     assert response.zeros(first_order).tolist() == pytest.approx([-1.0])
 
 
+@pytest.mark.parametrize(
+    ("taps", "frame"), [([1, 2, 1], (1.25, 0)), ([1, -2.5, 1], (2.2, 0)), ([1, -10.1, 1], (3.0, 1))]
+)
+def test_zeros_outside_of_the_unit_circle_are_drawn_or_counted(taps: list[float], frame: tuple[float, int]) -> None:
+    """An FIR filter with linear phase has one at 1/z for each at z."""
+    sos = np.array([[*taps, 1.0, 0.0, 0.0]])
+    facts = response.FilterFacts(sample_rate=1.0, ideal_sos=sos, quantized_sos=sos)
+    assert plots.plane_frame(facts) == pytest.approx(frame)
+    assert (", 1 zero farther out" in plots.pole_zero_figure(facts)) == bool(frame[1])
+
+
 def test_poles_and_zeros_are_roots_the_larger_of_two_real_ones_first() -> None:
     sos = np.array([[2.0, -3.0, 1.0, 1.0, 0.75, 0.125], [4.0, 4.0, 2.0, 1.0, -1.0, 0.5]])
     assert response.zeros(sos).tolist() == [1.0, 0.5, -0.5 + 0.5j, -0.5 - 0.5j]

@@ -11,6 +11,7 @@ import scipy.io
 from tests.gen.specification.bad_specifications import BASE, FILTER, with_fault
 
 import sosmith
+from sosmith.gen.filter.design import design
 from sosmith.gen.specification.specification import load
 from sosmith.model.errors import SpecificationError
 from sosmith.verify.graph import RejectedError
@@ -38,6 +39,11 @@ HALFBAND = 'family = "halfband"\nkind = "lowpass"\n'
         ),
         (
             'family = "equiripple"\nkind = "lowpass"\norder = 3\ncutoff = 10.0',
+            "filter must be given by passband_edge, stopband_edge, passband_loss and stopband_loss for equiripple, not "
+            "by order and cutoff",
+        ),
+        (
+            'family = "equiripple"\nkind = "lowpass"\norder = 63\ncutoff = 10.0',
             "filter must be given by passband_edge, stopband_edge, passband_loss and stopband_loss for equiripple, not "
             "by order and cutoff",
         ),
@@ -118,3 +124,11 @@ def test_files_without_taps_are_refused(tmp_path: Path) -> None:
         RejectedError, match=r"^filter\.taps_file must have one row or one column of numbers to be compared"
     ):
         taps_in(path)
+
+
+@pytest.mark.parametrize(("taps", "words"), [([0.5], "1 tap"), ([1.0, 0.0, 0.0, 1.0], "4 taps")])
+def test_given_taps_are_not_called_after_a_pass_band(tmp_path: Path, taps: list[float], words: str) -> None:
+    """A pure gain and a comb have none."""
+    spec = tmp_path / "given.toml"
+    spec.write_text(sosmith.Specification.from_taps(taps, sample_rate=48000.0).toml())
+    assert design(load(spec).filter, 48000.0).describe == f"FIR of {words} given at 48000 Hz"
