@@ -60,6 +60,13 @@ def small(realization: str = "df1", order: int = 3, *, steady: bool = False) -> 
     return certificate(quantized, quantized.datapath.output.lsb)
 
 
+def coarse(*, steady: bool = False) -> Certificate:
+    """Return the certificate of a filter whose output has more bits than its input: one code of that is many of it."""
+    inputs = Port.from_range("x", 6, Fraction(-1), Fraction(1), signed=True)
+    output = Port.from_range("y", 20, Fraction(-1), Fraction(1), signed=True)
+    return certificate(plain(butterworth(1, 0.2), "df1", inputs, output, steady=steady), output.lsb)
+
+
 def calibrated() -> Certificate:
     """Return the certificate of a calibration of two inputs before a low-pass filter, its output from -8 on."""
     inputs = (
