@@ -7,8 +7,9 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
-from tests.gen.word_lengths.filters import butterworth, plain
+from tests.gen.word_lengths.filters import butterworth, fir_spec, plain
 
+from sosmith.gen.filter.design import design
 from sosmith.gen.output.certificate import certificate
 from sosmith.gen.word_lengths.quantize import quantize
 from sosmith.model.polynomial import Polynomial
@@ -22,6 +23,9 @@ from sosmith.verify.rocq.kernel import THEORIES, compile_theories, ending, mark,
 needs_coqc = pytest.mark.skipif(shutil.which("coqc") is None, reason="there is no coqc on this machine")
 
 GRID = Fraction(1, 1 << 64)
+
+TAPS = ("0.05", "0.2", "0.37", "0.2", "0.05")
+"""Of a low-pass filter."""
 
 
 def _compile(folder: Path) -> None:
@@ -55,8 +59,9 @@ def checked(made: Certificate, folder: Path, claims: Sequence[Claim] | None = No
 
 
 def small(realization: str = "df1", order: int = 3, *, steady: bool = False) -> Certificate:
-    """Return the certificate of a low-pass filter that settles soon."""
-    quantized = plain(butterworth(order, 0.2), realization, steady=steady)
+    """Return the certificate of a low-pass filter that settles soon; of a short FIR filter if that is so realized."""
+    ideal = design(fir_spec(TAPS), 1.0) if realization.startswith("fir") else butterworth(order, 0.2)
+    quantized = plain(ideal, realization, steady=steady)
     return certificate(quantized, quantized.datapath.output.lsb)
 
 
