@@ -45,7 +45,7 @@ PART = re.compile("(?<=<!-- rocq -->\n).*(?=<!-- end of rocq -->)", re.DOTALL)
 EDITS, DESIGNS = 500, 20
 _ORDERS = (1, 2, 3)
 """Those of the filters whose certificates are edited, one after another."""
-_MAX_ORDER, _LOWEST = 4, -2.0
+_MAX_ORDER, _LOWEST = 4, -1.3
 _END = "end_of_answer"
 _ROWS = {
     "edits": {
@@ -99,7 +99,7 @@ class Kernel:
         assert stdout is not None
         stdin.write(f"{text}Print {_END}.\n")
         stdin.flush()
-        lines = []
+        lines: list[str] = []
         for line in stdout:
             if line.startswith(f"{_END} = "):
                 return lines
@@ -215,7 +215,7 @@ def design_counts(kernel: Kernel, count: int) -> tuple[dict[str, Any], list[str]
 
 
 def _recorded() -> dict[str, dict[str, Any]]:
-    return json.loads(RECORD.read_text(encoding="utf-8")) if RECORD.exists() else {}  # type: ignore[no-any-return]
+    return json.loads(RECORD.read_text(encoding="utf-8")) if RECORD.exists() else {}
 
 
 def main() -> None:

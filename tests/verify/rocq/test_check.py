@@ -142,6 +142,20 @@ def test_what_is_wrong_is_refused(edit: Callable[[Any], None], name: str, tmp_pa
         checked(Certificate.model_validate(tree), tmp_path)
 
 
+@needs_coqc
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("edit", "name"), [(less_rounding, "error_in_parts"), (other_scale, "calibrated_input|error_in_parts")]
+)
+def test_what_is_wrong_behind_an_input_of_few_bits_is_refused(
+    edit: Callable[[Any], None], name: str, tmp_path: Path
+) -> None:
+    tree = json.loads(certificate_text(coarse(steady=True)))
+    edit(tree)
+    with pytest.raises(RejectedError, match=f"^Rocq must accept (?:{name}) \\("):
+        checked(Certificate.model_validate(tree), tmp_path)
+
+
 def test_a_start_that_holds_something_else_has_no_theorem() -> None:
     tree = json.loads(certificate_text(small(steady=True)))
     other_start(tree)
