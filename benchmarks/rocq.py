@@ -232,7 +232,8 @@ def main() -> None:
             wrong += found
     for line in wrong:
         print(line)
-    record = made | {key: value for key, value in _recorded().items() if key not in made}
+    both = _recorded() | made
+    record = {part: both[part] for part in _ROWS if part in both}
     print(table(record), end="")
     RECORD.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
     text = DOCUMENT.read_text(encoding="utf-8")
