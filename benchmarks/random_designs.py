@@ -40,15 +40,15 @@ _LOSSES = {
 }
 
 
-def random_specification(seed: int) -> tuple[str, str]:
-    """Return the name of a specification and its TOML."""
+def random_specification(seed: int, *, max_order: int = 8, lowest: float = -3.0) -> tuple[str, str]:
+    """Return the name of a specification and its TOML; edges from 10 to the power of `lowest` times the sample rate."""
     rng = random.Random(seed)
     family, kind = rng.choice(FAMILIES), rng.choice(KINDS)
     band = kind in {"bandpass", "bandstop"}
-    low = 10 ** rng.uniform(-3, -0.8 if band else -0.35)
+    low = 10 ** rng.uniform(lowest, -0.8 if band else -0.35)
     edges = [low, low * rng.uniform(1.3, 2.8)] if band else [low]
     cutoff = ", ".join(f"{edge:.6f}" for edge in edges)
-    order, bits_in, bits_out = rng.randint(1, 8), rng.randint(4, 24), rng.randint(4, 24)
+    order, bits_in, bits_out = rng.randint(1, max_order), rng.randint(4, 24), rng.randint(4, 24)
     text = specification(
         kind, order, cutoff, family=family, bits_in=bits_in, bits_out=bits_out, losses=_LOSSES.get(family, "")
     )

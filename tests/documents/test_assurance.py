@@ -3,9 +3,12 @@
 import json
 import re
 
-from benchmarks import edge, upsets
+from benchmarks import edge, rocq, upsets
 from benchmarks.mutation.record import RECORD as MUTATION
 from benchmarks.mutation.record import markdown
+
+from sosmith.gen.realizations.registry import REALIZATIONS
+from sosmith.gen.specification.choices import FAMILIES, KINDS
 
 RECORD = json.loads(upsets.RECORD.read_text(encoding="utf-8"))
 
@@ -61,3 +64,13 @@ def test_nothing_was_found_at_the_edge_by_as_many_as_are_asked_for() -> None:
         assert counts[what] >= 10_000
     assert counts["kills in all"] >= 1000
     assert counts[f"environments, of {len(edge.COMMANDS)} calls of commands"] >= 200
+
+
+def test_what_rocq_refused_and_accepted_is_that_of_the_record() -> None:
+    record = json.loads(rocq.RECORD.read_text(encoding="utf-8"))
+    assert rocq.PART.findall(rocq.DOCUMENT.read_text(encoding="utf-8")) == [rocq.table(record)]
+    edits, designs = record["edits"], record["designs"]
+    assert edits["refused"] + edits["no theorem"] == edits["tried"] >= rocq.EDITS
+    assert designs["accepted"] == designs["tried"] == len(designs["names"]) >= rocq.DESIGNS
+    words = {word for name in designs["names"] for word in name.replace(",", "").split()}
+    assert words >= {*REALIZATIONS, *FAMILIES, *KINDS}

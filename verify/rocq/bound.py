@@ -114,7 +114,8 @@ Proof.
   cbv zeta. repeat (rewrite plus_IZR || rewrite mult_IZR). field.
 Qed.
 Theorem calibrated_input : forall x, inputs_within ports x -> forall m,
-  (Rabs (calibrated (x m) - IZR (code core x {task.taken} m) / IZR (2 ^ frac_of core {task.taken})%Z)
+  (Rabs (calibrated (x m) - IZR (code core x {task.taken} m)
+    * IZR (units_of (frac_of core {task.taken})) / IZR (steps_of (frac_of core {task.taken})))
     <= IZR {error.numerator} / IZR {error.denominator})%R /\\ (Rabs (calibrated (x m)) <= IZR {calibration.most})%R.
 Proof.
   intros x X m. rewrite calibrated_in_codes. apply (calibrated_within core ports x core_is_ordered X).
@@ -278,19 +279,20 @@ def _fits(task: _Task, calibration: Calibration, rows: Rows, exact: ExactRow, mo
     graph, windows = task.cascade.graph, windows_of(task.cascade, task.start)
     taken, last = graph.node(task.taken), graph.node(task.last)
     entry = task.cascade.sections[0].wires[0]
-    f, point, whole = taken.frac, last.frac, rows.whole << more
-    others = {place: over * (1 << f + more) for place, over in rows.row.items()}
-    entering = {entry: others.pop(entry, fmpz_poly()) - exact.row * (1 << point)}
+    f, units, point, whole = max(taken.frac, 0), max(-taken.frac, 0), max(last.frac, 0), rows.whole << more
+    up = f + more + point - last.frac
+    others = {place: over * (1 << up) for place, over in rows.row.items()}
+    entering = {entry: others.pop(entry, fmpz_poly()) - exact.row * (1 << point + units)}
     size = sum(abs(int(value)) for value in exact.row.coeffs())
     error = calibration.error
     at_rest = Fraction(0)
     if task.start is not None:
         gain = _gain(task) if task.held is not None else Fraction(0)
-        at_rest = abs(whole * gain - sum(int(value) for value in exact.row.coeffs())) * (1 << point)
+        at_rest = abs(whole * gain - sum(int(value) for value in exact.row.coeffs())) * (1 << point + units)
     values: list[Fraction | int] = [
         -(-size * error.numerator // error.denominator) << point + f,
         _either(windows, entering) + ((exact.rest // _FINE + 1) << point + f),
-        _either(windows, others) + (rows.rest << f + more),
+        _either(windows, others) + (rows.rest << up),
         at_rest * max(abs(taken.low), abs(taken.high)),
     ]
     unit = whole << point + f

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from flint import fmpz_poly
 
 from sosmith.verify.certificate_file import Operation, StageEntry
-from sosmith.verify.graph import inputs_of
+from sosmith.verify.graph import RejectedError, inputs_of
 from sosmith.verify.rocq.flat import FlatGraph
 from sosmith.verify.rocq.linear import LinearStage, Source
 from sosmith.verify.rocq.polynomials import common_denominator, integers, number, numbers, rows
@@ -93,11 +93,17 @@ Definition forms := Eval vm_compute in fill core sources written [] (firstn {sel
 """
 
     def rows(self, section: int, node: int, bits: int) -> Rows:
-        """Follow `rows_of`: the response of a node of a section, its first sample being ``2**bits``."""
+        """Follow `rows_of`: the response of a node of a section, its first sample being ``2**bits``.
+
+        Raises
+        ------
+        RejectedError
+            If a node on the way is not one that its section computes.
+        """
         at = self.sections[section]
         exponent, tail = split(at.under)
         first = impulse(exponent, tail, 1 << bits)
-        row = _times(at.forms[node], first.values)
+        row = _times(self._form(section, node), first.values)
         rest = first.rest * self._size(node)
         steps = []
         for index in range(section, 0, -1):
@@ -109,11 +115,17 @@ Definition forms := Eval vm_compute in fill core sources written [] (firstn {sel
                 wire = self.sources[place][1]
                 moved = divide(exponent, tail, [int(value) for value in row.pop(place).coeffs()])
                 steps.append(f"({place}%nat, {moved.samples}%N)")
-                for key, value in _times(before.forms[self.graph.fed_by(wire)], moved.values).items():
+                for key, value in _times(self._form(index - 1, self.graph.fed_by(wire)), moved.values).items():
                     row[key] = row.get(key, fmpz_poly()) + value
                 rest += moved.rest * self._size(wire)
         plan = f"Plan {first.samples} (2 ^ {bits}) [{'; '.join(steps)}]"
         return Rows(row, rest, 1 << bits + split(at.under)[0], plan)
+
+    def _form(self, section: int, node: int) -> Row:
+        forms = self.sections[section].forms
+        if node not in forms:
+            raise RejectedError(f"section {section} must compute its output, not pass node {node} on")
+        return forms[node]
 
     def _size(self, node: int) -> int:
         entry = self.graph.node(node)

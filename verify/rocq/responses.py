@@ -13,6 +13,9 @@ from sosmith.verify.graph import RejectedError
 _SAMPLES = 1 << 18
 """Most samples of a response."""
 
+_GROWTH = 256
+"""Bits by which a response may become larger than what it responds to."""
+
 _STRIDE = 16
 """Samples between two looks at whether a response has died away."""
 
@@ -76,8 +79,11 @@ def _respond(bits: int, tail: Sequence[int], past: Sequence[int], over: Sequence
     order, size = len(tail), sum(map(abs, tail))
     made = list(past)
     skip, least = len(made), len(over) if order or not past else 0
+    most = 1 << _GROWTH + max(value.bit_length() for value in (*past, *over, 1))
     while True:
         count = len(made) - skip
+        if count % _STRIDE == 0 and made and abs(made[-1]) > most:
+            raise RejectedError(f"a response must not become larger than 2**{_GROWTH} times what it responds to")
         if count >= least and (count % _STRIDE == 0 or not order):
             largest = max(map(abs, made[-order:]), default=0) if order else 0
             if largest * size <= count << bits or not order:

@@ -1,5 +1,6 @@
 """Filters and formats that tests of word lengths start from."""
 
+from collections.abc import Sequence
 from fractions import Fraction
 
 import numpy as np
@@ -34,6 +35,13 @@ def butterworth(order: int, cutoff: float, kind: str = "lowpass") -> Filter:
         ),
         1.0,
     )
+
+
+def fir_spec(taps: Sequence[str]) -> FilterSpec:
+    nothing = dict.fromkeys(
+        ("order", "cutoff", "passband_edge", "stopband_edge", "passband_loss", "stopband_loss", "sos")
+    )
+    return FilterSpec(family="fir", kind="fir", method="fir", taps=tuple(map(Fraction, taps)), **nothing)  # type: ignore[arg-type]
 
 
 def plain(

@@ -3,12 +3,12 @@
 from fractions import Fraction
 
 import pytest
+from tests.gen.word_lengths.filters import fir_spec
 
 import sosmith
 from sosmith.gen.core import design_core
 from sosmith.gen.filter.design import design
 from sosmith.gen.realizations.registry import FIR
-from sosmith.gen.specification.specification import FilterSpec
 from sosmith.gen.word_lengths.fir import fir_stages
 from sosmith.model.dataflow.adder_graph import signed_digits
 from sosmith.model.dataflow.graph import Range
@@ -18,16 +18,9 @@ TAPS = ["0.0123", "-0.0456", "0.1789", "0.31", "0.1789", "-0.0456", "0.0123"]
 X = Range(0, -1000, 999)
 
 
-def filter_of(taps: list[str]) -> FilterSpec:
-    nothing = dict.fromkeys(
-        ("order", "cutoff", "passband_edge", "stopband_edge", "passband_loss", "stopband_loss", "sos")
-    )
-    return FilterSpec(family="fir", kind="fir", method="fir", taps=tuple(map(Fraction, taps)), **nothing)  # type: ignore[arg-type]
-
-
 @pytest.mark.parametrize("allowed", [Fraction(1, 4), Fraction(3), Fraction(30)])
 def test_one_bit_less_would_exceed_the_error(allowed: Fraction) -> None:
-    ideal = design(filter_of(TAPS), 1000.0)
+    ideal = design(fir_spec(TAPS), 1000.0)
     (section,), proof = fir_stages(ideal, "fir_symmetric", X, allowed)
     assert proof.coefficients.magnitude <= allowed
     assert proof.rounding.magnitude == 0
@@ -37,7 +30,7 @@ def test_one_bit_less_would_exceed_the_error(allowed: Fraction) -> None:
 
 
 def test_the_bound_is_that_of_a_sum_of_magnitudes() -> None:
-    ideal = design(filter_of(TAPS), 1000.0)
+    ideal = design(fir_spec(TAPS), 1000.0)
     for name in FIR:
         (section,), proof = fir_stages(ideal, name, X, Fraction(2))
         made = {k: Fraction(integer) / 2**frac for k, (integer, frac) in section.coefficients.items()}
@@ -48,7 +41,7 @@ def test_the_bound_is_that_of_a_sum_of_magnitudes() -> None:
 
 
 def test_digits_are_saved_within_the_error() -> None:
-    ideal = design(filter_of(TAPS), 1000.0)
+    ideal = design(fir_spec(TAPS), 1000.0)
     allowed = Fraction(2)
     (plain,), _ = fir_stages(ideal, "fir_transposed", X, allowed)
     (few,), proof = fir_stages(ideal, "fir_transposed", X, allowed, few_digits=True)
@@ -58,7 +51,7 @@ def test_digits_are_saved_within_the_error() -> None:
 
 
 def test_too_small_an_error_is_refused() -> None:
-    ideal = design(filter_of(["0.1", "0.3"]), 1000.0)
+    ideal = design(fir_spec(["0.1", "0.3"]), 1000.0)
     with pytest.raises(
         ShortfallError,
         match=r"^the filter's coefficients must keep their error below 1e-20 output LSB with 40 bits, and do not: "

@@ -1,19 +1,20 @@
 """Small certificates for Rocq, and the mark of tests that need it."""
 
 import shutil
+import subprocess
 from collections.abc import Sequence
 from fractions import Fraction
-from functools import cache
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import pytest
-from tests.gen.word_lengths.filters import butterworth, plain
+from tests.gen.word_lengths.filters import butterworth, fir_spec, plain
 
+from sosmith.gen.filter.design import design
 from sosmith.gen.output.certificate import certificate
 from sosmith.gen.word_lengths.quantize import quantize
 from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
+from sosmith.sim.build_cache import BuildCache, cache_folder, key_of
 from sosmith.verify.certificate_file import Certificate
 from sosmith.verify.rocq.check import DATA, head, theorems
 from sosmith.verify.rocq.claims import Claim
@@ -23,21 +24,27 @@ needs_coqc = pytest.mark.skipif(shutil.which("coqc") is None, reason="there is n
 
 GRID = Fraction(1, 1 << 64)
 
+TAPS = ("0.05", "0.2", "0.37", "0.2", "0.05")
+"""Of a low-pass filter."""
 
-@cache
-def _compiled() -> TemporaryDirectory[str]:
-    """All theories, compiled once in a process."""
-    folder = TemporaryDirectory()
+
+def _compile(folder: Path) -> None:
+    """Compile all theories in an empty folder."""
     for name, text in theory_texts().items():
-        (Path(folder.name) / name).write_text(text, encoding="utf-8")
-    compile_theories(Path(folder.name))
-    return folder
+        (folder / name).write_text(text, encoding="utf-8")
+    compile_theories(folder)
 
 
 def library(folder: Path) -> None:
-    """Put the compiled theories into a folder."""
-    for name in THEORIES:
-        shutil.copy(Path(_compiled().name) / f"{name}.vo", folder)
+    """Put the compiled theories into a folder; they are kept between runs, for the same texts and the same Rocq."""
+    version = subprocess.run(["coqc", "--print-version"], capture_output=True, text=True, check=True).stdout
+    place = cache_folder()
+    if place is None:
+        _compile(folder)
+        return
+    with BuildCache(place).entry("theories", key_of(version, theory_texts()), _compile) as made:
+        for name in THEORIES:
+            shutil.copy(made / f"{name}.vo", folder)
 
 
 def checked(made: Certificate, folder: Path, claims: Sequence[Claim] | None = None) -> set[str]:
@@ -52,9 +59,17 @@ def checked(made: Certificate, folder: Path, claims: Sequence[Claim] | None = No
 
 
 def small(realization: str = "df1", order: int = 3, *, steady: bool = False) -> Certificate:
-    """Return the certificate of a low-pass filter that settles soon."""
-    quantized = plain(butterworth(order, 0.2), realization, steady=steady)
+    """Return the certificate of a low-pass filter that settles soon; of a short FIR filter if that is so realized."""
+    ideal = design(fir_spec(TAPS), 1.0) if realization.startswith("fir") else butterworth(order, 0.2)
+    quantized = plain(ideal, realization, steady=steady)
     return certificate(quantized, quantized.datapath.output.lsb)
+
+
+def coarse(*, steady: bool = False) -> Certificate:
+    """Return the certificate of a filter whose output has more bits than its input: one code of that is many of it."""
+    inputs = Port.from_range("x", 6, Fraction(-1), Fraction(1), signed=True)
+    output = Port.from_range("y", 20, Fraction(-1), Fraction(1), signed=True)
+    return certificate(plain(butterworth(1, 0.2), "df1", inputs, output, steady=steady), output.lsb)
 
 
 def calibrated() -> Certificate:

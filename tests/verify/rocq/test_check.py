@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.gen.word_lengths.filters import butterworth, plain
-from tests.verify.rocq.small import GRID, calibrated, checked, library, needs_coqc, small
+from tests.verify.rocq.small import GRID, calibrated, checked, coarse, library, needs_coqc, small
 
 from sosmith.gen.output.certificate import certificate
 from sosmith.gen.realizations.registry import REALIZATIONS
@@ -35,6 +35,13 @@ def test_every_code_and_the_error_bound(realization: str, steady: bool, tmp_path
     made = small(realization, steady=steady)
     assert checked(made, tmp_path) <= STANDARD
     assert theorems(made).unchecked == ()
+
+
+@needs_coqc
+@pytest.mark.slow
+@pytest.mark.parametrize("steady", [False, True])
+def test_an_input_with_fewer_bits_than_the_output(steady: bool, tmp_path: Path) -> None:
+    assert checked(coarse(steady=steady), tmp_path) <= STANDARD
 
 
 @needs_coqc
@@ -130,6 +137,20 @@ def other_filter(tree: Any) -> None:
 )
 def test_what_is_wrong_is_refused(edit: Callable[[Any], None], name: str, tmp_path: Path) -> None:
     tree = json.loads(certificate_text(small(steady=True)))
+    edit(tree)
+    with pytest.raises(RejectedError, match=f"^Rocq must accept (?:{name}) \\("):
+        checked(Certificate.model_validate(tree), tmp_path)
+
+
+@needs_coqc
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("edit", "name"), [(less_rounding, "error_in_parts"), (other_scale, "calibrated_input|error_in_parts")]
+)
+def test_what_is_wrong_behind_an_input_of_few_bits_is_refused(
+    edit: Callable[[Any], None], name: str, tmp_path: Path
+) -> None:
+    tree = json.loads(certificate_text(coarse(steady=True)))
     edit(tree)
     with pytest.raises(RejectedError, match=f"^Rocq must accept (?:{name}) \\("):
         checked(Certificate.model_validate(tree), tmp_path)

@@ -1,19 +1,21 @@
 """What is written for Rocq, without Rocq: responses, limits and plans that its theories follow."""
 
+import json
 import random
 from fractions import Fraction
 
 import numpy as np
 import pytest
 from flint import fmpz_poly
-from tests.verify.rocq.small import calibrated, small
+from tests.verify.rocq.small import calibrated, coarse, small
 
 from sosmith.gen.realizations.registry import REALIZATIONS
-from sosmith.verify.certificate_file import Certificate
+from sosmith.verify.certificate_file import Certificate, certificate_text
 from sosmith.verify.graph import RejectedError
 from sosmith.verify.rocq.bound import bound_claims
 from sosmith.verify.rocq.calibration import calibration_of
 from sosmith.verify.rocq.cascade import Cascade, cascade_of
+from sosmith.verify.rocq.check import theorems
 from sosmith.verify.rocq.exact import exact_row, sections_of
 from sosmith.verify.rocq.flat import flattened
 from sosmith.verify.rocq.ranges import negative, windows_of
@@ -41,6 +43,13 @@ def test_a_response_that_does_not_die_away_is_refused() -> None:
         impulse(4, [-16], 1 << 20)
 
 
+def test_a_response_that_grows_is_refused_before_it_is_long() -> None:
+    with pytest.raises(
+        RejectedError, match=r"^a response must not become larger than 2\*\*256 times what it responds to$"
+    ):
+        impulse(4, [-32], 1 << 20)
+
+
 def test_a_denominator_that_begins_with_another_number_is_refused() -> None:
     with pytest.raises(RejectedError, match=r"^a denominator must begin with a power of two, not 3$"):
         split([3, 1])
@@ -50,6 +59,31 @@ def last_rows(made: Certificate) -> tuple[Cascade, int]:
     """Return the cascade of a certificate and the node that its last stage takes."""
     graph = flattened(made)
     return cascade_of(graph), graph.feeds[-1][0]
+
+
+def test_a_section_that_passes_its_input_on_is_refused() -> None:
+    tree = json.loads(certificate_text(small(steady=True)))
+    section = next(stage for stage in tree["stages"] if stage["role"] == "section")
+    beside = [at for at, node in enumerate(section["nodes"]) if node["op"] == "input"][-1]
+    section["outputs"][0] = beside
+    with pytest.raises(RejectedError, match=r"^section 0 must compute its output, not pass node \d+ on$"):
+        theorems(Certificate.model_validate(tree))
+
+
+def test_a_floor_to_more_bits_is_refused() -> None:
+    tree = json.loads(certificate_text(small()))
+    section = next(stage for stage in tree["stages"] if stage["role"] == "section")
+    at, floor = next((at, node) for at, node in enumerate(section["nodes"]) if node["op"] == "floor")
+    floor["frac"] = section["nodes"][floor["operands"][0]]["frac"] + 3
+    with pytest.raises(RejectedError, match=f"^node {at} of {section['name']} must drop 0 bits or more, not -3$"):
+        theorems(Certificate.model_validate(tree))
+
+
+@pytest.mark.parametrize("steady", [False, True])
+def test_an_input_of_few_bits_before_an_output_of_many_has_all_theorems(steady: bool) -> None:
+    made = coarse(steady=steady)
+    assert made.stages[0].nodes[0].frac < 0
+    assert theorems(made).unchecked == ()
 
 
 @pytest.mark.sweep(3)

@@ -124,7 +124,7 @@ Qed.
 
 Definition either (g : graph) (S : list source) (W : windows) (row : list (list Z)) : Z :=
   Z.max (most_of g S W row) (most_of g S W (scale_rows (-1) row)).
-(* The parts as numbers, in units of 1 / (2^F 2^f K) but for the last one, which is in units of 1 / (2 2^F off_q). *)
+(* The parts as numbers, in units of 1 / (2^F steps_of f K) but for the last one, which is in units of 1 / (2 2^F off_q). *)
 Record values := Values { input_ : Z; coefficients_ : Z; roundings_ : Z; start_ : Z; output_ : Z; unit_ : Z; unit_out : Z }.
 Definition parts_of (g : graph) (S : list source) (forms : list (option form)) (k : nat) (W : windows) (d : parts_)
     (sections : list (list Z * list Z)) (lo hi off_p off_q : Z) : option values :=
@@ -138,21 +138,22 @@ Definition parts_of (g : graph) (S : list source) (forms : list (option form)) (
       | Some (alpha, beta, gamma), Some (E, Re) =>
         let F := frac_of g b in
         let f := frac_of g (taken d) in
-        let both := add_rows (scale_rows (2 ^ f * (2 ^ more d * alpha)) row) (place (entry d) (scale (- 2 ^ F) E)) in
+        let both := add_rows (scale_rows (steps_of f * (2 ^ more d * alpha)) row)
+          (place (entry d) (scale (- (2 ^ F * units_of f)) E)) in
         let entering := place (entry d) (nth (entry d) both []) in
         let others := without (entry d) both in
         let from_first := if steady d
-          then Z.abs (2 ^ f * K * match held_ d with Some _ => beta | None => 0 end - 2 ^ F * sum E) * size g (taken d) else 0 in
+          then Z.abs (steps_of f * K * match held_ d with Some _ => beta | None => 0 end - 2 ^ F * units_of f * sum E) * size g (taken d) else 0 in
         if Nat.ltb (out d) (length g) && Nat.ltb a (length g) && Nat.ltb (last_ d) k && Nat.ltb (taken d) (length g)
            && forallb (known_source g (length g)) (used S entering) && forallb (known_source g (length g)) (used S others)
-           && (frac_of g a =? 0) && (0 <=? F) && (0 <=? f) && (0 <? K) && (0 <? off_q) && (0 <? in_q d) && (0 <=? in_p d)
+           && (frac_of g a =? 0) && (0 <=? F) && (0 <? K) && (0 <? off_q) && (0 <? in_q d) && (0 <=? in_p d)
            && (0 <? fine d) && (0 <=? more d)
            && (steady d || match held_ d with None => true | Some _ => false end)
-        then Some (Values (2 ^ F * 2 ^ f * ((norm1 E * in_p d + in_q d - 1) / in_q d))
-               (either g S W entering + 2 ^ F * 2 ^ f * (Re / fine d + 1))
-               (either g S W others + 2 ^ f * (2 ^ more d * Z.abs alpha) * R) from_first
+        then Some (Values (2 ^ F * steps_of f * ((norm1 E * in_p d + in_q d - 1) / in_q d))
+               (either g S W entering + 2 ^ F * steps_of f * (Re / fine d + 1))
+               (either g S W others + steps_of f * (2 ^ more d * Z.abs alpha) * R) from_first
                (Z.abs (2 * off_q * gamma - 2 ^ F * off_q + 2 * 2 ^ F * off_p) + 2 ^ F * off_q)
-               (2 ^ F * 2 ^ f * K) (2 * (2 ^ F * off_q)))
+               (2 ^ F * steps_of f * K) (2 * (2 ^ F * off_q)))
         else None
       | _, _ => None
       end
@@ -178,7 +179,7 @@ Theorem error_parts g x S forms k W d sections lo hi off_p off_q bud (c : nat ->
   (forall n, nth (entry d) (map (drive g x) S) (fun _ => 0%R) n = (IZR (code g x (taken d) n) - IZR w0)%R) ->
   w0 = (if steady d then code g x (taken d) 0 else 0) -> c0 = (if steady d then c O else 0%R) ->
   match held_ d with Some j => forall n, code g x j n = w0 | None => True end ->
-  (forall n, (Rabs (c n - IZR (code g x (taken d) n) / IZR (2 ^ frac_of g (taken d))%Z) <= IZR (in_p d) / IZR (in_q d))%R
+  (forall n, (Rabs (c n - IZR (code g x (taken d) n) * IZR (units_of (frac_of g (taken d))) / IZR (steps_of (frac_of g (taken d)))) <= IZR (in_p d) / IZR (in_q d))%R
     /\ (Rabs (c n) <= IZR (least_ d))%R) ->
   forall y, exact_filter sections (after c0 c) y ->
   forall n, exists e, in_parts bud e
@@ -192,13 +193,13 @@ Proof.
   destruct (affine g (last_ d) (held_ d) 100 b) as [[[alpha beta] gamma]|] eqn:Eaf; [|discriminate].
   destruct (exact_row sections (exact d) (least_ d * fine d) K) as [[Ex Re]|] eqn:Eex; [|discriminate].
   set (F := frac_of g b) in *. set (f := frac_of g (taken d)) in *.
-  set (both := add_rows (scale_rows (2 ^ f * (2 ^ more d * alpha)) row) (place (entry d) (scale (- 2 ^ F) Ex))) in *.
+  set (both := add_rows (scale_rows (steps_of f * (2 ^ more d * alpha)) row) (place (entry d) (scale (- (2 ^ F * units_of f)) Ex))) in *.
   set (entering := place (entry d) (nth (entry d) both [])) in *. set (others := without (entry d) both) in *.
   set (beta' := match held_ d with Some _ => beta | None => 0 end) in *.
-  set (from_first := if steady d then Z.abs (2 ^ f * K * beta' - 2 ^ F * sum Ex) * size g (taken d) else 0) in *.
+  set (from_first := if steady d then Z.abs (steps_of f * K * beta' - 2 ^ F * units_of f * sum Ex) * size g (taken d) else 0) in *.
   set (cal := (norm1 Ex * in_p d + in_q d - 1) / in_q d) in *.
   set (re := Re / fine d + 1) in *.
-  set (unit := 2 ^ F * 2 ^ f * K) in *.
+  set (unit := 2 ^ F * steps_of f * K) in *.
   match type of H with match (if ?b then _ else _) with Some _ => _ | None => _ end = _ => destruct b eqn:Hc; [|discriminate] end.
   cbn [input_ coefficients_ roundings_ start_ output_ unit_ unit_out] in H.
   apply andb_prop in H. destruct H as [H _]. apply andb_prop in H. destruct H as [H P5]. apply andb_prop in H. destruct H as [H P4].
@@ -206,19 +207,19 @@ Proof.
   rename Hc into H.
   repeat match type of H with _ && _ = true => let X := fresh "X" in apply andb_prop in H; destruct H as [H X] end.
   rename X0 into More. rename X1 into Fine. apply Z.leb_le in More. apply Z.ltb_lt in Fine.
-  apply Nat.ltb_lt in H. apply Nat.ltb_lt in X13. apply Nat.ltb_lt in X12. apply Nat.ltb_lt in X11. apply Z.eqb_eq in X8.
-  apply Z.leb_le in X7. apply Z.leb_le in X6. apply Z.ltb_lt in X5. apply Z.ltb_lt in X4. apply Z.ltb_lt in X3. apply Z.leb_le in X2.
-  assert (Lb : (b < a)%nat) by (apply (operands_before g G a b X13); rewrite Ea; left; reflexivity).
+  apply Nat.ltb_lt in H. apply Nat.ltb_lt in X12. apply Nat.ltb_lt in X11. apply Nat.ltb_lt in X10. apply Z.eqb_eq in X7.
+  apply Z.leb_le in X6. apply Z.ltb_lt in X5. apply Z.ltb_lt in X4. apply Z.ltb_lt in X3. apply Z.leb_le in X2.
+  assert (Lb : (b < a)%nat) by (apply (operands_before g G a b X12); rewrite Ea; left; reflexivity).
   set (u := map (drive g x) S) in *.
   (* The parts, all of them real numbers. *)
-  destruct (rows_spec g x S forms k (length g) G C E Known (last_ d) (plan_ d) row R K1 n X12 Erow
+  destruct (rows_spec g x S forms k (length g) G C E Known (last_ d) (plan_ d) row R K1 n X11 Erow
     (fun m' _ => Known m' (last_ d) ltac:(pose proof (closed_length k g C); lia))) as [e1 [B1 H1]].
   fold u in H1. set (v := trace g x (last_ d) n) in *.
   set (mm := 2 ^ more d) in *. assert (M0 : 0 < mm) by (apply Z.pow_pos_nonneg; lia).
   assert (m0 : (0 < IZR mm)%R) by (apply IZR_lt; exact M0).
   assert (Kp : 0 < K) by assumption.
   set (wcode := fun j => IZR (code g x (taken d) j)) in *.
-  set (ff := IZR (2 ^ f)) in *. set (FF := IZR (2 ^ F)).
+  set (ff := IZR (steps_of f)) in *. set (uu := IZR (units_of f)) in *. set (FF := IZR (2 ^ F)).
   assert (ff0 : (0 < ff)%R) by (apply IZR_lt, Z.pow_pos_nonneg; lia). assert (FF0 : (0 < FF)%R) by (apply IZR_lt, Z.pow_pos_nonneg; lia).
   assert (K0 : (0 < IZR K)%R) by (apply IZR_lt; lia). assert (iq0 : (0 < IZR (in_q d))%R) by (apply IZR_lt; lia).
   assert (ip0 : (0 <= IZR (in_p d) / IZR (in_q d))%R)
@@ -227,10 +228,10 @@ Proof.
   { intros j. unfold after. destruct (j <? 0); [|apply Near]. rewrite C0. destruct (steady d); [apply Near|].
     rewrite Rabs_R0. apply Rle_trans with (Rabs (c O)); [apply Rabs_pos|apply Near]. }
   destruct (exact_row_fine sections (exact d) (least_ d) (fine d) K Ex Re (after c0 c) y Fine Eex Y Least (Z.of_nat n)) as [e2 [B2 H2]]. fold re in B2.
-  set (eps := fun j => (after c0 c j - after (IZR w0 / ff) (fun i => wcode i / ff) j)%R).
+  set (eps := fun j => (after c0 c j - after (IZR w0 * uu / ff) (fun i => wcode i * uu / ff) j)%R).
   assert (Beps : forall j, (Rabs (eps j) <= IZR (in_p d) / IZR (in_q d))%R).
   { intros j. unfold eps, after. destruct (j <? 0); [|apply Near]. rewrite C0, W0. destruct (steady d); [apply Near|].
-    replace (0 - 0 / ff)%R with 0%R by (field; lra). rewrite Rabs_R0. exact ip0. }
+    replace (0 - 0 * uu / ff)%R with 0%R by (field; lra). rewrite Rabs_R0. exact ip0. }
   set (e3 := taps Ex eps (Z.of_nat n)).
   assert (B3 : (Rabs e3 <= IZR cal)%R).
   { unfold e3. apply Rle_trans with (IZR (norm1 Ex) * (IZR (in_p d) / IZR (in_q d)))%R; [apply taps_bound; [exact ip0|intros; apply Beps]|].
@@ -239,18 +240,18 @@ Proof.
     rewrite <- mult_IZR. apply IZR_le. unfold cal.
     pose proof (Z.div_mod (norm1 Ex * in_p d + in_q d - 1) (in_q d) ltac:(lia)).
     pose proof (Z.mod_pos_bound (norm1 Ex * in_p d + in_q d - 1) (in_q d) X3). lia. }
-  assert (H3 : (taps Ex (after c0 c) (Z.of_nat n) = (conv Ex (fun j => wcode j - IZR w0) n + IZR (sum Ex) * IZR w0) / ff + e3)%R).
+  assert (H3 : (taps Ex (after c0 c) (Z.of_nat n) = (conv Ex (fun j => wcode j - IZR w0) n + IZR (sum Ex) * IZR w0) * uu / ff + e3)%R).
   { unfold e3.
-    rewrite (taps_ext Ex (after c0 c) (fun j => 1 * after (IZR w0 / ff) (fun i => wcode i / ff) j + eps j)%R)
+    rewrite (taps_ext Ex (after c0 c) (fun j => 1 * after (IZR w0 * uu / ff) (fun i => wcode i * uu / ff) j + eps j)%R)
       by (intros; unfold eps; ring).
-    rewrite (taps_plus Ex (fun j => 1 * after (IZR w0 / ff) (fun i => wcode i / ff) j)%R), taps_multiple, taps_after.
-    rewrite (conv_ext Ex _ (fun j => / ff * (wcode j - IZR w0))%R) by (intros; field; lra). rewrite conv_multiple. field. lra. }
+    rewrite (taps_plus Ex (fun j => 1 * after (IZR w0 * uu / ff) (fun i => wcode i * uu / ff) j)%R), taps_multiple, taps_after.
+    rewrite (conv_ext Ex _ (fun j => (uu / ff) * (wcode j - IZR w0))%R) by (intros; field; lra). rewrite conv_multiple. field. lra. }
   assert (Hb : (IZR (code g x b n) = IZR alpha * v + IZR beta' * IZR w0 + IZR gamma)%R).
   { rewrite (affine_spec g x (last_ d) (held_ d) n G 100 b alpha beta gamma ltac:(lia) Eaf), !plus_IZR, !mult_IZR.
     unfold v, trace, beta', code_if. destruct (held_ d) as [j|]; [rewrite Held; reflexivity|ring]. }
-  assert (Hboth : (total both u n = ff * (IZR mm * IZR alpha) * total row u n - FF * conv Ex (fun j => wcode j - IZR w0)%R n)%R).
-  { unfold both. rewrite total_add_rows, total_scale_rows, total_place, conv_scale, !mult_IZR, opp_IZR.
-    rewrite (conv_ext Ex (nth (entry d) u (fun _ => 0%R)) (fun j => wcode j - IZR w0)%R) by (intros; apply Entry). fold FF. fold ff. ring. }
+  assert (Hboth : (total both u n = ff * (IZR mm * IZR alpha) * total row u n - FF * uu * conv Ex (fun j => wcode j - IZR w0)%R n)%R).
+  { unfold both. rewrite total_add_rows, total_scale_rows, total_place, conv_scale, !mult_IZR, opp_IZR, ?mult_IZR.
+    rewrite (conv_ext Ex (nth (entry d) u (fun _ => 0%R)) (fun j => wcode j - IZR w0)%R) by (intros; apply Entry). fold FF. fold ff. fold uu. ring. }
   assert (Apart : total both u n = (total others u n + total entering u n)%R).
   { unfold others, entering. rewrite (total_without (entry d) both), total_place. ring. }
   assert (Either : forall l, forallb (known_source g (length g)) (used S l) = true -> (Rabs (total l u n) <= IZR (either g S W l))%R).
@@ -260,11 +261,11 @@ Proof.
     assert (M1 : (IZR (most_of g S W l) <= IZR (either g S W l))%R) by (apply IZR_le; unfold either; lia).
     assert (M2 : (IZR (most_of g S W (scale_rows (-1) l)) <= IZR (either g S W l))%R) by (apply IZR_le; unfold either; lia).
     apply Rabs_le. lra. }
-  set (e4 := ((ff * IZR K * IZR beta' - FF * IZR (sum Ex)) * IZR w0)%R).
+  set (e4 := ((ff * IZR K * IZR beta' - FF * uu * IZR (sum Ex)) * IZR w0)%R).
   assert (B4 : (Rabs e4 <= IZR from_first)%R).
   { unfold e4, from_first. rewrite W0. destruct (steady d) eqn:Es.
     - rewrite mult_IZR, Rabs_mult, abs_IZR, minus_IZR, !mult_IZR. apply Rmult_le_compat_l; [apply Rabs_pos|].
-      pose proof (size_spec g x (taken d) 0) as Sz. apply Sz, Known, X11.
+      pose proof (size_spec g x (taken d) 0) as Sz. apply Sz, Known, X10.
     - rewrite Rmult_0_r, Rabs_R0. lra. }
   set (s := (IZR (code g x b n) / FF)%R).
   assert (Main : (FF * ff * IZR K * (s - IZR gamma / FF - y (Z.of_nat n))
@@ -290,18 +291,18 @@ Proof.
   { apply (part_small eb _ unit _ unit0) with (2 := P2).
     replace (IZR unit * eb)%R with (total entering u n - FF * ff * e2)%R by (unfold eb; field; lra).
     rewrite plus_IZR, !mult_IZR. fold FF. fold ff. unfold Rminus. eapply Rle_trans; [apply Rabs_triang|]. rewrite Rabs_Ropp.
-    apply Rplus_le_compat; [apply Either; exact X10|]. rewrite Rabs_mult, (Rabs_pos_eq (FF * ff)) by lra. apply Rmult_le_compat_l; [lra|exact B2]. }
+    apply Rplus_le_compat; [apply Either; exact X9|]. rewrite Rabs_mult, (Rabs_pos_eq (FF * ff)) by lra. apply Rmult_le_compat_l; [lra|exact B2]. }
   assert (Br : (Rabs er <= real (of_roundings bud))%R).
   { apply (part_small er _ unit _ unit0) with (2 := P3).
     replace (IZR unit * er)%R with (total others u n + ff * (IZR mm * IZR alpha) * e1)%R by (unfold er; field; lra).
     rewrite plus_IZR, !mult_IZR, abs_IZR. fold ff. fold mm. eapply Rle_trans; [apply Rabs_triang|].
-    apply Rplus_le_compat; [apply Either; exact X9|]. rewrite !Rabs_mult, (Rabs_pos_eq ff), (Rabs_pos_eq (IZR mm)) by lra.
+    apply Rplus_le_compat; [apply Either; exact X8|]. rewrite !Rabs_mult, (Rabs_pos_eq ff), (Rabs_pos_eq (IZR mm)) by lra.
     apply Rmult_le_compat_l; [|exact B1]. apply Rmult_le_pos; [lra|apply Rmult_le_pos; [lra|apply Rabs_pos]]. }
   assert (Bs : (Rabs es <= real (of_start bud))%R).
   { apply (part_small es _ unit _ unit0) with (2 := P4). replace (IZR unit * es)%R with e4 by (unfold es; field; lra). exact B4. }
   (* The last rounding. *)
   assert (Ca : code g x a n = code g x b n / 2 ^ F).
-  { rewrite (code_spec g x G a n X13). unfold compute. rewrite Ea. change (frac (nth a g blank)) with (frac_of g a). rewrite X8.
+  { rewrite (code_spec g x G a n X12). unfold compute. rewrite Ea. change (frac (nth a g blank)) with (frac_of g a). rewrite X7.
     fold F. rewrite Z.sub_0_r. reflexivity. }
   assert (Rounded : (Rabs (IZR (code g x a n) - (s - 1 / 2)) <= 1 / 2)%R).
   { rewrite Ca. unfold s, FF. apply floor_near. apply Z.pow_pos_nonneg; lia. }

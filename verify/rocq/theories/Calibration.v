@@ -202,44 +202,46 @@ Definition calibration_holds (w : nat) (Q : list (list Z)) (d p q M : Z) : bool 
   let A := largest_at 0 in let B := largest_at 1 in
   match nth w (enclosures [] (firstn (Datatypes.S w) g)) None with
   | Some e =>
-      let all := frac_of g w + up e in
-      let far := size2 (add_rows (scale_rows d (poly e)) (scale_rows (- 2 ^ all) Q)) A B in
-      Nat.ltb w (length g) && (0 <=? frac_of g w) && (0 <? d) && (0 <? q)
-      && ((d * radius e + far) * q <=? p * (d * 2 ^ all)) && (size2 Q A B <=? M * d)
+      let u := units_of (frac_of g w) in
+      let all := steps_of (frac_of g w) * 2 ^ up e in
+      let far := size2 (add_rows (scale_rows (d * u) (poly e)) (scale_rows (- all) Q)) A B in
+      Nat.ltb w (length g) && (0 <? d) && (0 <? q)
+      && ((d * u * radius e + far) * q <=? p * (d * all)) && (size2 Q A B <=? M * d)
   | None => false
   end.
 Theorem calibrated_within w Q d p q M : calibration_holds w Q d p q M = true -> forall m,
-  (Rabs (IZR (ev2 Q (at_input 0 m) (at_input 1 m)) / IZR d - IZR (code g x w m) / IZR (2 ^ frac_of g w)%Z) <= IZR p / IZR q)%R
+  (Rabs (IZR (ev2 Q (at_input 0 m) (at_input 1 m)) / IZR d 
+    - IZR (code g x w m) * IZR (units_of (frac_of g w)) / IZR (steps_of (frac_of g w))) <= IZR p / IZR q)%R
   /\ (Rabs (IZR (ev2 Q (at_input 0 m) (at_input 1 m)) / IZR d) <= IZR M)%R.
 Proof.
   unfold calibration_holds. destruct (nth w (enclosures [] (firstn (Datatypes.S w) g)) None) as [e|] eqn:Ee; [|discriminate].
   intros H m. apply andb_prop in H. destruct H as [H H6]. apply andb_prop in H. destruct H as [H H5].
-  apply andb_prop in H. destruct H as [H H4]. apply andb_prop in H. destruct H as [H H3]. apply andb_prop in H. destruct H as [H1 H2].
-  apply Nat.ltb_lt in H1. apply Z.leb_le in H2. apply Z.ltb_lt in H3. apply Z.ltb_lt in H4. apply Z.leb_le in H5. apply Z.leb_le in H6.
+  apply andb_prop in H. destruct H as [H H4]. apply andb_prop in H. destruct H as [H1 H3].
+  apply Nat.ltb_lt in H1. apply Z.ltb_lt in H3. apply Z.ltb_lt in H4. apply Z.leb_le in H5. apply Z.leb_le in H6.
   assert (K : all_enclosed (enclosures [] (firstn (Datatypes.S w) g))).
   { apply enclosures_spec.
     - rewrite firstn_length. cbn [length]. lia.
     - intros j Hj. cbn [length plus]. symmetry. apply nth_firstn. rewrite firstn_length in Hj. lia.
     - intros i e0 m0 Hi. destruct i; discriminate. }
-  destruct (K w e m Ee) as [U0 R0]. set (f := frac_of g w) in *.
-  pose proof (size2_spec (add_rows (scale_rows d (poly e)) (scale_rows (- 2 ^ (f + up e)) Q)) _ _ _ _ (at_input_spec 0 m) (at_input_spec 1 m)) as S1.
+  destruct (K w e m Ee) as [U0 R0]. set (s := steps_of (frac_of g w)) in *.
+  set (u := units_of (frac_of g w)) in *. pose proof (size2_spec (add_rows (scale_rows (d * u) (poly e)) (scale_rows (- (s * 2 ^ up e)) Q)) _ _ _ _ (at_input_spec 0 m) (at_input_spec 1 m)) as S1.
   pose proof (size2_spec Q _ _ _ _ (at_input_spec 0 m) (at_input_spec 1 m)) as S2.
   rewrite ev2_add, !ev2_scale in S1. set (far := size2 _ _ _) in S1, H5.
   set (P := ev2 (poly e) (at_input 0 m) (at_input 1 m)) in *. set (V := ev2 Q (at_input 0 m) (at_input 1 m)) in *.
-  set (c := code g x w m) in *. assert (D : 2 ^ (f + up e) = 2 ^ f * 2 ^ up e) by (apply Z.pow_add_r; assumption).
-  assert (F0 : 0 < 2 ^ f) by (apply Z.pow_pos_nonneg; lia). assert (E0 : 0 < 2 ^ up e) by (apply Z.pow_pos_nonneg; lia).
+  set (c := code g x w m) in *. assert (N0 : 0 < u) by (apply Z.pow_pos_nonneg; lia).
+  assert (F0 : 0 < s) by (apply Z.pow_pos_nonneg; lia). assert (E0 : 0 < 2 ^ up e) by (apply Z.pow_pos_nonneg; lia).
   assert (dpos : (0 < IZR d)%R) by (apply IZR_lt; lia). assert (qpos : (0 < IZR q)%R) by (apply IZR_lt; lia).
-  assert (fpos : (0 < IZR (2 ^ f))%R) by (apply IZR_lt; lia). assert (epos : (0 < IZR (2 ^ up e))%R) by (apply IZR_lt; lia).
+  assert (fpos : (0 < IZR s)%R) by (apply IZR_lt; lia). assert (epos : (0 < IZR (2 ^ up e))%R) by (apply IZR_lt; lia).
   split.
-  - assert (A : Z.abs (2 ^ f * 2 ^ up e * V - d * c * 2 ^ up e) <= d * radius e + far).
-    { rewrite D in S1. assert (R1 : Z.abs (d * (c * 2 ^ up e - P)) <= d * radius e)
-        by (rewrite Z.abs_mul, (Z.abs_eq d) by lia; apply Z.mul_le_mono_nonneg_l; lia).
-      replace (2 ^ f * 2 ^ up e * V - d * c * 2 ^ up e)
-        with (- (d * (c * 2 ^ up e - P)) - (d * P + - (2 ^ f * 2 ^ up e) * V)) by ring. lia. }
-    assert (B : Z.abs (2 ^ f * 2 ^ up e * V - d * c * 2 ^ up e) * q <= p * (d * (2 ^ f * 2 ^ up e))).
-    { rewrite <- D. apply Z.le_trans with (2 := H5). apply Z.mul_le_mono_nonneg_r; lia. }
+  - assert (A : Z.abs (s * 2 ^ up e * V - d * (c * u) * 2 ^ up e) <= d * u * radius e + far).
+    { assert (R1 : Z.abs (d * u * (c * 2 ^ up e - P)) <= d * u * radius e)
+        by (rewrite Z.abs_mul, (Z.abs_eq (d * u)) by nia; apply Z.mul_le_mono_nonneg_l; nia).
+      replace (s * 2 ^ up e * V - d * (c * u) * 2 ^ up e)
+        with (- (d * u * (c * 2 ^ up e - P)) - (d * u * P + - (s * 2 ^ up e) * V)) by ring. lia. }
+    assert (B : Z.abs (s * 2 ^ up e * V - d * (c * u) * 2 ^ up e) * q <= p * (d * (s * 2 ^ up e))).
+    { apply Z.le_trans with (2 := H5). apply Z.mul_le_mono_nonneg_r; lia. }
     apply IZR_le in B. rewrite !mult_IZR, abs_IZR, minus_IZR, !mult_IZR in B.
-    set (ff := IZR (2 ^ f)) in *. set (ee := IZR (2 ^ up e)) in *. set (dd := IZR d) in *. set (qq := IZR q) in *.
+    set (ff := IZR s) in *. set (ee := IZR (2 ^ up e)) in *. set (dd := IZR d) in *. set (qq := IZR q) in *.
     apply Rmult_le_reg_r with (qq * (dd * (ff * ee)))%R; [repeat apply Rmult_lt_0_compat; assumption|].
     replace (IZR p / qq * (qq * (dd * (ff * ee))))%R with (IZR p * (dd * (ff * ee)))%R by (field; lra).
     apply Rle_trans with (2 := B).

@@ -25,6 +25,9 @@ Record node := Node { op : operation; frac : Z; low : Z; high : Z }.
 Definition graph := list node.
 Definition blank := Node (Constant 0) 0 0 0.
 Definition frac_of (g : graph) (i : nat) := frac (nth i g blank).
+(* A code with f fraction bits, which may be fewer than none, is worth code * units_of f / steps_of f. *)
+Definition units_of (f : Z) : Z := 2 ^ Z.max 0 (- f).
+Definition steps_of (f : Z) : Z := 2 ^ Z.max 0 f.
 
 (* The code of a node, from the codes of the nodes before it at this sample, of all nodes at the last one, and of the
    inputs at this one. *)
