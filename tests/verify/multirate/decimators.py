@@ -175,11 +175,11 @@ SAME = re.compile(
     "|".join(
         (
             r"reg \w+_control[12] .*",  # nothing counts before it is loaded
-            r"reg (\S+ )?(o_rail|o_flags|left|gathered|step|slice\d+) .*",
-            r"if \(front_rst\) (o_rail|o_flags|o_data|step|slice\d+) <= .*",
+            r"reg (\S+ )?(o_rail|o_flags|o_dest\w*|left|gathered|step|slice\d+) .*",
+            r"if \(front_rst\) (o_rail|o_flags|o_data|o_dest\w*|step|slice\d+) <= .*",
             r"assign \w+ = difference\d - \d+'h0;",  # a rounding that rounds nothing
             r"assign \w+ = (phase|left|filled|channel) [-+] 1'h1;",  # in a counter of one bit
-            r"assign signature__addr20\[(\d:)?2\] = step;",  # bits that are not used
+            r"assign states_read_address\[(\d:)?2\] = step;",  # bits that are not used
         )
     )
 )

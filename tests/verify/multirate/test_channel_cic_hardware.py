@@ -100,7 +100,7 @@ BROKEN_AROUND = [
     ("samples before it is open", "self.s_axis_tvalid & ~closed.any()", "self.s_axis_tvalid"),
     ("samples that get lost", "self.s_axis_tready.eq(ready & ~closed.any())", "self.s_axis_tready.eq(ready)"),
     ("a gate that stays shut", "closed.eq(closed - closed.any())", "closed.eq(closed)"),
-    ("results with the channel of none", "self.m_axis_tdest.eq(result[user:])", "self.m_axis_tdest.eq(0)"),
+    ("results with the channel of none", "self.m_axis_tdest.eq(handed.dest)", "self.m_axis_tdest.eq(0)"),
     ("channels that get lost", "core.s_axis_tdest.eq(decimator.o_dest)", "core.s_axis_tdest.eq(0)"),
 ]
 
