@@ -109,7 +109,7 @@ def record(folder: Path) -> list[int]:
     """Read the codes that a monitor has recorded so far."""
     file = folder / "record.csv"
     rows = file.read_text().splitlines()[1:] if file.exists() else []
-    return [int(row.split(",")[4]) for row in rows if row.count(",") == 5]
+    return [int(row.split(",")[5]) for row in rows if row.count(",") == 7]
 
 
 def test_kinds_of_damage_that_do_not_exist(tmp_path: Path) -> None:
