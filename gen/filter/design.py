@@ -275,7 +275,7 @@ def _fir(spec: FilterSpec, taps: Sequence[Fraction], fs: Fraction) -> Filter:
 
 
 def _designed(spec: FilterSpec, fs: Fraction) -> tuple[Fraction, ...]:
-    from sosmith.gen.filter.fir_design import designed_taps, mask_of  # noqa: PLC0415 - seldom needed
+    from sosmith.gen.filter.fir_design import designed_taps, mask_of  # noqa: PLC0415 - slow to load
 
     # The specification has checked that these are given together.
     assert spec.passband_edge is not None

@@ -23,6 +23,7 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from scipy import signal
 
 from sosmith.gen.filter.fir_gains import keeps_to
 from sosmith.gen.specification.choices import MAX_TAPS
@@ -173,15 +174,11 @@ def _edges_and_gains(mask: FirMask) -> tuple[list[float], list[float], list[floa
 
 
 def _equiripple(length: int, mask: FirMask) -> Array:
-    from scipy import signal  # noqa: PLC0415 - slow to load
-
     edges, gains, weights = _edges_and_gains(mask)
     return np.asarray(signal.remez(length, edges, gains, weight=weights, fs=1.0), dtype=np.float64)
 
 
 def _least_squares(length: int, mask: FirMask) -> Array:
-    from scipy import signal  # noqa: PLC0415 - slow to load
-
     edges, gains, weights = _edges_and_gains(mask)
     both = [gain for gain in gains for _ in range(2)]
     squares = [weight**2 for weight in weights]
@@ -189,8 +186,6 @@ def _least_squares(length: int, mask: FirMask) -> Array:
 
 
 def _kaiser(length: int, mask: FirMask) -> Array:
-    from scipy import signal  # noqa: PLC0415 - slow to load
-
     edges, gains, _ = _edges_and_gains(mask)
     cutoffs = [(edges[k] + edges[k + 1]) / 2 for k in range(1, len(edges) - 1, 2)]
     beta = signal.kaiser_beta(-20 * math.log10(min(mask.ripples)))
@@ -199,8 +194,6 @@ def _kaiser(length: int, mask: FirMask) -> Array:
 
 
 def _halfband(length: int, mask: FirMask) -> Array:
-    from scipy import signal  # noqa: PLC0415 - slow to load
-
     ((_, edge),) = mask.passbands
     taps = np.zeros(length)
     taps[::2] = signal.remez((length + 1) // 2, [0, 2 * float(edge)], [1], fs=1.0) / 2
