@@ -59,8 +59,9 @@ def _head() -> list[str]:
     return [
         "# The day's own error",
         "",
-        "Made by `python -m benchmarks.days --document`; every figure is a result of that run, on the project's own",
-        "emulation. No seed of it was used while building. Accuracy is the paper's equation 7. +- is",
+        "Written by `python -m benchmarks.days` from benchmarks/days.json, whose parts were recorded one after the",
+        "other by its functions on the project's own emulation, some before the last changes of the fit. No seed of",
+        "the bench and of the service was used while building. Accuracy is the paper's equation 7. +- is",
         "the standard error",
         "of the mean.",
         "",
