@@ -141,13 +141,13 @@ def test_sentences() -> None:
         check_rejected(SMALL, changed, sentence)
 
     named(
-        r"assign write__data_28 = combing \? acc : total;",
-        "assign write__data_28 = combing ? total : acc;",
+        r"assign states_write_data = combing \? acc : total;",
+        "assign states_write_data = combing ? total : acc;",
         "decimator.states must be what a decimator has there after a clock with state of the decimator = 3, "
         "decimator.step = 0, decimator.channel = 0, start of the channel = 1, not another value",
     )
     named(
-        r"if \(write__en\)",
+        r"if \(control_write_enable\)",
         "if (writes)",
         "decimator.control must be what a decimator has there after a clock with state of the decimator = 0, "
         "decimator.channel = 0, not another value",
