@@ -14,10 +14,12 @@ from sosmith.gen.realizations.registry import REALIZATIONS, Section
 from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
 from sosmith.gen.reload.first_samples import Limits, first_samples
 from sosmith.gen.word_lengths.cascade import cascade, chosen_formats, parts_of, stages_of
-from sosmith.gen.word_lengths.input_stage import InputStage, horner_error, normalised, starting_like
+from sosmith.gen.word_lengths.input_stage import InputStage, normalised, starting_like
+from sosmith.gen.word_lengths.polynomial_error import horner_error, rounded
 from sosmith.gen.word_lengths.quantize import gain_at_zero, gain_of
 from sosmith.gen.word_lengths.quantized import Quantized, assembled
 from sosmith.gen.word_lengths.settling import with_settling
+from sosmith.model.dataflow.graph import Op
 from sosmith.model.errors import ShortfallError
 from sosmith.model.polynomial import Polynomial
 from sosmith.model.sections.horner import HornerPolynomial, HornerStep, Variable
@@ -125,13 +127,19 @@ def _input_stage(design: Quantized, polynomial: Polynomial | None) -> InputStage
         (*row, *[zero] * (most - len(row))) for row, most in zip([*exact, *[()] * len(room)], room, strict=False)
     )
     frac = stages[-1].graph.output_ranges[0].frac
+    variables = tuple(Variable(name=p.name, bits=p.bits, signed=p.signed) for p in datapath.inputs)
+    finer = _finest(stages) - frac
     horner = HornerPolynomial(
-        coefficients=tuple(tuple(round(c * 2**frac) for c in row) for row in filled),
-        frac=frac,
-        variables=tuple(Variable(name=p.name, bits=p.bits, signed=p.signed) for p in datapath.inputs),
+        coefficients=rounded(filled, frac, variables), frac=frac, variables=variables, finer=finer
     )
     (output,) = horner.stages[-1].graph.output_ranges
     return InputStage(stages=horner.stages, output=output, error=horner_error(filled, horner))
+
+
+def _finest(stages: Sequence[HornerStep]) -> int:
+    """Fraction bits of the row that has the most."""
+    named = (node for stage in stages for node in stage.graph.nodes if node.op is Op.FLOOR)
+    return max((node.frac for node in named), default=stages[-1].graph.output_ranges[0].frac)
 
 
 def _ranked(ideal: Filter, like: Filter, realization: str) -> Filter:
