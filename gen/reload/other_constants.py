@@ -10,7 +10,7 @@ from typing import cast
 from sosmith.gen.filter.design import Filter
 from sosmith.gen.proof.cascade_proof import quantized_response
 from sosmith.gen.proof.linear_model import linear_models
-from sosmith.gen.realizations.registry import REALIZATIONS, Section
+from sosmith.gen.realizations.registry import REALIZATIONS, Section, realization_of
 from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
 from sosmith.gen.reload.first_samples import Limits, first_samples
 from sosmith.gen.word_lengths.cascade import cascade, chosen_formats, parts_of, stages_of
@@ -18,6 +18,7 @@ from sosmith.gen.word_lengths.input_stage import InputStage, normalised, startin
 from sosmith.gen.word_lengths.polynomial_error import horner_error, rounded
 from sosmith.gen.word_lengths.quantize import gain_at_zero, gain_of
 from sosmith.gen.word_lengths.quantized import Quantized, assembled
+from sosmith.gen.word_lengths.search import Choice, Search
 from sosmith.gen.word_lengths.settling import with_settling
 from sosmith.model.dataflow.graph import Op
 from sosmith.model.errors import ShortfallError
@@ -65,8 +66,9 @@ def with_constants(
         if ideal is not None:
             filled = _ranked(ideal, cast("Filter", design.filter), design.realization)
         formats = _lifted(chosen_formats(design.sections), finer)
-        if ideal is not None:
+        if ideal is not None and filled != design.filter:
             formats = _with_coefficients_of(filled, formats, design.realization)
+            formats = _closer(filled, formats, design, before)
         formats = _lifted(formats, room - finer)
         if design.steady:
             before = starting_like(before, gain_at_zero(filled), design.first_sample)
@@ -161,6 +163,27 @@ def _lifted(formats: Sequence[SectionFormat], bits: int) -> list[SectionFormat]:
     return [
         replace(f, coefficients={name: (code << bits, frac + bits) for name, (code, frac) in f.coefficients.items()})
         for f in formats
+    ]
+
+
+def _closer(ideal: Filter, formats: list[SectionFormat], design: Quantized, before: InputStage) -> list[SectionFormat]:
+    """Return `formats` with coefficients of the same formats whose error is smaller, where the design was searched."""
+    if not realization_of(design.realization).cascade:
+        return formats
+    try:
+        search = Search(ideal.rows, design.realization, [before], gain_of(ideal), steady=design.steady)
+        closer = search.with_closer_coefficients(Choice(0, tuple(formats))).formats
+    except ShortfallError:
+        return formats
+    fracs = [{name: frac for name, (_, frac) in form.coefficients.items()} for form in formats]
+    return [
+        replace(
+            form,
+            coefficients={
+                name: (code << kept[name] - frac, kept[name]) for name, (code, frac) in form.coefficients.items()
+            },
+        )
+        for form, kept in zip(closer, fracs, strict=True)
     ]
 
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import combinations, zip_longest
@@ -211,7 +211,7 @@ class Search:
             ways.append(self._trimmed_once(start, allowed, calibration=False))
         ends = [self._trimmed_closer(way, allowed) for way in ways]
         smallest = min(ends, key=lambda choice: (self.size(choice), self.error(choice)))
-        return self._closer(smallest, self._objective.negligible)
+        return self._closer(smallest, more=self._objective.negligible)
 
     def _trimmed_closer(self, start: Choice, allowed: float) -> Choice:
         choice = self._trimmed_once(start, allowed)
@@ -241,13 +241,19 @@ class Search:
             _, choice, error, size = best
         return choice
 
-    def _closer(self, choice: Choice, more: float = 0.0) -> Choice:
+    def with_closer_coefficients(self, choice: Choice) -> Choice:
+        """Return the same formats with coefficients whose error is smaller, of no more bits."""
+        return self._closer(choice, self._moved)
+
+    def _closer(
+        self, choice: Choice, neighbours: Callable[[Choice], Iterator[Choice]] | None = None, more: float = 0.0
+    ) -> Choice:
         """Take what lowers the error and costs at most `more` in all, the best first, until nothing does."""
         size = self.size(choice) + more
         while True:
             self._base = self._based(choice.formats)
             least = (1 - _WORTH) * self.error(choice)
-            others = [*self._neighbours(choice)]
+            others = [*(neighbours or self._neighbours)(choice)]
             errors = [self.error(other) for other in others]
             better = (at for at in np.argsort(errors, kind="stable").tolist() if errors[at] < least)
             free = next((others[at] for at in better if self.size(others[at]) <= size), None)
@@ -256,12 +262,16 @@ class Search:
             choice = free
 
     def _neighbours(self, choice: Choice) -> Iterator[Choice]:
-        """Yield formats with a finer quantizer, or with one coefficient or two next to what they were."""
+        """Yield formats with a finer input stage or quantizer, or other coefficients."""
         if choice.input_stage:
             yield replace(choice, input_stage=choice.input_stage - 1)
         for k, form in enumerate(choice.formats):
             for name, frac in form.fracs.items():
                 yield choice.with_format(k, form.with_frac(name, frac + 1))
+        yield from self._moved(choice)
+
+    def _moved(self, choice: Choice) -> Iterator[Choice]:
+        """Yield formats with one coefficient, or two if there are few, next to what they were."""
         places = [(k, name) for k, form in enumerate(choice.formats) for name in form.coefficients]
         moves = [((place, by),) for place in places for by in (-1, 1)]
         if len(places) <= _FEW:
