@@ -1,7 +1,9 @@
 """Follows a certificate's polynomial and output stages symbolically.
 
-These stages have no memory: every value is an exact polynomial in the inputs plus a bounded error. The inputs are
-scaled to variables of magnitude at most one, so the sum of the coefficients' absolute values bounds a polynomial.
+These stages have no memory: every value is an exact polynomial in the inputs plus a bounded error. Each input is
+written about the middle of its range, as ``c + r w`` with |w| at most one, so that the sum of the coefficients'
+absolute values bounds a polynomial. In the calibration, what a rounding down drops is a whole number of units of its
+operand.
 """
 
 from __future__ import annotations
@@ -57,6 +59,13 @@ def _variable(index: int, variables: int) -> _Value:
     return _Value({tuple(int(i == index) for i in range(variables)): Fraction(1)}, Fraction(0))
 
 
+def _centred(entry: NodeEntry, index: int, variables: int) -> _Value:
+    """Return an input as the middle of its range, and half its width times a variable."""
+    unit = Fraction(2) ** -entry.frac / 2
+    middle, radius = (entry.low + entry.high) * unit, (entry.high - entry.low) * unit
+    return _variable(index, variables).times(_constant(radius, variables)).plus(_constant(middle, variables))
+
+
 def _through(stage: StageEntry, arriving: Sequence[_Value], variables: int) -> list[_Value]:
     """Values of all nodes of a stage without memory."""
     supply = iter(arriving)
@@ -81,6 +90,8 @@ def _value(stage: StageEntry, index: int, operands: Sequence[_Value], variables:
         return operands[0].times(_constant(node.parameter * Fraction(2) ** -node.parameter_frac, variables))
     if node.op is Operation.FLOOR:  # the middle of the dropped range, plus or minus half its width
         half = Fraction(2) ** -node.frac / 2
+        if stage.role == "polynomial":
+            half -= Fraction(2) ** -stage.nodes[node.operands[0]].frac / 2
         return _Value(operands[0].plus(_constant(-half, variables)).exact, operands[0].radius + half)
     require(
         node.op is Operation.CLAMP and stage.role == "output" and stage.outputs == (index,),
@@ -104,7 +115,7 @@ def polynomial_error(certificate: Certificate, stages: Sequence[StageEntry]) -> 
             max(-entry.low, entry.high) <= Fraction(2) ** entry.frac,
             f"input {entry.name} must be at most one in size, not with {entry.frac} fraction bits",
         )
-    wires = [_variable(index, count) for index in range(count)]
+    wires = [_centred(entry, index, count) for index, entry in enumerate(entries)]
     for stage in stages:
         values = _through(stage, wires, count)
         wires = [values[i] for i in stage.outputs]
@@ -135,7 +146,7 @@ def _ideal_polynomial(certificate: Certificate, entries: Sequence[NodeEntry]) ->
 def _affine(port: PortEntry, entry: NodeEntry, index: int, count: int) -> _Value:
     """``zero + lsb * code`` with the variable ``code * 2**-frac``."""
     scale = _constant(port.lsb * Fraction(2) ** entry.frac, count)
-    return _variable(index, count).times(scale).plus(_constant(port.zero, count))
+    return _centred(entry, index, count).times(scale).plus(_constant(port.zero, count))
 
 
 def output_error(certificate: Certificate, stage: StageEntry) -> tuple[Fraction, Fraction]:

@@ -10,14 +10,17 @@ from typing import cast
 from sosmith.gen.filter.design import Filter
 from sosmith.gen.proof.cascade_proof import quantized_response
 from sosmith.gen.proof.linear_model import linear_models
-from sosmith.gen.realizations.registry import REALIZATIONS, Section
+from sosmith.gen.realizations.registry import REALIZATIONS, Section, realization_of
 from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
 from sosmith.gen.reload.first_samples import Limits, first_samples
 from sosmith.gen.word_lengths.cascade import cascade, chosen_formats, parts_of, stages_of
-from sosmith.gen.word_lengths.input_stage import InputStage, horner_error, normalised, starting_like
+from sosmith.gen.word_lengths.input_stage import InputStage, normalised, starting_like
+from sosmith.gen.word_lengths.polynomial_error import horner_error, rounded
 from sosmith.gen.word_lengths.quantize import gain_at_zero, gain_of
 from sosmith.gen.word_lengths.quantized import Quantized, assembled
+from sosmith.gen.word_lengths.search import Choice, Search
 from sosmith.gen.word_lengths.settling import with_settling
+from sosmith.model.dataflow.graph import Op
 from sosmith.model.errors import ShortfallError
 from sosmith.model.polynomial import Polynomial
 from sosmith.model.sections.horner import HornerPolynomial, HornerStep, Variable
@@ -63,8 +66,9 @@ def with_constants(
         if ideal is not None:
             filled = _ranked(ideal, cast("Filter", design.filter), design.realization)
         formats = _lifted(chosen_formats(design.sections), finer)
-        if ideal is not None:
+        if ideal is not None and filled != design.filter:
             formats = _with_coefficients_of(filled, formats, design.realization)
+            formats = _closer(filled, formats, design, before)
         formats = _lifted(formats, room - finer)
         if design.steady:
             before = starting_like(before, gain_at_zero(filled), design.first_sample)
@@ -125,13 +129,19 @@ def _input_stage(design: Quantized, polynomial: Polynomial | None) -> InputStage
         (*row, *[zero] * (most - len(row))) for row, most in zip([*exact, *[()] * len(room)], room, strict=False)
     )
     frac = stages[-1].graph.output_ranges[0].frac
+    variables = tuple(Variable(name=p.name, bits=p.bits, signed=p.signed) for p in datapath.inputs)
+    finer = _finest(stages) - frac
     horner = HornerPolynomial(
-        coefficients=tuple(tuple(round(c * 2**frac) for c in row) for row in filled),
-        frac=frac,
-        variables=tuple(Variable(name=p.name, bits=p.bits, signed=p.signed) for p in datapath.inputs),
+        coefficients=rounded(filled, frac, variables), frac=frac, variables=variables, finer=finer
     )
     (output,) = horner.stages[-1].graph.output_ranges
     return InputStage(stages=horner.stages, output=output, error=horner_error(filled, horner))
+
+
+def _finest(stages: Sequence[HornerStep]) -> int:
+    """Fraction bits of the row that has the most."""
+    named = (node for stage in stages for node in stage.graph.nodes if node.op is Op.FLOOR)
+    return max((node.frac for node in named), default=stages[-1].graph.output_ranges[0].frac)
 
 
 def _ranked(ideal: Filter, like: Filter, realization: str) -> Filter:
@@ -153,6 +163,27 @@ def _lifted(formats: Sequence[SectionFormat], bits: int) -> list[SectionFormat]:
     return [
         replace(f, coefficients={name: (code << bits, frac + bits) for name, (code, frac) in f.coefficients.items()})
         for f in formats
+    ]
+
+
+def _closer(ideal: Filter, formats: list[SectionFormat], design: Quantized, before: InputStage) -> list[SectionFormat]:
+    """Return `formats` with coefficients of the same formats whose error is smaller, where the design was searched."""
+    if not realization_of(design.realization).cascade:
+        return formats
+    try:
+        search = Search(ideal.rows, design.realization, [before], gain_of(ideal), steady=design.steady)
+        closer = search.with_closer_coefficients(Choice(0, tuple(formats))).formats
+    except ShortfallError:
+        return formats
+    fracs = [{name: frac for name, (_, frac) in form.coefficients.items()} for form in formats]
+    return [
+        replace(
+            form,
+            coefficients={
+                name: (code << kept[name] - frac, kept[name]) for name, (code, frac) in form.coefficients.items()
+            },
+        )
+        for form, kept in zip(closer, fracs, strict=True)
     ]
 
 

@@ -12,6 +12,7 @@ from fractions import Fraction
 
 from sosmith.gen.realizations.coefficients import lowest_terms
 from sosmith.gen.word_lengths.bit_limits import MAX_BITS
+from sosmith.gen.word_lengths.polynomial_error import horner_error, rounded
 from sosmith.model.dataflow.datapath import Stage
 from sosmith.model.dataflow.graph import Range
 from sosmith.model.errors import ShortfallError
@@ -21,8 +22,11 @@ from sosmith.model.sections.horner import HornerPolynomial, Variable
 from sosmith.model.sections.output import FirstSample
 from sosmith.model.sections.start import StartStage
 
-_COARSER = 4
-"""How many fraction bits fewer the calibration may have than with an equal share of the budget."""
+_COARSER = 8
+"""Most input stages to choose from: the one with an equal share of the budget, and coarser ones."""
+
+_FINER = 2
+"""Fraction bits more of the rows of a calibration that are only added."""
 
 
 _START_SHARE = 16
@@ -172,7 +176,8 @@ def input_stages(
 ) -> tuple[InputStage, ...]:
     """Make the input stage with the fewest fraction bits that keeps to the error `allowed`, and coarser ones.
 
-    The error is in output LSBs. Each stage in the result has one fraction bit fewer than the previous one. Without a
+    The error is in output LSBs. Each stage in the result has fewer fraction bits than the previous one: of all its
+    results or, where there are rows that are only added, of these. Without a
     polynomial, an input stage scales the input to output LSBs; it is empty if the factor is a power of two.
 
     Raises
@@ -189,24 +194,15 @@ def input_stages(
     variables = tuple(Variable(name=p.name, bits=p.bits, signed=p.signed) for p in inputs)
     finest_first: list[InputStage] = []
     for frac in range(MAX_BITS + 1):
-        integers = tuple(tuple(round(c * 2**frac) for c in row) for row in coefficients)
-        horner = HornerPolynomial(coefficients=integers, frac=frac, variables=variables)
-        error = horner_error(coefficients, horner)
-        stages = horner.stages
-        finest_first.insert(0, InputStage(stages=stages, output=stages[-1].graph.output_ranges[0], error=error))
-        if error <= allowed:
-            return tuple(finest_first[:_COARSER])
+        integers = rounded(coefficients, frac, variables)
+        for finer in (0, _FINER) if any(len(row) > 1 for row in coefficients[:-1]) else (0,):
+            horner = HornerPolynomial(coefficients=integers, frac=frac, variables=variables, finer=finer)
+            error = horner_error(coefficients, horner)
+            stages = horner.stages
+            finest_first.insert(0, InputStage(stages=stages, output=stages[-1].graph.output_ranges[0], error=error))
+            if error <= allowed:
+                return tuple(finest_first[:_COARSER])
     raise ShortfallError(
         f"the calibration must keep its error below {float(allowed):.3g} output LSB with {MAX_BITS} fraction bits, "
         f"not {float(error):.3g}: raise output.max_error or output.bits"
     )
-
-
-def horner_error(exact: tuple[tuple[Fraction, ...], ...], horner: HornerPolynomial) -> Fraction:
-    """Bound on the polynomial's error over all input codes, exact; |u| and |t| are at most one."""
-    half = Fraction(1, 2 ** (horner.frac + 1))
-    rows = []
-    for wanted, rounded in zip(exact, horner.coefficients, strict=True):
-        errors = [abs(w - m * Fraction(1, 2**horner.frac)) for w, m in zip(wanted, rounded, strict=True)]
-        rows.append(sum(errors) + half * (len(errors) - 1))
-    return Fraction(sum(rows) + half * (len(rows) - 1))

@@ -47,6 +47,10 @@ class Objective(Protocol):
         """Ratio to the smallest size beyond which a plan is not trimmed."""
 
     @property
+    def negligible(self) -> float:
+        """Size that a design may have beyond the smallest one, for a smaller error."""
+
+    @property
     def few_digits(self) -> bool:
         """Whether a coefficient of fewer signed digits takes less, though it has as many bits."""
 
@@ -81,6 +85,7 @@ class SmallArea:
     beyond = "more in multiplier blocks alone"
     unsuited = "not for this filter"
     hopeless = 2.5  # trimming saved less than half in every design seen
+    negligible = 0.0
     few_digits = False
     factor_bits = MULTIPLIER_BITS
 
@@ -117,6 +122,7 @@ class FewAdders:
     beyond = "more in multiplier blocks alone"
     unsuited = "not for this filter"
     hopeless = SmallArea.hopeless
+    negligible = 0.0
     few_digits = True
     factor_bits = None
 
@@ -159,6 +165,7 @@ class ShortProgram:
     digit_bits: int
     bit_serial: bool = False
 
+    negligible = 1 / 128  # bits of words that take no instruction
     few_digits = False
     beyond = "longer even with one digit for each value"
     unsuited = "not to be folded"

@@ -38,6 +38,7 @@ class OnlineUnits:
     best = "the smallest estimated area for its rate"
     beyond = "more"
     unsuited = "no direct form"
+    negligible = 0.0
     hopeless = 2.5  # as for the parallel architecture
     few_digits = False
     factor_bits = None

@@ -4,7 +4,8 @@ The start keeps to the error allowed. Each step is the one that saves the most e
 the search ends when no further step fits. A step drops bits of one quantizer, of the calibration or of one
 coefficient, which may become either neighbour of its ideal value; or it starts to quantize a product's operand so that
 it fits one hardware multiplier. Where products are made of adders, a coefficient may also become a number near its
-ideal value that has fewer signed digits.
+ideal value that has fewer signed digits. Where no step fits any more, what lowers the error and costs nothing is
+taken: neighbouring values of one or two coefficients, and bits of quantizers, as memory words may have room for them.
 
 All errors here are linear estimates in double precision: the gain to the output for a quantizer, the response of the
 derivative for a coefficient, so that errors of several coefficients may cancel. They only guide the choice; the result
@@ -15,10 +16,10 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from itertools import zip_longest
+from itertools import combinations, zip_longest
 from typing import NamedTuple
 
 import numpy as np
@@ -51,6 +52,12 @@ _ENOUGH = 1 << 14
 _LOST = 2.0**-16
 """Share of a response's sum of magnitudes that may be lost when samples with different signs are added up."""
 
+_FEW = 16
+"""Coefficients up to which neighbours are tried two at a time."""
+
+_WORTH = 2.0**-10
+"""Share of the error that a step which costs nothing must save."""
+
 _STEPS = (1, 2, 3)
 """Bits that one step may drop: several, as a shorter fraction may save something only once it is the shortest one."""
 
@@ -61,6 +68,10 @@ class Choice:
 
     input_stage: int
     formats: tuple[SectionFormat, ...]
+
+    def with_format(self, k: int, form: SectionFormat) -> Choice:
+        """Return a copy with another format of section k."""
+        return replace(self, formats=(*self.formats[:k], form, *self.formats[k + 1 :]))
 
 
 class _Input(NamedTuple):
@@ -195,11 +206,27 @@ class Search:
         allowed : float
             Allowed sum of the errors of input stage, coefficients and rounding, in output LSBs.
         """
+        ways = [start]
+        if len(self._inputs) > 1:
+            ways.append(self._trimmed_once(start, allowed, calibration=False))
+        ends = [self._trimmed_closer(way, allowed) for way in ways]
+        smallest = min(ends, key=lambda choice: (self.size(choice), self.error(choice)))
+        return self._closer(smallest, more=self._objective.negligible)
+
+    def _trimmed_closer(self, start: Choice, allowed: float) -> Choice:
+        choice = self._trimmed_once(start, allowed)
+        while True:
+            closer = self._closer(choice)
+            if closer is choice:
+                return choice
+            choice = self._trimmed_once(closer, allowed)
+
+    def _trimmed_once(self, start: Choice, allowed: float, *, calibration: bool = True) -> Choice:
         choice, error, size = start, self.error(start), self.size(start)
         while error <= allowed:
             self._base = self._based(choice.formats)
             best: tuple[float, Choice, float, float] | None = None
-            for candidate in self._steps(choice):
+            for candidate in self._steps(choice, calibration=calibration):
                 after = self.error(candidate)
                 if after > allowed:
                     continue
@@ -214,15 +241,59 @@ class Search:
             _, choice, error, size = best
         return choice
 
-    def _steps(self, choice: Choice) -> Iterator[Choice]:
+    def with_closer_coefficients(self, choice: Choice) -> Choice:
+        """Return the same formats with coefficients whose error is smaller, of no more bits."""
+        return self._closer(choice, self._moved)
+
+    def _closer(
+        self, choice: Choice, neighbours: Callable[[Choice], Iterator[Choice]] | None = None, more: float = 0.0
+    ) -> Choice:
+        """Take what lowers the error and costs at most `more` in all, the best first, until nothing does."""
+        size = self.size(choice) + more
+        while True:
+            self._base = self._based(choice.formats)
+            least = (1 - _WORTH) * self.error(choice)
+            others = [*(neighbours or self._neighbours)(choice)]
+            errors = [self.error(other) for other in others]
+            better = (at for at in np.argsort(errors, kind="stable").tolist() if errors[at] < least)
+            free = next((others[at] for at in better if self.size(others[at]) <= size), None)
+            if free is None:
+                return choice
+            choice = free
+
+    def _neighbours(self, choice: Choice) -> Iterator[Choice]:
+        """Yield formats with a finer input stage or quantizer, or other coefficients."""
+        if choice.input_stage:
+            yield replace(choice, input_stage=choice.input_stage - 1)
+        for k, form in enumerate(choice.formats):
+            for name, frac in form.fracs.items():
+                yield choice.with_format(k, form.with_frac(name, frac + 1))
+        yield from self._moved(choice)
+
+    def _moved(self, choice: Choice) -> Iterator[Choice]:
+        """Yield formats with one coefficient, or two if there are few, next to what they were."""
+        places = [(k, name) for k, form in enumerate(choice.formats) for name in form.coefficients]
+        moves = [((place, by),) for place in places for by in (-1, 1)]
+        if len(places) <= _FEW:
+            moves += [(*one, *other) for one, other in combinations(moves, 2) if one[0][0] != other[0][0]]
+        for move in moves:
+            moved = choice
+            for (k, name), by in move:
+                integer, frac = moved.formats[k].coefficients[name]
+                if integer + by:
+                    value = lowest_terms(integer + by, frac)
+                    moved = moved.with_format(k, moved.formats[k].with_coefficient(name, value))
+            yield moved
+
+    def _steps(self, choice: Choice, *, calibration: bool) -> Iterator[Choice]:
         first = choice.input_stage + 1
-        for index in range(first, min(first + len(_STEPS), len(self._inputs))):
+        for index in range(first, min(first + len(_STEPS), len(self._inputs)) if calibration else first):
             yield replace(choice, input_stage=index)
         x = self._inputs[choice.input_stage].x
         for k, form in enumerate(choice.formats):
             _, y, fits = self._section(k, x, form)
             for changed in self._changes(k, form, fits):
-                yield replace(choice, formats=(*choice.formats[:k], changed, *choice.formats[k + 1 :]))
+                yield choice.with_format(k, changed)
             x = y
 
     def _changes(self, k: int, form: SectionFormat, fits: Mapping[str, int]) -> Iterator[SectionFormat]:

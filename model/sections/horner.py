@@ -7,7 +7,8 @@ variable at once, then their results in the first::
     r_i = (.. (c_in t + c_i(n-1)) t + ..) t + c_i0        one stage for each power of t
     d   = (.. (r_m u + r_(m-1)) u + ..) u + r_0           one stage for each power of u
 
-Each stage rounds once per row to `frac` fraction bits, to which the coefficients are rounded too.
+Each stage rounds once per row to `frac` fraction bits, to which the coefficients are rounded too. A row that is only
+added from then on may keep some more: these bits make no multiplier wider.
 """
 
 from __future__ import annotations
@@ -54,14 +55,17 @@ class HornerPolynomial:
     coefficients : tuple of tuple of int
         Row i holds the coefficients of ``u**i``; rows may be short.
     frac : int
-        Fraction bits of the coefficients and of every intermediate result.
+        Fraction bits of the coefficients and of every intermediate result but those that `finer` is for.
     variables : tuple of Variable
         The first variable, and the second if there is one; without it every row has one coefficient.
+    finer : int
+        Additional fraction bits of the rows r_0 to r_(m-1), which are added to products and multiplied by nothing.
     """
 
     coefficients: tuple[tuple[int, ...], ...]
     frac: int
     variables: tuple[Variable, ...]
+    finer: int = 0
 
     def __post_init__(self) -> None:
         if not self.coefficients or not all(self.coefficients):
@@ -84,6 +88,11 @@ class HornerPolynomial:
             steps.append(self._constant_step())
         return tuple(steps)
 
+    def row_frac(self, i: int, power: int) -> int:
+        """Fraction bits of row i behind the stage for ``t**power``."""
+        only_added = power == 1 and i < len(self.coefficients) - 1
+        return min(self.frac + self.finer * only_added, self.frac + self.variables[-1].bits)
+
     def _variable(self, g: GraphBuilder, index: int) -> Wire:
         variable = self.variables[index]
         return g.input(variable.name, variable.bits, variable.low, variable.high)
@@ -100,7 +109,7 @@ class HornerPolynomial:
             if len(row) > power:
                 start = so_far.get(i) or self._constant(g, i, power)
                 total = g.add(g.multiply(start, t, f"product{i}"), self._constant(g, i, power - 1))
-                so_far[i] = g.round(total, self.frac, f"row{i}")
+                so_far[i] = g.round(total, self.row_frac(i, power), f"row{i}")
         keep = [u, t] if power > 1 else [u] if len(self.coefficients) > 1 else []
         return _step(g, f"row_power{power}", keep, so_far, rows)
 

@@ -268,7 +268,7 @@ def test_a_range_too_narrow_for_what_is_possible(end: str) -> None:
     [
         pytest.param(
             lambda t: t.update(max_error="1/20000"),
-            r"the error must be at most 5e-05 mm, not 0\.00023\d* mm",
+            r"the error must be at most 5e-05 mm, not 0\.0002\d* mm",
             id="error not met",
         ),
         pytest.param(
@@ -289,7 +289,7 @@ def test_a_range_too_narrow_for_what_is_possible(end: str) -> None:
         ),
         pytest.param(
             lambda t: t["claims"].update(bound="1/2"),
-            r"the bound must be \d+/\d+ = 0\.9\d+, not 1/2 = 0\.5",
+            r"the bound must be \d+/\d+ = 0\.\d+, not 1/2 = 0\.5",
             id="bound",
         ),
         pytest.param(

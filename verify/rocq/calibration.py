@@ -49,7 +49,7 @@ def calibration_of(certificate: Certificate, graph: FlatGraph, node: int) -> Cal
     RejectedError
         If a node before it is of a kind that no polynomial is known for.
     """
-    sizes = [1 << max(max(abs(low), abs(high)) - 1, 0).bit_length() for low, high in graph.ports] + [1]
+    sizes = [max(abs(low), abs(high)) for low, high in graph.ports] + [0]
     exact = _exact(certificate)
     denominator = 1
     for value in exact.values():
@@ -62,7 +62,8 @@ def calibration_of(certificate: Certificate, graph: FlatGraph, node: int) -> Cal
         [int(exact.get((i, j), Fraction(0)) * denominator) for j in range(max(k for _, k in exact) + 1)]
         for i in range(width)
     ]
-    error = radius * unit + _size(apart, sizes)
+    middles = [*graph.ports, (0, 0)]
+    error = radius * unit + _size(_about(apart, middles), [abs(high - low) for low, high in middles])
     return Calibration(_physical(certificate), rows(whole), denominator, error, -int(-_size(exact, sizes) // 1))
 
 
@@ -74,6 +75,20 @@ def _gcd(a: int, b: int) -> int:
 
 def _size(polynomial: Polynomial, sizes: Sequence[int]) -> Fraction:
     return sum((abs(value) * sizes[0] ** i * sizes[1] ** j for (i, j), value in polynomial.items()), Fraction(0))
+
+
+def _about(polynomial: Polynomial, ports: Sequence[tuple[int, int]]) -> Polynomial:
+    """Return a polynomial in twice the distances from the middles of the codes' ranges."""
+    codes = [
+        {(0, 0): Fraction(low + high, 2), (1 - at, at): Fraction(1, 2)} for at, (low, high) in enumerate(ports[:2])
+    ]
+    total: Polynomial = {}
+    for (i, j), value in polynomial.items():
+        term: Polynomial = {(0, 0): value}
+        for code in [codes[0]] * i + [codes[1]] * j:
+            term = _times(term, code)
+        total = _plus(total, term)
+    return total
 
 
 def _times(a: Polynomial, b: Polynomial) -> dict[tuple[int, int], Fraction]:
@@ -172,7 +187,8 @@ def _value(
     if node.op in {Operation.SHIFT, Operation.BOUND}:
         return exact, radius
     if node.op is Operation.FLOOR:
-        drop, half = Fraction(1, 1 << first.frac - node.frac), Fraction(1, 2)
+        drop = Fraction(1, 1 << first.frac - node.frac)
+        half = (1 - drop) / 2
         shifted = _plus({key: drop * value for key, value in exact.items()}, {(0, 0): Fraction(1)}, -half)
         return shifted, drop * radius + half
     raise RejectedError(f"a polynomial must be known of a node before the filter, not a {node.op.value}")

@@ -166,7 +166,7 @@ def test_each_has_the_smallest_architecture_that_keeps_up() -> None:
         "sample rate must be at most 85.3658 Hz, not 100 Hz"
     )
     assert rate_costs(made).architecture == "parallel, folded"
-    assert made.architecture.cycles_per_result == 138
+    assert made.architecture.cycles_per_result == 137
     slower = at_clock(800, realization="df2t")
     assert rate_costs(slower).architecture == "parallel"
     with refused(

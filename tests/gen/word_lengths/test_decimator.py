@@ -190,8 +190,8 @@ def test_a_clock_that_is_too_slow() -> None:
     spec = locomotive_spec("16", "folded")
     slow = replace(spec, hardware=replace(spec.hardware, clock=Fraction(500), realization="df2t"))
     sentence = (
-        "the folded architecture takes 123 clocks for 16 samples: at a clock of 500 Hz the sample rate must be at most "
-        "65.0406 Hz, not 100 Hz"
+        "the folded architecture takes 118 clocks for 16 samples: at a clock of 500 Hz the sample rate must be at most "
+        "67.7966 Hz, not 100 Hz"
     )
     with refused(sentence, ShortfallError):
         design_core(slow, core="filter")

@@ -1,7 +1,8 @@
 (* What a stage without memory computes: a polynomial in the codes at the inputs, within a radius.
 
    For each node an integer polynomial P, a number k and a radius say |code 2^k - P(a, b)| <= radius, where a and b are the
-   codes at the first and the second input. They follow node by node; a rounding down adds half of what it can drop. *)
+   codes at the first and the second input. They follow node by node; a rounding down adds half of what it can drop. What
+   is left between two polynomials is bounded about the middle of the inputs' ranges, where it is smallest. *)
 Require Import Bool ZArith Reals List Lia Lra. Import ListNotations.
 From Sosmith Require Import Definitions Streams Graph Ranges Linear.
 Open Scope Z_scope.
@@ -42,20 +43,48 @@ Proof.
   assert (Z.abs (a * ev2 P a b) <= A * size2 P A B) by (rewrite Z.abs_mul; apply Z.mul_le_mono_nonneg; lia). lia.
 Qed.
 
+(* The same polynomial, times a power of two, in twice the distances from s / 2 and t / 2: those are integers. *)
+Fixpoint middle1 (t : Z) (k : nat) (l : list Z) : list Z := match l, k with
+  | c :: l', Datatypes.S k' => add [2 ^ Z.of_nat k * c] (mul [t; 1] (middle1 t k' l')) | _, _ => [] end.
+Fixpoint middle2 (s t : Z) (n k : nat) (P : list (list Z)) : list (list Z) := match P, n with
+  | l :: P', Datatypes.S n' =>
+      add_rows [scale (2 ^ Z.of_nat n) (middle1 t k l)] (mul2 [[s]; [1]] (middle2 s t n' k P')) | _, _ => [] end.
+Definition columns (P : list (list Z)) : nat := fold_right (fun l => Nat.max (length l)) O P.
+Lemma middle1_spec t b l : forall k, (length l <= k)%nat -> ev1 (middle1 t k l) (2 * b - t) = 2 ^ Z.of_nat k * ev1 l b.
+Proof.
+  induction l as [|c l IH]; intros [|k] H; cbn [middle1 ev1 length] in *; try lia.
+  rewrite ev1_add, ev1_mul, IH by lia. cbn [ev1]. rewrite Nat2Z.inj_succ, Z.pow_succ_r by lia. ring.
+Qed.
+Lemma middle2_spec s t a b k P : forall n, (length P <= n)%nat -> (columns P <= k)%nat ->
+  ev2 (middle2 s t n k P) (2 * a - s) (2 * b - t) = 2 ^ Z.of_nat n * 2 ^ Z.of_nat k * ev2 P a b.
+Proof.
+  induction P as [|l P IH]; intros [|n] H K; cbn [middle2 ev2 length columns fold_right] in *; try lia.
+  fold (columns P) in K. rewrite ev2_add, ev2_mul, IH by lia. cbn [ev2]. rewrite ev1_scale, middle1_spec by lia. cbn [ev1].
+  rewrite Nat2Z.inj_succ, Z.pow_succ_r by lia. ring.
+Qed.
+
 Record enclosure := Enclosure { poly : list (list Z); up : Z; radius : Z }.
 Section Enclosures.
 Variables (g : graph) (ports : list (Z * Z)) (x : nat -> nat -> Z).
 Hypothesis G : ordered g = true.
 Hypothesis X : inputs_within ports x.
 
-Definition largest_at (p : nat) : Z := 2 ^ Z.log2_up (Z.max (Z.abs (fst (nth p ports (0, 0)))) (Z.abs (snd (nth p ports (0, 0))))).
+Definition ends_at (p : nat) : Z * Z := nth p ports (0, 0).
+Definition largest_at (p : nat) : Z := Z.max (Z.abs (fst (ends_at p))) (Z.abs (snd (ends_at p))).
+Definition middle_at (p : nat) : Z := fst (ends_at p) + snd (ends_at p).
+Definition width_at (p : nat) : Z := Z.abs (snd (ends_at p) - fst (ends_at p)).
 Definition at_input (p : nat) (n : nat) : Z := if Nat.ltb p (length ports) then x n p else 0.
-Lemma at_input_spec p n : Z.abs (at_input p n) <= largest_at p.
+Lemma at_input_within p n : (length ports <= p)%nat /\ ends_at p = (0, 0) /\ at_input p n = 0
+  \/ fst (ends_at p) <= at_input p n <= snd (ends_at p).
 Proof.
-  unfold at_input, largest_at. set (m := Z.max _ _).
-  assert (M : m <= 2 ^ Z.log2_up m) by (destruct (Z.le_gt_cases m 1) as [O|O]; [rewrite Z.log2_up_eqn0 by exact O; exact O|apply Z.log2_up_spec; exact O]).
-  destruct (Nat.ltb_spec p (length ports)) as [H|H]; [specialize (X n p H)|]; unfold m in *; lia.
+  unfold at_input, ends_at. destruct (Nat.ltb_spec p (length ports)) as [H|H].
+  - right. exact (X n p H).
+  - left. repeat split; [exact H|]. apply nth_overflow. exact H.
 Qed.
+Lemma at_input_spec p n : Z.abs (at_input p n) <= largest_at p.
+Proof. unfold largest_at. destruct (at_input_within p n) as [(_ & E & A)|H]; [rewrite E, A; simpl|]; lia. Qed.
+Lemma at_middle_spec p n : Z.abs (2 * at_input p n - middle_at p) <= width_at p.
+Proof. unfold middle_at, width_at. destruct (at_input_within p n) as [(_ & E & A)|H]; [rewrite E, A; simpl|]; lia. Qed.
 
 Definition bound_of (e : enclosure) : Z := size2 (poly e) (largest_at 0) (largest_at 1).
 Definition encloses (e : enclosure) (c n : Z) (m : nat) : Prop :=
@@ -86,8 +115,8 @@ Definition enclose (known : list (option enclosure)) (v : node) : option enclosu
   | Floor a => match got a with
     | Some e =>
         let d := frac_of g a - frac v in
-        let half := 2 ^ (d - 1 + up e) in
-        Some (Enclosure (add_rows (poly e) [[- half]]) (up e + d) (radius e + half))
+        let most := (2 ^ d - 1) * 2 ^ up e in
+        Some (Enclosure (add_rows (scale_rows 2 (poly e)) [[- most]]) (up e + d + 1) (radius e * 2 + most))
     | None => None end
   | _ => None
   end.
@@ -166,17 +195,18 @@ Proof.
   - intros Ea. exact (K a e m Ea).
   - destruct (nth a known None) as [e0|] eqn:Ea; [|discriminate]. intros Q; injection Q as <-. destruct (K a e0 m Ea) as [U1 R1].
     apply Z.ltb_lt in P. set (d := frac_of g a - frac v) in *. unfold encloses. cbn [up poly radius]. split; [lia|].
-    rewrite ev2_add. cbn [ev2 ev1]. change (nth a (run g x m) 0) with (code g x a m).
-    assert (D : 2 ^ d = 2 * 2 ^ (d - 1)) by (rewrite <- Z.pow_succ_r by lia; f_equal; lia).
-    assert (D0 : 0 < 2 ^ (d - 1)) by (apply Z.pow_pos_nonneg; lia). assert (U0 : 0 < 2 ^ up e0) by (apply Z.pow_pos_nonneg; lia).
-    rewrite !Z.pow_add_r by lia. pose proof (Z.div_mod (code g x a m) (2 ^ d) ltac:(lia)) as M.
+    rewrite ev2_add, ev2_scale. cbn [ev2 ev1]. change (nth a (run g x m) 0) with (code g x a m).
+    assert (D0 : 0 < 2 ^ d) by (apply Z.pow_pos_nonneg; lia). assert (U0 : 0 < 2 ^ up e0) by (apply Z.pow_pos_nonneg; lia).
+    rewrite !Z.pow_add_r by lia. change (2 ^ 1) with 2. pose proof (Z.div_mod (code g x a m) (2 ^ d) ltac:(lia)) as M.
     pose proof (Z.mod_pos_bound (code g x a m) (2 ^ d) ltac:(lia)) as B.
-    set (z := code g x a m / 2 ^ d) in *. set (r := code g x a m mod 2 ^ d) in *. set (h := 2 ^ (d - 1)) in *.
-    assert (W : Z.abs ((h - r) * 2 ^ up e0) <= h * 2 ^ up e0)
-      by (rewrite Z.abs_mul, (Z.abs_eq (2 ^ up e0)) by lia; apply Z.mul_le_mono_nonneg_r; lia).
-    replace (z * (2 ^ up e0 * 2 ^ d) - (ev2 (poly e0) (at_input 0 m) (at_input 1 m) + (- (h * 2 ^ up e0) + at_input 1 m * 0 + at_input 0 m * 0)))
-      with ((code g x a m * 2 ^ up e0 - ev2 (poly e0) (at_input 0 m) (at_input 1 m)) + (h - r) * 2 ^ up e0) by (rewrite M; ring).
-    lia.
+    set (z := code g x a m / 2 ^ d) in *. set (r := code g x a m mod 2 ^ d) in *. set (u := 2 ^ up e0) in *.
+    assert (W : Z.abs ((2 ^ d - 1 - 2 * r) * u) <= (2 ^ d - 1) * u)
+      by (rewrite Z.abs_mul, (Z.abs_eq u) by lia; apply Z.mul_le_mono_nonneg_r; lia).
+    replace (z * (u * 2 ^ d * 2)
+        - (2 * ev2 (poly e0) (at_input 0 m) (at_input 1 m) + (- ((2 ^ d - 1) * u) + at_input 1 m * 0 + at_input 0 m * 0)))
+      with (2 * (code g x a m * u - ev2 (poly e0) (at_input 0 m) (at_input 1 m)) + (2 ^ d - 1 - 2 * r) * u)
+      by (rewrite M; ring).
+    clear - R1 W. set (one := (2 ^ d - 1 - 2 * r) * u) in *. set (two := code g x a m * u - _) in *. lia.
   - intros Ea. exact (K a e m Ea).
   - intros Ea. exact (K a e m Ea).
 Qed.
@@ -204,9 +234,11 @@ Definition calibration_holds (w : nat) (Q : list (list Z)) (d p q M : Z) : bool 
   | Some e =>
       let u := units_of (frac_of g w) in
       let all := steps_of (frac_of g w) * 2 ^ up e in
-      let far := size2 (add_rows (scale_rows (d * u) (poly e)) (scale_rows (- all) Q)) A B in
+      let D := add_rows (scale_rows (d * u) (poly e)) (scale_rows (- all) Q) in
+      let more := 2 ^ Z.of_nat (length D) * 2 ^ Z.of_nat (columns D) in
+      let far := size2 (middle2 (middle_at 0) (middle_at 1) (length D) (columns D) D) (width_at 0) (width_at 1) in
       Nat.ltb w (length g) && (0 <? d) && (0 <? q)
-      && ((d * u * radius e + far) * q <=? p * (d * all)) && (size2 Q A B <=? M * d)
+      && ((more * (d * u * radius e) + far) * q <=? more * (p * (d * all))) && (size2 Q A B <=? M * d)
   | None => false
   end.
 Theorem calibrated_within w Q d p q M : calibration_holds w Q d p q M = true -> forall m,
@@ -224,22 +256,31 @@ Proof.
     - intros j Hj. cbn [length plus]. symmetry. apply nth_firstn. rewrite firstn_length in Hj. lia.
     - intros i e0 m0 Hi. destruct i; discriminate. }
   destruct (K w e m Ee) as [U0 R0]. set (s := steps_of (frac_of g w)) in *.
-  set (u := units_of (frac_of g w)) in *. pose proof (size2_spec (add_rows (scale_rows (d * u) (poly e)) (scale_rows (- (s * 2 ^ up e)) Q)) _ _ _ _ (at_input_spec 0 m) (at_input_spec 1 m)) as S1.
+  set (u := units_of (frac_of g w)) in *.
+  set (D := add_rows (scale_rows (d * u) (poly e)) (scale_rows (- (s * 2 ^ up e)) Q)) in *.
+  pose proof (size2_spec (middle2 (middle_at 0) (middle_at 1) (length D) (columns D) D) _ _ _ _ (at_middle_spec 0 m)
+    (at_middle_spec 1 m)) as S1.
+  rewrite middle2_spec in S1 by lia. set (more := 2 ^ Z.of_nat (length D) * 2 ^ Z.of_nat (columns D)) in *.
+  assert (More : 0 < more) by (apply Z.mul_pos_pos; apply Z.pow_pos_nonneg; lia).
   pose proof (size2_spec Q _ _ _ _ (at_input_spec 0 m) (at_input_spec 1 m)) as S2.
-  rewrite ev2_add, !ev2_scale in S1. set (far := size2 _ _ _) in S1, H5.
+  set (far := size2 (middle2 _ _ _ _ _) _ _) in S1, H5. unfold D in S1. rewrite ev2_add, !ev2_scale in S1.
   set (P := ev2 (poly e) (at_input 0 m) (at_input 1 m)) in *. set (V := ev2 Q (at_input 0 m) (at_input 1 m)) in *.
   set (c := code g x w m) in *. assert (N0 : 0 < u) by (apply Z.pow_pos_nonneg; lia).
   assert (F0 : 0 < s) by (apply Z.pow_pos_nonneg; lia). assert (E0 : 0 < 2 ^ up e) by (apply Z.pow_pos_nonneg; lia).
   assert (dpos : (0 < IZR d)%R) by (apply IZR_lt; lia). assert (qpos : (0 < IZR q)%R) by (apply IZR_lt; lia).
   assert (fpos : (0 < IZR s)%R) by (apply IZR_lt; lia). assert (epos : (0 < IZR (2 ^ up e))%R) by (apply IZR_lt; lia).
   split.
-  - assert (A : Z.abs (s * 2 ^ up e * V - d * (c * u) * 2 ^ up e) <= d * u * radius e + far).
+  - assert (A : more * Z.abs (s * 2 ^ up e * V - d * (c * u) * 2 ^ up e) <= more * (d * u * radius e) + far).
     { assert (R1 : Z.abs (d * u * (c * 2 ^ up e - P)) <= d * u * radius e)
         by (rewrite Z.abs_mul, (Z.abs_eq (d * u)) by nia; apply Z.mul_le_mono_nonneg_l; nia).
       replace (s * 2 ^ up e * V - d * (c * u) * 2 ^ up e)
-        with (- (d * u * (c * 2 ^ up e - P)) - (d * u * P + - (s * 2 ^ up e) * V)) by ring. lia. }
+        with (- (d * u * (c * 2 ^ up e - P)) - (d * u * P + - (s * 2 ^ up e) * V)) by ring.
+      rewrite Z.abs_mul, (Z.abs_eq more) in S1 by lia.
+      apply Z.le_trans with (more * (d * u * radius e + Z.abs (d * u * P + - (s * 2 ^ up e) * V))); [|lia].
+      apply Z.mul_le_mono_nonneg_l; lia. }
     assert (B : Z.abs (s * 2 ^ up e * V - d * (c * u) * 2 ^ up e) * q <= p * (d * (s * 2 ^ up e))).
-    { apply Z.le_trans with (2 := H5). apply Z.mul_le_mono_nonneg_r; lia. }
+    { apply Z.mul_le_mono_pos_l with more; [exact More|]. apply Z.le_trans with (2 := H5). rewrite Z.mul_assoc.
+      apply Z.mul_le_mono_nonneg_r; lia. }
     apply IZR_le in B. rewrite !mult_IZR, abs_IZR, minus_IZR, !mult_IZR in B.
     set (ff := IZR s) in *. set (ee := IZR (2 ^ up e)) in *. set (dd := IZR d) in *. set (qq := IZR q) in *.
     apply Rmult_le_reg_r with (qq * (dd * (ff * ee)))%R; [repeat apply Rmult_lt_0_compat; assumption|].
