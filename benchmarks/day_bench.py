@@ -136,9 +136,9 @@ def loaded(core: CoreDesign, made: BayesianFit, trace: Any) -> dict[str, Any]:
         swap = check_swap(core, None, other_set(core, polynomial=made.fit.polynomial, max_error=SET_ERROR))
     except ShortfallError as error:
         return {"hardware": None, "refused": str(error)}
-    datapath = swap.made.quantized.datapath
+    datapath = swap.new_set.quantized.datapath
     clearance = datapath.output.decode(datapath.compute(trace.codes))
-    bound = float(swap.made.quantized.bound * datapath.output.lsb)
+    bound = float(swap.new_set.quantized.bound * datapath.output.lsb)
     return {
         "hardware": round(accuracy_percent(clearance, trace.truth, trace.reading), 4),
         "bound": round(bound, 7),

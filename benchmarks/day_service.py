@@ -128,7 +128,7 @@ def _loaded(core: CoreDesign, polynomial: Polynomial, before: Datapath) -> tuple
         swap = check_swap(core, None, other_set(core, polynomial=polynomial, max_error=SET_ERROR))
     except ShortfallError:
         return before, True
-    return swap.made.quantized.datapath, False
+    return swap.new_set.quantized.datapath, False
 
 
 def _read(
