@@ -8,7 +8,7 @@ the mean half-width, and how many sensors were warned of, by the fit or by an al
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,9 +21,17 @@ from sosmith.instrument.calibration.health.monitoring import health_of
 from sosmith.instrument.calibration.sensor_type import DEFAULT_TYPE, SENSOR_TYPES
 from sosmith.instrument.calibration.uncertainty import SHARE, of_posterior
 from sosmith.model.arrays import Values
+from sosmith.model.errors import SpecificationError
 
-DAYS, EACH, READINGS = 10, 25, 40
-"""Days of measurements, measurements of each, and readings whose intervals are checked on each of two days."""
+DAYS, EACH, READINGS, AFTER = 10, 25, 40, 5
+"""Days of measurements, measurements of each, readings whose intervals are checked on a day, and days drawn for the one
+after the last."""
+
+ENOUGH = 0.92
+"""Share of a sensor's intervals on a day that hold, below which a warning is wanted."""
+
+Reading = tuple[Values, Values, Values]
+"""Voltages in V, temperatures in degC and true clearances in mm."""
 
 FIRST_SEED, SEEDS = 7001, 20
 """Seeds that nothing was chosen by."""
@@ -83,6 +91,8 @@ CASES = (
     Case("scatter times 3", scatter=0.9),
     Case("errors of days times 3", systematic=0.36),
     Case("voltage steps by -1 V", step=-1.0),
+    Case("voltage steps by +1 V", step=1.0),
+    Case("voltage steps by -0.3 V", step=-0.3),
     Case("voltage steps by +0.3 V", step=0.3),
     Case("thermometer reads 10 K more", thermometer=10.0),
     Case("rail at 6 V", rail=6.0),
@@ -96,13 +106,15 @@ def _error(chance: np.random.Generator, case: Case, clearance: Values) -> Values
     return case.systematic * (np.linalg.cholesky(covariance) @ chance.normal(size=len(clearance)))
 
 
-def _sensor(case: Case, seed: int) -> tuple[Measurements, list[tuple[Values, Values, Values]]]:
-    """Emulate a sensor: its measurements, and voltages, temperatures and true clearances of readings on two days."""
+def _sensor(case: Case, seed: int) -> tuple[Measurements, list[list[Reading]]]:
+    """Emulate a sensor: its measurements, and readings on the last day of these and on days that may come after it."""
     chance = np.random.default_rng(seed)
     z = chance.normal(size=5) if case.typical else np.zeros(5)
-    columns, readings = [], []
-    for day in range(DAYS + 1):
-        z = z + chance.normal(size=5) * np.sqrt(TYPE.drifts)
+    columns, last, after = [], [], []
+    for day in range(DAYS + AFTER):
+        if day <= DAYS:  # each of the days after is the day after the last one, drawn anew
+            before = z
+        z = before + chance.normal(size=5) * np.sqrt(TYPE.drifts)
         count = EACH + READINGS
         V, T = chance.uniform(0.5, 9.5, count), chance.uniform(20.0, 95.0, count)
         d = TYPE.polynomial(tuple(z.tolist()))(V * case.gain, T)
@@ -113,40 +125,55 @@ def _sensor(case: Case, seed: int) -> tuple[Measurements, list[tuple[Values, Val
         if day < DAYS:
             measured = np.maximum(d[:EACH] + chance.normal(0, case.scatter, EACH), 0.0)
             columns.append([measured, V[:EACH], T[:EACH], np.full(EACH, FIRST_DAY + day)])
+        inside = slice(EACH, None)
         if day >= DAYS - 1:
-            inside = slice(EACH, None)
-            readings.append((V[inside], T[inside], d[inside]))
+            (last if day < DAYS else after).append((V[inside], T[inside], d[inside]))
     clearance, voltage, temperature, days = np.concatenate(columns, axis=1)
-    return Measurements(clearance, voltage, temperature, "emulated", tuple(days.astype(int).tolist())), readings
+    return Measurements(clearance, voltage, temperature, "emulated", tuple(days.astype(int).tolist())), [last, after]
 
 
-def run(case: Case, seeds: range) -> dict[str, Any]:
-    """Return shares inside and mean half-widths in mm, on the last day and the day after, and the share warned of."""
-    inside, widths, warned = [[], []], [[], []], 0
-    for seed in seeds:
-        measurements, readings = _sensor(case, seed)
-        told = False
-        for k, (V, T, d) in enumerate(readings):
+def one_sensor(case: Case, seed: int) -> dict[str, Any]:
+    """Return shares inside and mean half-widths in mm, on the last day and the day after, and whether it is warned of.
+
+    A sensor that is not calibrated at all, because most of its measurements fit no sensor of the type, is warned of.
+    """
+    measurements, readings = _sensor(case, seed)
+    inside, widths, told = list[float](), list[float](), False
+    stepped = False
+    for k, days in enumerate(readings):
+        try:
             made = bayesian_fit(measurements, TYPE, FIRST_DAY + DAYS - 1 + k, DEFAULT_RANGES)
-            held = made.rails.hold(V)
-            worth = of_posterior(measurements, made)
-            half = worth.half_width(V[held], T[held])
-            inside[k] += (np.abs(made.fit.polynomial(V[held], T[held]) - d[held]) <= half).tolist()
-            widths[k] += half.tolist()
-            told = told or bool(made.surprise or made.doubts or made.rails.found or worth.lack.structured)
-        alarms = health_of(measurements, TYPE, made.rails.ends).alarms
-        warned += told or bool(alarms)
-    shares, halves = ([round(float(np.mean(one)), 4) for one in both] for both in (inside, widths))
-    return {"case": case.name, "inside": shares, "half_width": halves, "warned": warned, "count": len(seeds)}
+        except SpecificationError:
+            return {"inside": None, "half_width": None, "warned": True, "step": False}
+        worth = of_posterior(measurements, made)
+        V, T, d = (np.concatenate(values) for values in zip(*days, strict=True))
+        held = made.rails.hold(V)
+        half = worth.half_width(V[held], T[held])
+        inside.append(float(np.mean(np.abs(made.fit.polynomial(V[held], T[held]) - d[held]) <= half)))
+        widths.append(float(half.mean()))
+        told = told or bool(made.surprise or made.doubts or made.rails.found or worth.lack.structured or made.step)
+        stepped = stepped or (made.step is not None and made.step.told)
+    alarms = health_of(measurements, TYPE, made.rails.ends).alarms
+    return {"inside": inside, "half_width": widths, "warned": told or bool(alarms), "step": stepped}
 
 
-def all_sensors(seeds: range, progress: Callable[[str, int, int], None]) -> list[dict[str, Any]]:
-    """Return the figures of all cases."""
-    found = []
-    for k, case in enumerate(CASES):
-        progress(f"coverage: {case.name}", k, len(CASES))
-        found.append(run(case, seeds))
-    return found
+def summed(case: Case, found: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Return the figures of a case; silent are sensors whose intervals hold too little on a day, without a warning."""
+    fitted = [one for one in found if one["inside"] is not None]
+    columns = {key: np.array([one[key] for one in fitted]) for key in ("inside", "half_width")}
+    inside, half = (np.round(columns[key].mean(axis=0), 4).tolist() for key in ("inside", "half_width"))
+    errors = np.round(columns["inside"].std(axis=0, ddof=1) / np.sqrt(len(fitted)), 4).tolist()
+    return {
+        "case": case.name,
+        "inside": inside,
+        "inside_error": errors,
+        "half_width": half,
+        "warned": sum(one["warned"] for one in found),
+        "step": sum(one["step"] for one in found),
+        "silent": sum(min(one["inside"]) < ENOUGH and not one["warned"] for one in fitted),
+        "refused": len(found) - len(fitted),
+        "count": len(found),
+    }
 
 
 def main() -> None:
@@ -156,16 +183,23 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=SEEDS, help="sensors of each case")
     given = parser.parse_args()
     seeds = range(given.first, given.first + given.seeds)
-    print(f"| sensor | its last day, % inside {100 * SHARE:.0f} % | ± mm | day after | ± mm | warned of |")
-    print("|---|---|---|---|---|---|")
+    print(f"| {HEADER} |")
+    print(f"|{'---|' * len(HEADER.split(' | '))}")
     for case in CASES:
-        print(f"| {' | '.join(row_of(run(case, seeds)))} |", flush=True)
+        print(f"| {' | '.join(row_of(summed(case, [one_sensor(case, seed) for seed in seeds])))} |", flush=True)
+
+
+HEADER = (
+    f"sensor | its last day, % inside {100 * SHARE:.0f} % | ± mm | day after, % | ± mm | warned of | step told | silent"
+)
+"""Of the table."""
 
 
 def row_of(one: dict[str, Any]) -> list[str]:
     """Return the cells of a case."""
-    cells = [f"{100 * a:.1f} | {b:.3f}" for a, b in zip(one["inside"], one["half_width"], strict=True)]
-    return [one["case"], *cells, f"{one['warned']} of {one['count']}"]
+    columns = zip(one["inside"], one["inside_error"], one["half_width"], strict=True)
+    cells = [f"{100 * a:.1f} +- {100 * e:.1f} | {b:.3f}" for a, e, b in columns]
+    return [one["case"], *cells, f"{one['warned']} of {one['count']}", f"{one['step']}", f"{one['silent']}"]
 
 
 if __name__ == "__main__":

@@ -6,7 +6,6 @@ and the intervals of the fit to all of it are held against what was wished.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -77,13 +76,3 @@ def _measured(chance: np.random.Generator, case: Case, z: Values, V: Values, T: 
 def _as_measurements(rows: list[Values]) -> Measurements:
     d, V, T, days = np.concatenate(rows, axis=1)
     return Measurements(d, V, T, "emulated", tuple(days.astype(int).tolist()))
-
-
-def all_cases(first: int, progress: Callable[[str, int, int], None]) -> list[dict[str, Any]]:
-    """Return what became of the plans of all cases, with seeds from `first` on."""
-    rows = []
-    for k, case in enumerate(CASES):
-        for seed in range(first, first + EACH):
-            progress("advice", k * EACH + seed - first, EACH * len(CASES))
-            rows.append(one_case(*case, seed))
-    return rows

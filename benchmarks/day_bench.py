@@ -7,8 +7,8 @@ proof, and the run is evaluated with it, in double precision and in the integers
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from examples.wear_campaign import hardware
 from examples.wear_campaign.bench import PAPER_FILTER
-from examples.wear_campaign.methods import PRIOR, Made, Worth, judged, measured, measured_by
+from examples.wear_campaign.methods import PRIOR, measured, on_day
 
 from sosmith.gen.calibration.fit import Measurements
 from sosmith.gen.core import CoreDesign
@@ -24,13 +24,19 @@ from sosmith.gen.reload.reload import check_swap, other_set
 from sosmith.gen.stimuli.core import bench_of
 from sosmith.instrument.calibration.acceptance import DEFAULT_RANGES
 from sosmith.instrument.calibration.bayesian_fit import BayesianFit, bayesian_fit
-from sosmith.instrument.calibration.coefficient_covariance import of_bayes
-from sosmith.instrument.calibration.uncertainty import of_posterior
-from sosmith.instrument.scenarios.file import ScenarioFile, emulate_file, load_scenario
+from sosmith.instrument.calibration.mixed_effects.steps import step_of
+from sosmith.instrument.calibration.uncertainty import reading_half_width
+from sosmith.instrument.scenarios.file import ScenarioFile, emulate_file
 from sosmith.instrument.sensors.inductive_sensor import InductiveState
+from sosmith.instrument.uncertainty.instrument_budget import noise_gain, slopes
 from sosmith.model.arithmetic.random_streams import streams
+from sosmith.model.arrays import Values
+from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.dataflow.stacked import compute_stacked
 from sosmith.model.errors import ShortfallError
 from sosmith.model.reference.accuracy import accuracy_percent
+from sosmith.model.reference.golden import filtered
+from sosmith.model.traces.trace import Trace
 
 SCENARIOS = Path(__file__).parents[1] / "examples" / "scenarios"
 RUNS = ("bench_43_50", "bench_92_96")
@@ -62,6 +68,15 @@ UNCERTAINTY = {"noise": 0.048, "temperature": 0.3, "voltage": 0.0, "clearance_ra
 
 MAX_ERROR, SET_ERROR = 0.0005, Fraction(1, 1000)
 """Allowed error in mm of the hardware as it is made, and with a set that is loaded."""
+
+HELD_DAYS = {"none": 20, "three": 5, "five": 5}
+"""Days whose readings are held against their intervals: that of the run and those after it, each with the targets of
+its own morning. All readings of a day share its error, so that one day says little about how often intervals hold.
+The sensors of the bench do not age; what the calibration allows for their ageing counts all the same."""
+
+AT_RAIL = 0.01
+"""Share of a reading from which on samples at the rail spoil it: the hardware flags those (`input_at_rail`), and no
+interval is claimed. It counts for the accuracy all the same."""
 
 FACTORY_SEED = 8999
 """Of the sensor whose day the hardware is made with: its own curve is of the highest order."""
@@ -114,44 +129,117 @@ def hardware_of(scenario: ScenarioFile, folder: Path) -> CoreDesign:
     )
 
 
+@dataclass(frozen=True, eq=False)
+class Day:
+    """A day's readings, with its calibration and the hardware's datapath with that; None if the set was refused."""
+
+    trace: Trace
+    made: BayesianFit
+    datapath: Datapath | None
+    bound: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """Readings of one day, shape (n,): their errors in mm, half-widths of intervals, and where these are claimed.
+
+    `by_hardware` are the errors of the hardware's integers; None if the set was refused.
+    """
+
+    off: Values
+    half: Values
+    claimed: Values
+    by_hardware: Values | None
+
+    def inside(self, off: Values) -> float:
+        """Return the share of the claimed intervals that hold; NaN if there are none."""
+        return float(np.mean((np.abs(off) <= self.half)[self.claimed])) if self.claimed.any() else float("nan")
+
+
+def held(core: CoreDesign, day: Day, codes: Values | None) -> Held:
+    """Hold readings against their intervals, in double precision and by the integers of the hardware (`codes`).
+
+    The interval of a reading is that of the calibration at its voltage and temperature, with the noise that the filter
+    lets through and what is stated of the thermometer.
+    """
+    trace, polynomial, bench = day.trace, day.made.fit.polynomial, bench_of(core)
+    sos, steady = core.quantized.filter.sos, core.quantized.steady
+    V, T = (port.decode(trace.codes[:, k]) for k, port in enumerate(bench.ports))
+    clearance = filtered(polynomial(V, T), sos, bench.output, steady=steady)
+    voltage, at = core.datapath.inputs[0], trace.reading
+    at_rail = np.isin(trace.codes[:, 0], (voltage.lowest, voltage.highest)).astype(np.float64)
+    spoilt = np.abs(filtered(at_rail, sos, bench.output, steady=steady)) > AT_RAIL
+    V, T = V[at], T[at]
+    by_voltage, by_temperature = slopes(polynomial, V, T)
+    noise = UNCERTAINTY["noise"] * noise_gain(core.quantized.filter)
+    beside = (noise * by_voltage) ** 2 + (UNCERTAINTY["temperature"] * by_temperature) ** 2
+    half = reading_half_width(day.made, V, T, beside)
+    by_hardware = None if codes is None else (core.datapath.output.decode(codes) - trace.truth)[at]
+    return Held((clearance - trace.truth)[at], half, ~spoilt[at], by_hardware)
+
+
+def days_of(scenario: ScenarioFile, core: CoreDesign, seed: int, name: str) -> Iterator[Day]:
+    """Yield the day of the run and those after it, each calibrated; a set that stays is proven once."""
+    (excerpt,) = scenario.document.excerpt
+    day: Day | None = None
+    for k in range(HELD_DAYS[name]):
+        here = on_day(scenario, excerpt.day + k)
+        trace = emulate_file(here, bench_of(core), seed=seed)
+        if day is None or TARGETS[name]:
+            _, made = calibrated(here, seed, TARGETS[name])
+            day = Day(trace, made, *loaded(core, made))
+        else:
+            date = here.document.start.toordinal() + int(excerpt.day) + k
+            day = replace(day, trace=trace, made=for_day(day.made, date))
+        yield day
+
+
 def one_run(scenario: ScenarioFile, core: CoreDesign, seed: int) -> Iterator[dict[str, Any]]:
-    """Yield the figures of one run for each number of targets."""
-    trace = emulate_file(scenario, bench_of(core), seed=seed)
-    for name, clearances in TARGETS.items():
-        measurements, made = calibrated(scenario, seed, clearances)
-        worth = Worth(of_bayes(measurements, made), of_posterior(measurements, made).half_width)
-        polynomial = made.fit.polynomial
-        found = judged(Made(polynomial, polynomial.orders[0], worth, made.plain), trace, core)
-        _, _, smooth = measured_by(Made(polynomial, polynomial.orders[0]), trace, core)
-        off = (smooth - trace.truth)[trace.reading]
-        row = {"run": scenario.path.stem, "targets": name, "seed": seed, "order": polynomial.orders[0]}
-        row |= {key: round(found[key], 4) for key in ("accuracy", "inside", "half_width")}
-        row |= {"rms": round(float(np.sqrt(np.mean(off**2))), 4)}
-        yield row | loaded(core, made, trace)
+    """Yield the figures of one run for each number of targets; intervals are held against the days after it, too."""
+    every = [(name, day) for name in TARGETS for day in days_of(scenario, core, seed, name)]
+    taken = [day for _, day in every if day.datapath is not None]
+    sets = [day.datapath for day in taken if day.datapath is not None]
+    results = compute_stacked(sets, np.stack([day.trace.codes for day in taken], axis=1))
+    codes = {id(day): results[:, k] for k, day in enumerate(taken)}
+    for name in TARGETS:
+        days = [day for own, day in every if own == name]
+        found = [held(core, day, codes.get(id(day))) for day in days]
+        row: dict[str, Any] = {"run": scenario.path.stem, "targets": name, "seed": seed}
+        row |= figures(days[0], found[0])
+        for key, shares in (
+            ("inside", [one.inside(one.off) for one in found]),
+            ("inside_hardware", [one.inside(one.by_hardware) for one in found if one.by_hardware is not None]),
+            ("half_width", [float(one.half[one.claimed].mean()) for one in found if one.claimed.any()]),
+            ("claimed", [float(one.claimed.mean()) for one in found]),
+        ):
+            row[key] = round(float(np.nanmean(shares)), 4)
+        yield row
 
 
-def loaded(core: CoreDesign, made: BayesianFit, trace: Any) -> dict[str, Any]:
-    """Load a calibration into the hardware: its accuracy in integers and proven bound, or why it is refused."""
+def for_day(made: BayesianFit, date: int) -> BayesianFit:
+    """Return a calibration for a later day without measurements: the same curve, as far as it may have drifted."""
+    posterior = made.posterior
+    later = made.model.posterior(posterior.scatters, posterior.curves, date)
+    return replace(made, posterior=later, step=step_of(made.model, later, date))
+
+
+def figures(day: Day, first: Held) -> dict[str, Any]:
+    """Return order, bound, accuracy in % and rms in mm of the run."""
+    trace, clearance = day.trace, day.trace.truth.copy()
+    row: dict[str, Any] = {"order": day.made.fit.polynomial.orders[0], "bound": day.bound, "hardware": None}
+    row |= {"rms": round(float(np.sqrt(np.mean(first.off**2))), 4)}
+    for name, off in (("accuracy", first.off), ("hardware", first.by_hardware)):
+        if off is not None:
+            clearance[trace.reading] = trace.truth[trace.reading] + off
+            row[name] = round(accuracy_percent(clearance, trace.truth, trace.reading), 4)
+    return row
+
+
+def loaded(core: CoreDesign, made: BayesianFit) -> tuple[Datapath | None, float | None]:
+    """Load a calibration into the hardware: its datapath and proven bound in mm; None if it is refused."""
     try:
         swap = check_swap(core, None, other_set(core, polynomial=made.fit.polynomial, max_error=SET_ERROR))
-    except ShortfallError as error:
-        return {"hardware": None, "refused": str(error)}
-    datapath = swap.made.quantized.datapath
-    clearance = datapath.output.decode(datapath.compute(trace.codes))
-    bound = float(swap.made.quantized.bound * datapath.output.lsb)
-    return {
-        "hardware": round(accuracy_percent(clearance, trace.truth, trace.reading), 4),
-        "bound": round(bound, 7),
-    }
-
-
-def all_runs(seeds: range, folder: Path, progress: Callable[[str, int, int], None]) -> list[dict[str, Any]]:
-    """Return the figures of all runs."""
-    rows: list[dict[str, Any]] = []
-    for number, name in enumerate(RUNS):
-        scenario = load_scenario(SCENARIOS / f"{name}.toml")
-        core = hardware_of(scenario, folder / name)
-        for k, seed in enumerate(seeds):
-            progress(f"bench: {name}", number * len(seeds) + k, len(RUNS) * len(seeds))
-            rows += one_run(scenario, core, seed)
-    return rows
+    except ShortfallError:
+        return None, None
+    quantized = swap.new_set.quantized
+    return quantized.datapath, round(float(quantized.bound * quantized.datapath.output.lsb), 7)

@@ -7,13 +7,13 @@ double precision and by the integers of the hardware with the curve of the day.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from benchmarks.day_bench import SCENARIOS, SET_ERROR, TYPE, hardware_of, with_targets
+import numpy.typing as npt
+from benchmarks.day_bench import SET_ERROR, TYPE, with_targets
 from examples.wear_campaign.methods import measured
 from scipy.signal import sosfilt
 
@@ -24,13 +24,14 @@ from sosmith.instrument.calibration.acceptance import DEFAULT_RANGES
 from sosmith.instrument.calibration.bayesian_fit import bayesian_fit
 from sosmith.instrument.calibration.mixed_effects.day_polynomial import polynomial_of
 from sosmith.instrument.calibration.mixed_effects.following_day import Following
-from sosmith.instrument.calibration.mixed_effects.model import Posterior
-from sosmith.instrument.scenarios.file import ScenarioFile, load_scenario
+from sosmith.instrument.calibration.mixed_effects.model import Posterior, mixture_half_width
+from sosmith.instrument.scenarios.file import ScenarioFile
 from sosmith.instrument.uncertainty.instrument_budget import slopes
 from sosmith.instrument.wear.state_space import DayReading, DayState, WearModel, filtered
 from sosmith.model.arithmetic.random_streams import streams
 from sosmith.model.arrays import Values
 from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.dataflow.stacked import compute_stacked
 from sosmith.model.errors import ShortfallError
 from sosmith.model.polynomial import Polynomial
 from sosmith.model.reference.golden import filtered as smooth
@@ -50,21 +51,34 @@ SAMPLES, KEPT = 60, 30
 SUM_KNOWN_TO = 0.03
 """Standard uncertainty in mm of the sum of both clearances, new each day."""
 
-SHARE = 0.95
-
-THROUGH_HARDWARE = 10
-"""Axles whose readings are computed by the integers of the hardware, too: each set is proven and compiled."""
+SHARE, NORMAL = 0.95, 1.959964
+"""Probability of the intervals, and their half-width in standard deviations of a normal distribution."""
 
 
 @dataclass(frozen=True, eq=False)
 class Wheel:
-    """One wheel in service: true clearance, readings and their uncertainty on each day, shape (days,), in mm."""
+    """One wheel in service, over the days; lengths in mm.
+
+    Attributes
+    ----------
+    true, double, uncertainty : ndarray, shape (days,)
+        Clearance, reading in double precision, and standard uncertainty of what is new each day.
+    shared : float
+        Standard uncertainty that the readings of all days share.
+    codes : ndarray, shape (samples, days, 2)
+        What the hardware took.
+    sets : list of Datapath
+        Its datapath on each day.
+    refused : int
+        Sets that the hardware refused: it went on with that of the day before.
+    """
 
     true: Values
     double: Values
-    hardware: Values | None
     uncertainty: Values
     shared: float
+    codes: npt.NDArray[np.int64]
+    sets: list[Datapath]
     refused: int
 
 
@@ -76,7 +90,7 @@ def true_clearances(seed: int) -> Values:
 
 
 def in_service(
-    scenario: ScenarioFile, core: CoreDesign, seed: int, wheel: int, true: Values, *, targets: bool, loaded: bool
+    scenario: ScenarioFile, core: CoreDesign, seed: int, wheel: int, true: Values, *, targets: bool
 ) -> Wheel:
     """Read one wheel over the days; with `targets`, two gauges of whole millimetres about it are read each morning."""
     sensor = 2 * seed + wheel
@@ -89,9 +103,8 @@ def in_service(
     )
     so_far = Following(before, max(known.days))
     chance = streams(sensor, "service of a wheel")
-    found: dict[str, list[float]] = {"double": [], "hardware": [], "uncertainty": []}
+    double, uncertainty, shared, taken, sets = list[float](), list[float](), list[float](), [], list[Datapath]()
     polynomial: Polynomial | None = None
-    shared: list[float] = []
     refused, expected, noise = 0, float(true[0]), reading_noise(core, scenario.sensors.inductive.noise)
     datapath = core.datapath
     for k, clearance in enumerate(true.tolist()):
@@ -106,20 +119,33 @@ def in_service(
             so_far = so_far.without(day)
         if targets or polynomial is None:
             polynomial, _ = polynomial_of(so_far.posterior, known, made.region, DEFAULT_RANGES)
-            if loaded:
-                datapath, refusal = _loaded(core, polynomial, datapath)
-                refused += refusal
+            datapath, refusal = _loaded(core, polynomial, datapath)
+            refused += refusal
         V, T, codes = _read(scenario, core, state, clearance, chance, k)
         values = smooth(polynomial(V, T), core.quantized.filter.sos, core.datapath.output, steady=core.quantized.steady)
         expected = float(np.mean(values[-KEPT:]))
-        found["double"].append(expected)
-        if loaded:
-            found["hardware"].append(float(np.mean(datapath.output.decode(datapath.compute(codes))[-KEPT:])))
         new, common = _uncertainty(so_far.posterior, polynomial, V[-1:], T[-1:], noise)
-        found["uncertainty"].append(new)
-        shared.append(common)
-    columns = {name: np.array(values) if values else None for name, values in found.items()}
-    return Wheel(true=true, shared=float(np.mean(shared)), refused=refused, **columns)
+        for values_so_far, value in ((double, expected), (uncertainty, new), (shared, common)):
+            values_so_far.append(value)
+        taken.append(codes)
+        sets.append(datapath)
+    return Wheel(
+        true=true,
+        double=np.array(double),
+        uncertainty=np.array(uncertainty),
+        shared=float(np.mean(shared)),
+        codes=np.stack(taken, axis=1),
+        sets=sets,
+        refused=refused,
+    )
+
+
+def by_hardware(core: CoreDesign, wheels: Sequence[Wheel]) -> list[Values]:
+    """Return the readings of each wheel by the integers of the hardware in mm, all days of all wheels at once."""
+    sets = [one for wheel in wheels for one in wheel.sets]
+    results = compute_stacked(sets, np.concatenate([wheel.codes for wheel in wheels], axis=1))
+    read = core.datapath.output.decode(results[-KEPT:]).mean(axis=0)
+    return np.split(read, len(wheels))
 
 
 def _loaded(core: CoreDesign, polynomial: Polynomial, before: Datapath) -> tuple[Datapath, bool]:
@@ -128,7 +154,7 @@ def _loaded(core: CoreDesign, polynomial: Polynomial, before: Datapath) -> tuple
         swap = check_swap(core, None, other_set(core, polynomial=polynomial, max_error=SET_ERROR))
     except ShortfallError:
         return before, True
-    return swap.made.quantized.datapath, False
+    return swap.new_set.quantized.datapath, False
 
 
 def _read(
@@ -156,17 +182,17 @@ def _uncertainty(
     """Return the standard uncertainty in mm of a reading that is new on its day, and that which the days share.
 
     The sensor's deviations are the same on all days; the error of the day is new, as far as its targets leave it open,
-    and so are what the polynomial misses of the day's curve and the noise of the reading, in V.
+    and so are what the polynomial misses of the day's curve and the noise of the reading, in V. How large an error of
+    a day is, ten days do not say for certain: what is new is that of the normal distribution with the same interval.
     """
     mean, of_curve, of_day = posterior.predicted_parts(V, T)
     off = mean - polynomial(V, T)[:, None]
     deviations = len(posterior.mean)
     shared = np.sum(of_curve[:deviations] ** 2, axis=0)
-    new = np.sum(of_curve[deviations:] ** 2, axis=0) + of_day + off**2
-    weigh = posterior.scatters.variance_of
     by_voltage, _ = slopes(polynomial, V, T)
-    whole = float(weigh(new)[0]) + (noise * float(by_voltage[0])) ** 2
-    return float(np.sqrt(whole)), float(np.sqrt(weigh(shared)[0]))
+    new = np.sum(of_curve[deviations:] ** 2, axis=0) + of_day + off**2 + (noise * float(by_voltage[0])) ** 2
+    half = mixture_half_width(np.zeros_like(new), new, posterior.scatters.of_intervals, SHARE)
+    return float(half[0]) / NORMAL, float(np.sqrt(posterior.scatters.variance_of(shared)[0]))
 
 
 def reading_noise(core: CoreDesign, noise: float) -> float:
@@ -182,19 +208,17 @@ def reading_noise(core: CoreDesign, noise: float) -> float:
 WAYS = ("readings", "filter", "sum", "filter and sum")
 
 
-def judged(wheels: tuple[Wheel, Wheel], seed: int, column: str) -> dict[str, dict[str, float]]:
-    """Return accuracy in %, rms in mm and the share of intervals that hold, of each way to use the readings."""
+def judged(wheels: Sequence[Wheel], read: Values, seed: int) -> dict[str, dict[str, float]]:
+    """Return accuracy in %, rms in mm and the share of intervals that hold, of each way to use readings (2, days)."""
     true = np.array([wheel.true for wheel in wheels])
-    read = np.array([getattr(wheel, column) for wheel in wheels])
     spread = np.array([wheel.uncertainty for wheel in wheels])
     shared = np.array([[wheel.shared] for wheel in wheels])
     total = true.sum(axis=0) + streams(seed, "service")("sum").normal(0.0, SUM_KNOWN_TO, DAYS)
     whole = np.hypot(spread, shared)
-    z = 1.959964
-    found = {"readings": _of(read, true, np.abs(read - true) <= z * whole)}
+    found = {"readings": _of(read, true, np.abs(read - true) <= NORMAL * whole)}
     share = whole**2 / ((whole**2).sum(axis=0) + SUM_KNOWN_TO**2)
     summed = read + share * (total - read.sum(axis=0))
-    found["sum"] = _of(summed, true, np.abs(summed - true) <= z * whole * np.sqrt(1 - share))
+    found["sum"] = _of(summed, true, np.abs(summed - true) <= NORMAL * whole * np.sqrt(1 - share))
     model = WearModel(shared=float(np.mean(shared)))
     for name, known in (("filter", None), ("filter and sum", total)):
         days = [
@@ -229,24 +253,20 @@ def _of(values: Values, true: Values, inside: Any) -> dict[str, float]:
     }
 
 
-def one_service(scenario: ScenarioFile, core: CoreDesign, seed: int, *, loaded: bool) -> list[dict[str, Any]]:
+def one_service(scenario: ScenarioFile, core: CoreDesign, seed: int) -> list[dict[str, Any]]:
     """Return the figures of one axle, by targets, by arithmetic and by way."""
-    rows = []
-    for targets in (False, True):
-        true = true_clearances(seed)
-        wheels = tuple(in_service(scenario, core, seed, w, true[w], targets=targets, loaded=loaded) for w in range(2))
+    rows, true = [], true_clearances(seed)
+    each = [
+        [in_service(scenario, core, seed, w, true[w], targets=targets) for w in range(2)] for targets in (False, True)
+    ]
+    hardware = by_hardware(core, [wheel for wheels in each for wheel in wheels])
+    for targets, wheels in enumerate(each):
         refused = sum(wheel.refused for wheel in wheels)
-        for column in ("double", "hardware") if loaded else ("double",):
-            for way, one in judged((wheels[0], wheels[1]), seed, column).items():
-                rows.append({"seed": seed, "targets": targets, "by": column, "way": way, "refused": refused} | one)
-    return rows
-
-
-def all_services(seeds: range, folder: Path, progress: Callable[[str, int, int], None]) -> list[dict[str, Any]]:
-    """Return the figures of all axles."""
-    scenario = load_scenario(SCENARIOS / f"{SCENARIO}.toml")
-    core, rows = hardware_of(scenario, folder / "service"), []
-    for k, seed in enumerate(seeds):
-        progress("service", k, len(seeds))
-        rows += one_service(scenario, core, seed, loaded=k < THROUGH_HARDWARE)
+        readings = {
+            "double": np.array([wheel.double for wheel in wheels]),
+            "hardware": np.array(hardware[2 * targets : 2 * targets + 2]),
+        }
+        for by, read in readings.items():
+            for way, one in judged(wheels, read, seed).items():
+                rows.append({"seed": seed, "targets": bool(targets), "by": by, "way": way, "refused": refused} | one)
     return rows

@@ -2,28 +2,35 @@
 
 The bench with reference targets on the morning of the run, 26 days of service with and without targets and filter, both
 in double precision and by the integers of the proven hardware; what is told of jumps and rates, and missed at the
-limit; whether plans of `advise` keep their promise, and intervals for sensors that are not as
-their type. Takes about half an hour of processor time. With --document,
-records it in benchmarks/days.json and renews docs/days.md; --part measures one part anew and takes the others from
-the record.
+limit; whether plans of `advise` keep their promise, and intervals for sensors that are not as their type. Takes about
+half an hour of a processor, shared by two processes. With --document, records it in benchmarks/days.json and renews
+docs/days.md; --part measures some parts only and takes the others from the record.
+
+What is measured is kept in the folder -o, each run by itself, with a digest of the code that it was measured by: called
+again, the command goes on where it was, and measures anew what the code has changed for. Seeds are given, so that the
+record is the same whatever the number of processes.
 """
 
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
-from collections.abc import Callable
+import multiprocessing
+import os
+from collections.abc import Iterable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from benchmarks.calibration_coverage import all_sensors
-from benchmarks.day_advice import all_cases
-from benchmarks.day_alarms import all_alarms
-from benchmarks.day_bench import all_runs
+from benchmarks import calibration_coverage, day_advice, day_alarms
+from benchmarks.day_bench import RUNS, SCENARIOS, hardware_of, one_run
 from benchmarks.day_page import page
-from benchmarks.day_service import all_services
+from benchmarks.day_service import SCENARIO, one_service
 
+from sosmith.gen.core import CoreDesign
+from sosmith.instrument.scenarios.file import ScenarioFile, load_scenario
 from sosmith.model.text_files import write_contents
 from sosmith.terminal import show_progress
 
@@ -34,28 +41,121 @@ PAGE = HERE.parent / "docs" / "days.md"
 SEEDS = 40
 """Runs of each kind on the bench, and axles in service."""
 
-SENSORS = 20
+SENSORS = 40
 """Sensors of each kind that is not as its type."""
 
-FIRST_SEEDS = {"bench": 9001, "service": 9101, "alarms": 9201, "advice": 9301, "coverage": 9401}
+FIRST_SEEDS = {"bench": 19001, "service": 19101, "alarms": 19201, "advice": 19301, "coverage": 19401}
 """None of these seeds was used while building."""
 
+PROCESSES = 2
 
-def measured(parts: list[str], earlier: dict[str, Any], folder: Path, step: Callable[[str, int, int], None]) -> Any:
+_MODEL = ("model/*.py", "model/*/*.py")
+_CALIBRATION = ("instrument/calibration/**/*.py", "gen/calibration/*.py", "instrument/sensors/*.py")
+_HARDWARE = ("gen/**/*.py", "instrument/**/*.py", "examples/wear_campaign/*.py", "examples/scenarios/bench_*.toml")
+CODE = {
+    "bench": ("benchmarks/day_bench.py", *_HARDWARE, *_MODEL),
+    "service": ("benchmarks/day_bench.py", "benchmarks/day_service.py", *_HARDWARE, *_MODEL),
+    "alarms": ("benchmarks/day_alarms.py", "instrument/wear/state_space.py"),
+    "advice": ("benchmarks/day_advice.py", "benchmarks/calibration_coverage.py", *_CALIBRATION, *_MODEL),
+    "coverage": ("benchmarks/calibration_coverage.py", *_CALIBRATION, *_MODEL),
+}
+"""Files by which each part is measured, from the folder of the repository."""
+
+Task = tuple[str, Any, int]
+"""A part, what of it is measured, and the seed."""
+
+
+def tasks_of(part: str) -> list[Task]:
+    """Return what a part consists of."""
+    first = FIRST_SEEDS[part]
+    if part == "alarms":
+        return [(part, step, first) for step in day_alarms.steps()]
+    kinds: dict[str, tuple[Iterable[Any], int]] = {
+        "bench": (RUNS, SEEDS),
+        "service": (("",), SEEDS),
+        "advice": (range(len(day_advice.CASES)), day_advice.EACH),
+        "coverage": (range(len(calibration_coverage.CASES)), SENSORS),
+    }
+    some, seeds = kinds[part]
+    return [(part, one, seed) for one in some for seed in range(first, first + seeds)]
+
+
+@cache
+def digest_of(part: str) -> str:
+    """Return a digest of the code that measures a part."""
+    found = hashlib.sha256()
+    for path in sorted({path for pattern in CODE[part] for path in HERE.parent.glob(pattern)}):
+        found.update(path.name.encode() + path.read_bytes())
+    return found.hexdigest()
+
+
+@cache
+def bench(name: str, folder: Path) -> tuple[ScenarioFile, CoreDesign]:
+    """Return a scenario and the hardware that reads it, designed once in a process."""
+    scenario = load_scenario(SCENARIOS / f"{name}.toml")
+    return scenario, hardware_of(scenario, folder / f"{name}-{os.getpid()}")
+
+
+def measured_one(task: Task, folder: Path) -> Any:
+    """Measure one task."""
+    part, what, seed = task
+    if part == "bench":
+        return list(one_run(*bench(what, folder), seed))
+    if part == "service":
+        return one_service(*bench(SCENARIO, folder), seed)
+    if part == "alarms":
+        return day_alarms.one_step(what, seed)
+    if part == "advice":
+        return day_advice.one_case(*day_advice.CASES[what], seed)
+    return calibration_coverage.one_sensor(calibration_coverage.CASES[what], seed)
+
+
+def kept(task: Task, folder: Path) -> Any:
+    """Return a task's figures from the folder, or measure them and keep them there."""
+    path = folder / task[0] / f"{hashlib.sha256(json.dumps(task).encode()).hexdigest()[:24]}.json"
+    code = digest_of(task[0])
+    if path.exists():
+        found = json.loads(path.read_text(encoding="utf-8"))
+        if found["code"] == code:
+            return found["figures"]
+    figures = measured_one(task, folder)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_contents(path.parent, {path.name: json.dumps({"task": task, "code": code, "figures": figures}).encode()})
+    return json.loads(json.dumps(figures))
+
+
+def _kept(given: tuple[Task, Path]) -> tuple[Task, Any]:
+    return given[0], kept(*given)
+
+
+def measured(parts: list[str], earlier: dict[str, Any], folder: Path, processes: int) -> dict[str, Any]:
     """Return the record, with these parts measured anew."""
+    every = [task for part in parts for task in tasks_of(part)]
+    rows: dict[Task, Any] = {}
+    folder.mkdir(parents=True, exist_ok=True)
+    with show_progress() as step, multiprocessing.get_context("spawn").Pool(processes) as pool:
+        for number, (task, figures) in enumerate(pool.imap(_kept, [(task, folder) for task in every])):
+            step(task[0], number, len(every))
+            rows[task] = figures
     found = dict(earlier)
-    seeds = {name: range(first, first + SEEDS) for name, first in FIRST_SEEDS.items()}
-    if "bench" in parts:
-        found["bench"] = summed(all_runs(seeds["bench"], folder, step), ("run", "targets"))
-    if "service" in parts:
-        found["service"] = of_services(all_services(seeds["service"], folder, step))
-    if "alarms" in parts:
-        found["alarms"] = all_alarms(FIRST_SEEDS["alarms"], step)
-    if "advice" in parts:
-        found["advice"] = all_cases(FIRST_SEEDS["advice"], step)
-    if "coverage" in parts:
-        found["coverage"] = all_sensors(range(FIRST_SEEDS["coverage"], FIRST_SEEDS["coverage"] + SENSORS), step)
+    for part in parts:
+        found[part] = _summed(part, {task: rows[task] for task in tasks_of(part)})
     return found
+
+
+def _summed(part: str, rows: dict[Task, Any]) -> Any:
+    if part == "bench":
+        return summed([row for some in rows.values() for row in some], ("run", "targets"))
+    if part == "service":
+        return of_services([row for some in rows.values() for row in some])
+    if part == "alarms":
+        return day_alarms.summed({step: figures for (_, step, _), figures in rows.items()})
+    if part == "advice":
+        return list(rows.values())
+    return [
+        calibration_coverage.summed(case, [figures for (_, k, _), figures in rows.items() if k == number])
+        for number, case in enumerate(calibration_coverage.CASES)
+    ]
 
 
 def summed(rows: list[dict[str, Any]], keys: tuple[str, ...]) -> list[dict[str, Any]]:
@@ -66,7 +166,7 @@ def summed(rows: list[dict[str, Any]], keys: tuple[str, ...]) -> list[dict[str, 
     found = []
     for key, some in groups.items():
         one: dict[str, Any] = dict(zip(keys, key, strict=True)) | {"count": len(some)}
-        for name in ("accuracy", "hardware", "rms", "inside", "half_width"):
+        for name in ("accuracy", "hardware", "rms", "inside", "inside_hardware", "half_width", "claimed"):
             values = [row[name] for row in some if row.get(name) is not None]
             if values:
                 one[name] = round(float(np.mean(values)), 4)
@@ -74,7 +174,7 @@ def summed(rows: list[dict[str, Any]], keys: tuple[str, ...]) -> list[dict[str, 
         one["worst"] = round(min(row["accuracy"] for row in some), 2)
         if "order" in some[0]:
             one["refused"] = sum(row["hardware"] is None for row in some)
-            one["bound"] = max(row.get("bound", 0.0) for row in some)
+            one["bound"] = max(row["bound"] or 0.0 for row in some)
             one["orders"] = sorted(row["order"] for row in some)
             differences = [abs(row["hardware"] - row["accuracy"]) for row in some if row["hardware"] is not None]
             one["off"] = round(max(differences), 4)
@@ -85,20 +185,18 @@ def summed(rows: list[dict[str, Any]], keys: tuple[str, ...]) -> list[dict[str, 
 
 
 def of_services(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Return the figures of the services in double precision, with those of the axles that the hardware read, too."""
-    found = summed([row for row in rows if row["by"] == "double"], ("targets", "way"))
-    for one in found:
-        alike = [row for row in rows if (row["targets"], row["way"]) == (one["targets"], one["way"])]
-        by_hardware = {row["seed"]: row for row in alike if row["by"] == "hardware"}
-        both = [
-            (row, by_hardware[row["seed"]]) for row in alike if row["by"] == "double" and row["seed"] in by_hardware
+    """Return the figures of the services in double precision, with those of the hardware's integers."""
+    found, by_hardware = (
+        summed([row for row in rows if row["by"] == by], ("targets", "way")) for by in ("double", "hardware")
+    )
+    own = {(row["seed"], row["targets"], row["way"]): row for row in rows if row["by"] == "hardware"}
+    for one, other in zip(found, by_hardware, strict=True):
+        alike = [
+            row for row in rows if (row["by"], row["targets"], row["way"]) == ("double", one["targets"], one["way"])
         ]
-        one["axles"] = len(both)
-        one["same"], one["hardware"] = (
-            round(float(np.mean([pair[k]["accuracy"] for pair in both])), 4) for k in (0, 1)
-        )
-        one["inside_hardware"] = round(float(np.mean([own["inside"] for _, own in both])), 4)
-        one["off"] = round(max(abs(own["accuracy"] - row["accuracy"]) for row, own in both), 4)
+        off = [abs(own[row["seed"], row["targets"], row["way"]]["accuracy"] - row["accuracy"]) for row in alike]
+        one |= {"hardware": other["accuracy"], "inside_hardware": other["inside"], "off": round(max(off), 4)}
+        one["inside_hardware_error"] = other["inside_error"]
     return found
 
 
@@ -108,13 +206,13 @@ def main() -> None:
     parser.add_argument("--document", action="store_true", help="record, and renew docs/days.md")
     parser.add_argument("--recorded", action="store_true", help="do not measure: renew the page from the record")
     parser.add_argument("--part", action="append", choices=tuple(FIRST_SEEDS), help="measure this part only")
-    parser.add_argument("-o", "--output", type=Path, default=Path("build/days"), help="folder for specifications")
+    parser.add_argument("-o", "--output", type=Path, default=Path("build/days"), help="folder of what is measured")
+    parser.add_argument("--processes", type=int, default=PROCESSES, help=f"[default: {PROCESSES}]")
     arguments = parser.parse_args()
     earlier = json.loads(RECORD.read_text(encoding="utf-8")) if RECORD.exists() else {}
     found = earlier
     if not arguments.recorded:
-        with show_progress() as step:
-            found = measured(arguments.part or list(FIRST_SEEDS), earlier, arguments.output, step)
+        found = measured(arguments.part or list(FIRST_SEEDS), earlier, arguments.output, arguments.processes)
     text = json.dumps(found, indent=1) + "\n"
     if not (arguments.document or arguments.recorded):
         print(text, end="")

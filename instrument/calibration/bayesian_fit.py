@@ -41,6 +41,7 @@ from sosmith.instrument.calibration.mixed_effects.model import (
     Scatters,
     rows_of,
 )
+from sosmith.instrument.calibration.mixed_effects.steps import Step, step_of
 from sosmith.instrument.calibration.mixed_effects.systematic_error import SystematicCurves
 from sosmith.instrument.calibration.rails import Rails, rails_of
 from sosmith.instrument.calibration.sensor_type import DEVIATIONS, MOST_ORDER, SYSTEMATIC_FACTOR, SensorType
@@ -90,6 +91,8 @@ class BayesianFit:
         Region of the measurements, without those at a rail inside the range: nothing is calibrated there.
     clearance : ndarray, shape (n,)
         Clearance in mm of each row of the model, at which the errors of the days are taken.
+    step : Step or None
+        A step of the sensor on one of the last days, if one is possible: intervals hold with it and without.
     """
 
     fit: Fit
@@ -101,6 +104,12 @@ class BayesianFit:
     rails: Rails
     region: CoveredRegion
     clearance: Values
+    step: Step | None
+
+    @property
+    def doubted(self) -> Posterior:
+        """What is known if the sensor stepped, where it may have; else the posterior."""
+        return self.posterior if self.step is None else self.step.posterior
 
     @cached_property
     def doubts(self) -> tuple[str, ...]:
@@ -164,7 +173,8 @@ def bayesian_fit(
     2. Without systematic errors of the days, the model gives a curve, at which those errors are then taken.
     3. Measurements whose residual from the curve of their day is more than `REJECTED` standard deviations are left
        out, and the model is fitted again, until these are the same.
-    4. The posterior mean for `date` is the polynomial. If there are measurements of that very day, it is the polynomial
+    4. A step of the sensor on one of the last days is looked for; the curve stays, and intervals hold in either case.
+    5. The posterior mean for `date` is the polynomial. If there are measurements of that very day, it is the polynomial
        nearest to the day's own curve, with squared errors relative to the clearance, unless that polynomial leaves the
        range of the clearance somewhere or falls with the voltage; for a later day the day's own curve is unknown.
 
@@ -225,7 +235,8 @@ def bayesian_fit(
     given = np.empty(len(d))
     given[order] = weights
     fit = _as_fit(measurements, polynomial, usable.covered, given)
-    return BayesianFit(fit, posterior, model, plain, order, at_rail, rails, region, clearance)
+    step = step_of(model, posterior, max(date, rows.days[-1]))
+    return BayesianFit(fit, posterior, model, plain, order, at_rail, rails, region, clearance, step)
 
 
 def _without_rails(measurements: Measurements, rails: Rails, voltages: Range) -> Measurements:

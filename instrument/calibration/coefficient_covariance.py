@@ -97,9 +97,10 @@ def of_bayes(measurements: Measurements, made: BayesianFit) -> CoefficientUncert
     The curve of the day is projected on the terms of the polynomial, by least squares over the covered region: the
     covariance is that of the projection about the coefficients, and the systematic error, in the mean over the region,
     the rest, which includes that of a day without measurements. Both variances are uncertain over the pairs of
-    scatters, weighted as for intervals; `student` makes of each a standard uncertainty with degrees of freedom.
+    scatters, weighted as for intervals; `student` makes of each a standard uncertainty with degrees of freedom. Where
+    the sensor may have stepped, it is what is known if it did: the polynomial is then off by a part of the step.
     """
-    posterior, polynomial = made.posterior, made.fit.polynomial
+    posterior, polynomial = made.doubted, made.fit.polynomial
     lengths = tuple(map(len, polynomial.coefficients))
     V, T = made.region.points()
     V, T = V[::EVERY], T[::EVERY]

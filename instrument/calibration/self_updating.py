@@ -98,7 +98,8 @@ class Calibration:
         if self.bayesian is not None:
             found += [text for text in (self.bayesian.surprise,) if text]
             found += [f"{text}; they are left out" for text in self.bayesian.rails.found]
-            found += [text for text in (self._far, self.bayesian.missed, *self.bayesian.doubts) if text]
+            step = self.bayesian.step.sentence if self.bayesian.step is not None else ""
+            found += [text for text in (self._far, self.bayesian.missed, step, *self.bayesian.doubts) if text]
         else:
             found += [f"{text}; --method bayes leaves them out" for text in self._rails.found]
         return tuple(found)

@@ -152,21 +152,35 @@ def of_posterior(measurements: Measurements, made: BayesianFit) -> Uncertainty:
 
     The interval includes the day's systematic error: as far as the measurements of that day leave it open, and all of
     it if there are none. It is centred on the polynomial, and so holds what the polynomial misses of the day's curve.
+    Where the sensor may have stepped, it is the wider of the intervals with and without a step.
     """
     posterior, polynomial = made.posterior, made.fit.polynomial
+    either = [posterior] if made.step is None else [posterior, made.step.posterior]
 
     def standard_error(V: Values, T: Values) -> Values:
-        mean, variance = posterior.predicted(V, T)
-        off = mean - polynomial(V, T)[:, None]
-        return np.asarray(np.sqrt(posterior.scatters.variance_of(variance + off**2)))
+        variances = []
+        for one in either:
+            mean, variance = one.predicted(V, T)
+            variances.append(one.scatters.variance_of(variance + (mean - polynomial(V, T)[:, None]) ** 2))
+        return np.asarray(np.sqrt(np.max(variances, axis=0)))
 
     def half_width(V: Values, T: Values) -> Values:
-        return posterior.half_width(V, T, polynomial(V, T), SHARE)
+        return reading_half_width(made, V, T)
 
     own = made.order[made.kept]
     off = made.model.residuals(posterior.scatters.likeliest)[made.kept]
     lack = lack_of_fit(off, measurements.voltage[own], measurements.temperature[own])
     return Uncertainty(standard_error, half_width, lack, lambda: _predicted(made), made.region)
+
+
+def reading_half_width(made: BayesianFit, V: Values, T: Values, beside: Values | float = 0.0) -> Values:
+    """Return half-widths in mm of intervals for readings at voltages in V and temperatures in degC, shape (n,).
+
+    `beside` is the variance in mm**2 of what else a reading errs by, such as the noise that a filter lets through.
+    """
+    either = [made.posterior] if made.step is None else [made.posterior, made.step.posterior]
+    centre = made.fit.polynomial(V, T)
+    return np.asarray(np.max([one.half_width(V, T, centre, SHARE, beside) for one in either], axis=0))
 
 
 def _predicted(made: BayesianFit) -> CrossValidation | None:

@@ -7,7 +7,8 @@ curve, and a ratio ``rho = systematic**2 / scatter**2``, the covariance of the m
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
 from decimal import Decimal
 
 import numpy as np
@@ -73,7 +74,7 @@ class DaySums:
             count=sums[last, last],
         )
 
-    def _all(self, name: str, squared: Values) -> Values:
+    def times(self, name: str, squared: Values) -> Values:
         """Return a sum over all measurements, times the squared scatter for each in `squared`, the last axis."""
         own: Values = getattr(self, name)[..., None]
         return own if self.known is None else own + getattr(self.known, name)[..., None] * squared
@@ -84,20 +85,25 @@ class DaySums:
         `squared`, of the same shape, are the squared scatters in mm**2 to go with them; without measurements of known
         variance they do not matter.
         """
-        m = len(self.hh)
-        lower = cholesky(identity(m, (len(self.rr), len(rho))) + self._all("hh", squared) * rho)
-        of_a, of_r = solved(lower, self._all("ha", squared)), solved(lower, self._all("hr", squared)[:, None])
-        diagonal = np.stack([lower[k, k] for k in range(m)])
-        mantissa, exponent = np.ones(diagonal.shape[1:]), np.zeros(diagonal.shape[1:])
-        for pivot in diagonal:
-            mantissa, more = np.frexp(mantissa * pivot)
-            exponent = exponent + more
-        return Information(
-            j=self._all("aa", squared) - rho * product(transposed(of_a), of_a),
-            h=self._all("ar", squared) - rho * applied(transposed(of_a), of_r[:, 0]),
-            q=self._all("rr", squared) - rho * dot(of_r[:, 0], of_r[:, 0]),
-            root=Scaled(mantissa, exponent),
-        )
+        j, h, q, mantissa, exponent = self._by_days(_eliminated, rho, squared)
+        return Information(j=j, h=h, q=q, root=Scaled(mantissa, exponent))
+
+    def _by_days(self, of: _OfDays, rho: Values, squared: Values) -> tuple[Values, ...]:
+        """Return what `of` makes of the days; for those without known variances, once for each ratio alone."""
+        if self.known is None:
+            return of(self, rho, squared)
+        also = np.flatnonzero(self.known.count > 0)
+        rest = np.flatnonzero(self.known.count == 0)
+        if not len(rest):
+            return of(self, rho, squared)
+        ratios, at = np.unique(rho, return_inverse=True)
+        plain = of(replace(self.at_days(rest), known=None), ratios, np.ones(len(ratios)))
+        found = []
+        for one, own in zip(plain, of(self.at_days(also), rho, squared), strict=True):
+            every = np.empty((*one.shape[:-2], len(self.rr), len(rho)))
+            every[..., rest, :], every[..., also, :] = one[..., at], own
+            found.append(every)
+        return tuple(found)
 
     def fisher(self, rho: Values, squared: Values) -> Values:
         """Return how much the measurements can tell of both standard deviations, for each ratio; shape (ratios,).
@@ -128,20 +134,7 @@ class DaySums:
         The eigenvalues of the systematic error's share are those of ``rho H' W H G``; of those measurements that
         scatter, ``rho H' H G``. ``rho tr(G' H' H G)`` couples both.
         """
-        m = len(self.hh)
-        stack = (len(self.rr), len(rho))
-        every = self._all("hh", squared) * rho
-        lower = cholesky(identity(m, stack) + every)
-        inverse = solved_transposed(lower, solved(lower, identity(m, stack)))
-        systematic = product(every, inverse)
-        own = product(self.hh[..., None] * rho, inverse)
-        coupled = product(transposed(inverse), own)
-        trace = [np.zeros(stack) for _ in range(4)]
-        for k in range(m):
-            trace[0] = trace[0] + own[k, k]
-            trace[1] = trace[1] + dot(own[k], own[:, k])
-            trace[2] = trace[2] + dot(systematic[k], systematic[:, k])
-            trace[3] = trace[3] + coupled[k, k]
+        trace = self._by_days(_traces, rho, squared)
         first, second, of_day, both = (np.zeros(len(rho)) for _ in range(4))
         count = 0.0
         for day in range(len(self.rr)):
@@ -152,9 +145,12 @@ class DaySums:
 
     def only(self, day: int) -> DaySums:
         """Return the sums of one day, with an axis of length 1 for the day."""
-        at = slice(day, day + 1)
-        own = {field.name: getattr(self, field.name)[..., at] for field in fields(self) if field.name != "known"}
-        return DaySums(**own, known=None if self.known is None else self.known.only(day))
+        return self.at_days(np.array([day]))
+
+    def at_days(self, some: npt.NDArray[np.int64]) -> DaySums:
+        """Return the sums of some days."""
+        own = {field.name: getattr(self, field.name)[..., some] for field in fields(self) if field.name != "known"}
+        return DaySums(**own, known=None if self.known is None else self.known.at_days(some))
 
     def day_curves(self, rho: Values, squared: Values) -> tuple[Values, Values, Values]:
         """Return what the weights w of each day's systematic curves are, given the deviations z.
@@ -163,13 +159,51 @@ class DaySums:
         Shapes (m, days, ratios), (m, 5, days, ratios) and (m, m, days, ratios).
         """
         m, stack = len(self.hh), (len(self.rr), len(rho))
-        lower = cholesky(identity(m, stack) + self._all("hh", squared) * rho)
+        lower = cholesky(identity(m, stack) + self.times("hh", squared) * rho)
 
         def divided(b: Values) -> Values:
             return rho * solved_transposed(lower, solved(lower, b))
 
-        of_r, of_a = divided(self._all("hr", squared)[:, None])[:, 0], divided(self._all("ha", squared))
+        of_r, of_a = divided(self.times("hr", squared)[:, None])[:, 0], divided(self.times("ha", squared))
         return of_r, of_a, solved(lower, identity(m, stack))
+
+
+_OfDays = Callable[[DaySums, Values, Values], tuple[Values, ...]]
+"""Arrays whose last axes are the day and the ratio, of sums, ratios and squared scatters."""
+
+
+def _eliminated(sums: DaySums, rho: Values, squared: Values) -> tuple[Values, ...]:
+    """Return j, h, q of `Information`, with mantissa and exponent of its root."""
+    m = len(sums.hh)
+    lower = cholesky(identity(m, (len(sums.rr), len(rho))) + sums.times("hh", squared) * rho)
+    of_a, of_r = solved(lower, sums.times("ha", squared)), solved(lower, sums.times("hr", squared)[:, None])
+    mantissa, exponent = np.ones(lower.shape[2:]), np.zeros(lower.shape[2:])
+    for k in range(m):
+        mantissa, more = np.frexp(mantissa * lower[k, k])
+        exponent = exponent + more
+    j = sums.times("aa", squared) - rho * product(transposed(of_a), of_a)
+    h = sums.times("ar", squared) - rho * applied(transposed(of_a), of_r[:, 0])
+    q = sums.times("rr", squared) - rho * dot(of_r[:, 0], of_r[:, 0])
+    return j, h, q, mantissa, exponent
+
+
+def _traces(sums: DaySums, rho: Values, squared: Values) -> tuple[Values, ...]:
+    """Return the traces that Fisher's information is made of: of measurements that scatter, their squares, and both."""
+    m = len(sums.hh)
+    stack = (len(sums.rr), len(rho))
+    every = sums.times("hh", squared) * rho
+    lower = cholesky(identity(m, stack) + every)
+    inverse = solved_transposed(lower, solved(lower, identity(m, stack)))
+    systematic = product(every, inverse)
+    own = product(sums.hh[..., None] * rho, inverse)
+    coupled = product(transposed(inverse), own)
+    trace = [np.zeros(stack) for _ in range(4)]
+    for k in range(m):
+        trace[0] = trace[0] + own[k, k]
+        trace[1] = trace[1] + dot(own[k], own[:, k])
+        trace[2] = trace[2] + dot(systematic[k], systematic[:, k])
+        trace[3] = trace[3] + coupled[k, k]
+    return tuple(trace)
 
 
 @dataclass(frozen=True, eq=False)

@@ -154,6 +154,7 @@ class Model:
     sensor_type: SensorType
     rows: Rows
     sums: DaySums
+    weights: Values
 
     @classmethod
     def of(cls, sensor_type: SensorType, rows: Rows, weights: Values) -> Model:
@@ -161,9 +162,9 @@ class Model:
         is_known, days = rows.known > 0, len(rows.days)
         own = DaySums.of(rows.a, rows.h, rows.r, np.where(is_known, 0.0, weights), rows.day, days)
         if is_known.any():
-            weights = np.where(is_known, weights, 0.0) / np.where(is_known, rows.known, 1.0)
-            own = replace(own, known=DaySums.of(rows.a, rows.h, rows.r, weights, rows.day, days))
-        return cls(sensor_type, rows, own)
+            known = np.where(is_known, weights, 0.0) / np.where(is_known, rows.known, 1.0)
+            own = replace(own, known=DaySums.of(rows.a, rows.h, rows.r, known, rows.day, days))
+        return cls(sensor_type, rows, own, weights)
 
     def scatters(self) -> Scatters:
         """Return the pairs of scatters that the measurements leave possible: a coarse grid, then a fine one there."""
@@ -250,7 +251,7 @@ class Model:
             else:
                 kept = (1.0 - left_out[:, k])[:, None]
                 days.append((day[0][..., None, :] * kept, day[1][..., None, :] * kept, day[2][..., None, :] * kept))
-        return course(days, self.rows.gaps, self.sensor_type.drifts, stack)
+        return course(days, self.rows.gaps, self.drifts, stack)
 
     def information(self, at: Scatters) -> Information:
         """Return the information of the days for pairs of scatters, the last axis."""
@@ -259,7 +260,7 @@ class Model:
 
     def residuals(self, at: Scatters) -> Values:
         """Return the residuals from the curve of each day, with its systematic error, for one pair of scatters."""
-        means, _ = smoothed(self.course(at), self.rows.gaps, self.sensor_type.drifts)
+        means, _ = smoothed(self.course(at), self.rows.gaps, self.drifts)
         z = np.concatenate(means, axis=1)
         offset, slope, _ = self.sums.day_curves(at.ratio**2, at.scatter**2)
         weights = offset[..., 0] - applied(slope[..., 0], z)
@@ -279,7 +280,7 @@ class Model:
             curves=curves,
             scatters=at,
             mean=last.mean[-1],
-            factor=moved(last.factor[-1], gap, self.sensor_type.drifts),
+            factor=moved(last.factor[-1], gap, self.drifts),
             offset=offset,
             slope=slope,
             curve_factor=factor,
@@ -372,7 +373,7 @@ class Posterior:
         return self.scatters.mean_of(self.predicted(voltage, temperature)[0])
 
     def half_width(
-        self, voltage: Values, temperature: Values, centre: Values, share: float, scatter: float = 0.0
+        self, voltage: Values, temperature: Values, centre: Values, share: float, beside: Values | float = 0.0
     ) -> Values:
         """Return the half-widths of intervals about `centre` that hold the true clearance of a reading, in mm.
 
@@ -382,11 +383,12 @@ class Posterior:
             In V, degC and mm.
         share : float
             Probability, such as 0.95.
+        beside : ndarray, shape (n,), or float
+            Variance in mm**2 of what else a reading errs by, such as the noise that the filter lets through.
         """
         mean, variance = self.predicted(voltage, temperature)
-        return mixture_half_width(
-            mean - centre[:, None], variance + scatter * self.scatters.scatter**2, self.scatters.of_intervals, share
-        )
+        variance = variance + np.broadcast_to(beside, len(voltage))[:, None]
+        return mixture_half_width(mean - centre[:, None], variance, self.scatters.of_intervals, share)
 
 
 def _weighted(values: Values, weight: Values) -> Values:

@@ -15,7 +15,7 @@ from sosmith.model.errors import SpecificationError
 NEVER = 1e-12
 """So rare that the filter is one of Kalman."""
 
-PLAIN = WearModel(jumps=NEVER, rate_changes=NEVER, offs=NEVER, shared=0.05)
+PLAIN = WearModel(jumps=NEVER, rate_changes=NEVER, sensor_changes=1e-100, offs=NEVER, shared=0.05)
 
 
 def days_of(read: Values, error: float) -> list[DayReading]:
@@ -112,6 +112,26 @@ def test_what_happens_is_told_with_its_size(what: Happening, step: float, times:
     assert told.size == pytest.approx(expected, abs=0.1 if what is Happening.JUMP else 0.04)
 
 
+def test_the_sum_tells_a_replaced_sensor_from_a_jump_of_the_wheel() -> None:
+    """At errors of 0.13 mm a day; the sum knows nothing of what a sensor reads, and all of what happens to a wheel."""
+    generator = np.random.default_rng(5)
+    true = np.add.outer([3.0, 3.4], 0.05 * np.arange(45.0))
+    read = true + generator.normal(0, 0.13, true.shape)
+    for name, of_sensor, of_wheel in ((Happening.SENSOR, 0.4, 0.0), (Happening.JUMP, 0.0, 0.4)):
+        days = [
+            DayReading(
+                time=float(k),
+                clearance=(float(read[0, k] + (of_sensor + of_wheel) * (k >= 35)), float(read[1, k])),
+                uncertainty=(0.13, 0.13),
+                total=float(true[:, k].sum() + of_wheel * (k >= 35) + generator.normal(0, 0.03)),
+            )
+            for k in range(45)
+        ]
+        (told,) = [one for state in filtered(days, WearModel()) for one in state.told]
+        assert (told.event.wheel, told.event.what) == (0, name)
+        assert told.size == pytest.approx(0.4, abs=0.15)
+
+
 def test_nothing_is_told_where_nothing_happens_nor_where_one_reading_is_off() -> None:
     read = worn(40, 0.05, 3)
     assert not [one for state in filtered(days_of(read, 0.05), WearModel()) for one in state.told]
@@ -178,8 +198,14 @@ def test_impossible_days_are_refused(days: list[DayReading], sentence: str) -> N
     ("changes", "sentence"),
     [
         ({"shared": -1.0}, "shared must be 0 or more, not -1"),
-        ({"jumps": 0.5}, "jumps, rate_changes and offs must be above 0 and below 0.5 a day together, not 0.51"),
-        ({"offs": 0.0}, "jumps, rate_changes and offs must be above 0 and below 0.5 a day together, not 0.015"),
+        (
+            {"jumps": 0.5},
+            "jumps, rate_changes, sensor_changes and offs must be above 0 and below 0.5 a day together, not 0.52",
+        ),
+        (
+            {"offs": 0.0},
+            "jumps, rate_changes, sensor_changes and offs must be above 0 and below 0.5 a day together, not 0.025",
+        ),
     ],
 )
 def test_an_impossible_model_is_refused(changes: dict[str, float], sentence: str) -> None:

@@ -291,12 +291,13 @@ def _told(record: WearRecord, one: Told) -> str:
     def when(days: float) -> str:
         return moment_text(days) if record.dated else f"day {days:.4g}"
 
-    what = f"{one.size:+.2g} mm" if one.event.what is Happening.JUMP else f"to {one.size:.2g} mm a day"
-    return (
-        f"a {one.event.what} of about {what} at {when(one.event.time)}"
-        if one.event.what is Happening.JUMP
-        else f"a {one.event.what} {what} at about {when(one.event.time)}"
-    ) + f"{' of the other wheel' * one.event.wheel}, seen at {when(one.at)} with a probability of {one.probability:.2g}"
+    text = (
+        f"a {one.event.what} to {one.size:.2g} mm a day at about {when(one.event.time)}"
+        if one.event.what is Happening.RATE
+        else f"a {one.event.what} of about {one.size:+.2g} mm at {when(one.event.time)}"
+    )
+    other = " of the other wheel" * one.event.wheel
+    return f"{text}{other}, seen at {when(one.at)} with a probability of {one.probability:.2g}"
 
 
 def _over_days_json(found: OverDays) -> dict[str, Any]:

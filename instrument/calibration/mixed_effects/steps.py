@@ -1,0 +1,139 @@
+"""A step of the sensor on one of the last days: whether there was one, and what is known of the sensor if there was.
+
+The evidence of the model with one step of the voltage's offset, of the type's tolerance and from some day on, is
+compared with that of the model without. A step that is past doubt is told. Where it is about as possible as none, which
+one day of measurements often leaves open, it cannot be told, but intervals must hold in either case: they are the wider
+of both.
+"""
+
+from __future__ import annotations
+
+import datetime
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sosmith.instrument.calibration.health.explanation import steps_of_the_voltage
+from sosmith.instrument.calibration.mixed_effects.model import RATIOS, SCATTERS, Model, Posterior
+from sosmith.instrument.calibration.sensor_type import TERMS, SensorType
+from sosmith.model.arithmetic.stacked_matrices import applied, product
+from sosmith.model.arrays import Values
+
+FEWEST_DAYS = 3
+"""Days from which on a step can be told from an error of a day."""
+
+RECENT = 10
+"""Days, counted back from the last, on each of which a step is looked for; what was before, the health charts tell."""
+
+CERTAIN = math.log(100.0)
+"""Logarithm of the evidence for a step, over that for none, from which on it is told. The evidence is divided by the
+number of days that there are to choose from: by Markov's inequality, a sensor of the type then has at most one false
+alarm in 100 fits."""
+
+STEP = 1.5
+"""Ratio of neighbouring points of the grid of scatters."""
+
+FRESH, POSSIBLE = 3, -0.5
+"""Last days, and the same without that division, from which on a step is possible and intervals must hold in either
+case. What began earlier has had the days since to show."""
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """A step that there may have been.
+
+    Attributes
+    ----------
+    day : int
+        Ordinal of the first day with it.
+    days : int
+        Days that it was chosen from.
+    size : float
+        Step of the voltage in V, posterior mean.
+    evidence : float
+        Logarithm of the probability of the measurements with a step on that day over that without.
+    posterior : Posterior
+        What is known of the day of the calibration if there was one.
+    """
+
+    day: int
+    days: int
+    size: float
+    evidence: float
+    posterior: Posterior
+
+    @property
+    def told(self) -> bool:
+        """Whether it is past doubt."""
+        return self.evidence - math.log(self.days) > CERTAIN
+
+    @property
+    def sentence(self) -> str:
+        """What is to be known of it."""
+        date = datetime.date.fromordinal(self.day).isoformat()
+        if self.told:
+            return (
+                f"the voltage stepped by about {self.size:+.2g} V on {date}: the measurements before belong to another "
+                "curve, and intervals are wider by it"
+            )
+        return (
+            f"the voltage may have stepped by about {self.size:+.2g} V on {date}: the measurements since cannot tell a "
+            "step from the errors of days, and intervals hold in either case"
+        )
+
+
+def step_of(model: Model, plain: Posterior, date: int) -> Step | None:
+    """Return the most probable step if it is possible, else None.
+
+    Parameters
+    ----------
+    model : Model
+        Without a step.
+    plain : Posterior
+        Its posterior for the day `date`.
+    date : int
+        Ordinal, not before the last measurement.
+    """
+    rows, known = model.rows, model.sensor_type
+    if len(rows.days) < FEWEST_DAYS:
+        return None
+    at = plain.scatters.likeliest
+    days = range(max(1, len(rows.days) - RECENT), len(rows.days))
+    first = {k: _with_step(model, k).evidence(at.scatter, at.ratio) for k in days}
+    own = plain.scatters.scatter
+    scatters = SCATTERS[(own.min() / STEP <= SCATTERS) & (own.max() * STEP >= SCATTERS)]
+    without = model.evidence(scatters, RATIOS)
+    for some in (days, days[-FRESH:]):
+        best = max(some, key=lambda k: first[k])
+        stepped = _with_step(model, best)
+        evidence = stepped.evidence(scatters, RATIOS) - without
+        if evidence > (CERTAIN + math.log(len(days)) if some == days else POSSIBLE):
+            found = stepped.posterior(stepped.scatters(), plain.curves, date)
+            size = float(found.scatters.mean_of(found.mean)[-1]) * known.offset
+            return Step(rows.days[best], len(days), size, evidence, _collapsed(found))
+    return None
+
+
+def _direction(known: SensorType) -> Values:
+    """Return what a step of the voltage by the type's tolerance is in deviations, shape (5,)."""
+    return steps_of_the_voltage(known)[0]
+
+
+def _with_step(model: Model, day: int) -> Model:
+    """Return the model with one deviation more: a step from the day of this index on."""
+    rows = model.rows
+    step = np.where(rows.day >= day, applied(_direction(model.sensor_type)[None], rows.a)[0], 0.0)
+    return Model.of(model.sensor_type, replace(rows, a=np.concatenate((rows.a, step[None]))), model.weights)
+
+
+def _collapsed(found: Posterior) -> Posterior:
+    """Return the posterior of the deviations with the step as part of them, for the day of the calibration."""
+    size = len(TERMS)
+    join = np.concatenate((np.eye(size), _direction(found.sensor_type)[:, None]), axis=1)[..., None]
+    return replace(
+        found,
+        mean=applied(join, found.mean),
+        factor=product(join, found.factor),
+        slope=None if found.slope is None else found.slope[:, :size],
+    )
