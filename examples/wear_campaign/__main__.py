@@ -11,8 +11,10 @@ from __future__ import annotations
 
 import argparse
 import json
+import re
 import tomllib
 from pathlib import Path
+from typing import Any
 
 from examples.wear_campaign.campaign import carry_out, methods_campaign
 from examples.wear_campaign.document import document
@@ -29,7 +31,7 @@ def main() -> None:
     """Run the campaign."""
     parser = argparse.ArgumentParser(prog="python -m examples.wear_campaign", description=__doc__)
     parser.add_argument("-o", "--output", type=Path, default=Path("build/wear_campaign"), help="folder for all files")
-    parser.add_argument("--seeds", type=int, help="number of seeds, at least 2, instead of that in campaign.toml")
+    parser.add_argument("--seeds", type=int, help="number of seeds, at least 2, instead of those in campaign.toml")
     parser.add_argument("--simulator", choices=("verilator", "icarus"), help="instead of that in campaign.toml")
     parser.add_argument("--document", action="store_true", help="also write docs/campaign.md and its pictures")
     parts = parser.add_mutually_exclusive_group()
@@ -38,6 +40,8 @@ def main() -> None:
     arguments = parser.parse_args()
     settings = tomllib.loads((HERE / "campaign.toml").read_text(encoding="utf-8"))
     settings |= {name: value for name, value in vars(arguments).items() if name in settings and value is not None}
+    if arguments.seeds is not None:
+        settings["methods"]["bench_seeds"] = arguments.seeds
     if settings["seeds"] < 2:
         parser.error(f"--seeds must be at least 2, not {settings['seeds']}")
     earlier = json.loads((HERE / "outcome.json").read_text(encoding="utf-8"))
@@ -53,7 +57,7 @@ def main() -> None:
         step("pictures and document")
         drawn = pictures(results, series)
         text = document(results)
-        files = {"campaign.md": text.encode(), "campaign.json": (json.dumps(results, indent=1) + "\n").encode()}
+        files = {"campaign.md": text.encode(), "campaign.json": _as_json(results).encode()}
         write_contents(arguments.output, files)
         write_contents(arguments.output / "images", drawn)
     if arguments.document:
@@ -61,6 +65,12 @@ def main() -> None:
         write_contents(DOCS / "images", drawn)
         write_contents(HERE, {"outcome.json": files["campaign.json"]})
     note(f"report: {(arguments.output / 'campaign.md').resolve()}")
+
+
+def _as_json(results: dict[str, Any]) -> str:
+    """Return the figures as JSON, with those of all seeds in one line."""
+    text = json.dumps(results, indent=1) + "\n"
+    return re.sub(r"\[[^][{}\"]*\]", lambda numbers: " ".join(numbers[0].split()), text)
 
 
 if __name__ == "__main__":

@@ -259,10 +259,10 @@ def cases(settings: dict[str, Any], scenarios: dict[str, ScenarioFile], filter_t
     week = hardware.instrument(folder, "week", RATE, calibration, filter_table, uncertainty=stated[1])
 
     own, all_seeds = settings["methods"], settings["seeds"]
-    some_seeds = min(all_seeds, own["variant_seeds"])
+    bench_seeds, some_seeds = own["bench_seeds"], min(all_seeds, own["variant_seeds"])
 
     def bench_case(
-        name: str, sensor: str, scenario: ScenarioFile, seeds: int = all_seeds, days: int = own["interval_days"]
+        name: str, sensor: str, scenario: ScenarioFile, seeds: int = bench_seeds, days: int = own["interval_days"]
     ) -> Case:
         return Case(name, sensor, seeds, lambda seed: on_the_bench(with_sensor(scenario, sensor), bench, seed, days))
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from examples.wear_campaign import wear_intervals
 from matplotlib.figure import Figure
+from scipy import stats
 
 BLUE, RED, GREY, INK = "#2563a8", "#b4432f", "#8a8a8a", "#222222"
 
@@ -28,8 +29,6 @@ METHODS = {"paper": "the paper's rule", "least squares": "least squares, orders 
 DEGREES = {"bench_43_50": "43 to 50 degC", "bench_92_96": "92 to 96 degC"}
 WEAR = {"depth": "depth", "rate": "rate", "life": "remaining life"}
 
-LINEAR = {0: "no linear fit", 1: "one linear fit"}
-
 CEILING = "the true sensor's own curve"
 
 FEW_LINEAR = 0.05
@@ -50,7 +49,8 @@ def section(rows: list[dict[str, Any]], wear: dict[str, Any], settings: dict[str
         "## Which way of fitting",
         "The same measurements, fitted in three ways ([calibration.md](calibration.md)): by the paper's rule; by "
         "least squares with the paper's orders 2, 1 whatever r is reached; and by `bayes`. For each of "
-        f"{settings['seeds']} seeds and each of {len(own['sensors'])} true sensors: the paper's equation 5a, its "
+        f"{own['bench_seeds']} seeds on the bench, {settings['seeds']} in the week, and each of {len(own['sensors'])} "
+        "true sensors: the paper's equation 5a, its "
         "equation 4, and a coil with a core; `bayes` takes each for a sensor of the type equation 5a. In double "
         "precision, with the paper's filter on the bench and that from spectra in the week. Mean accuracy in % with "
         f"its {share:.0f} % interval, and the worst seed. The true sensors of a seed share their streams of random "
@@ -72,25 +72,26 @@ def section(rows: list[dict[str, Any]], wear: dict[str, Any], settings: dict[str
         f"In the week, `bayes` gains on average, in points: {told}; in the worst seed: {worst}. The day's own "
         f"curve was left out on {100 * fell:.1f} % of the days, because a polynomial with it left the output's range "
         "or fell.",
-        *_ceilings([row for row in mains if row not in week]),
+        *_ceilings([row for row in mains if row not in week], settings),
         *_variants([row for row in rows if row not in mains], own),
         *_intervals(mains, settings),
         *_wear_intervals(wear),
     ]
 
 
-def _ceilings(benches: list[dict[str, Any]]) -> list[str]:
+def _ceilings(benches: list[dict[str, Any]], settings: dict[str, Any]) -> list[str]:
     """Say how much of the error a calibration can take away on the bench, and what the paper's rule loses."""
     rows = []
     for row in benches:
         means = {name: one["mean"] for name, one in row["accuracy"].items()}
         linear = of_order_1(row)
+        low, high = share_of(linear, settings["confidence"])
         accuracies = np.array(row["methods"]["paper"]["accuracy"])
         rows.append(
             [
                 NAMES[row["case"]],
                 SENSORS[row["sensor"]],
-                f"{np.count_nonzero(linear)} of {len(linear)}",
+                f"{np.count_nonzero(linear)} of {len(linear)}: {100 * low:.0f} to {100 * high:.0f} %",
                 f"{accuracies[linear].mean():.2f}" if linear.any() else "-",
                 f"{accuracies[~linear].mean():.2f}" if not linear.all() else "-",
                 *(f"{means[name]:.2f}" for name in ("bayes", "own curve", "own polynomial", "day polynomial")),
@@ -106,7 +107,9 @@ def _ceilings(benches: list[dict[str, Any]]) -> list[str]:
         "sensor is at its rail of 0 V at the smallest clearance: the curve says only where the rail begins, a "
         "polynomial can allow for it. The last column is the most that any way of fitting gains from these "
         "measurements over the paper's rule, but for luck. Mean accuracies in %; those of the paper's rule apart for "
-        "the seeds in which it keeps a linear fit and for the others.",
+        "the seeds in which it keeps a linear fit and for the others. How many keep one decides what `bayes` gains; "
+        f"the share of all seeds lies between the two figures with {100 * settings['confidence']:.0f} % confidence "
+        "(Clopper and Pearson).",
         table(
             [
                 "run",
@@ -139,7 +142,7 @@ def _reason(benches: list[dict[str, Any]]) -> str:
     for row in fewest:
         text += (
             f" With {SENSORS[row['sensor']]} at {DEGREES[row['case']]} it keeps "
-            f"{LINEAR.get(np.count_nonzero(of_order_1(row)), 'few linear fits')}, and the true sensor's curve itself "
+            f"{np.count_nonzero(of_order_1(row))} linear fits, and the true sensor's curve itself "
             f"gains {ceiling(row):+.2f} points: no way of fitting reaches more from these measurements. `bayes` "
             f"differs from the rule by {paired(row)} points."
         )
@@ -249,6 +252,12 @@ def ceiling(row: dict[str, Any]) -> float:
 def of_order_1(row: dict[str, Any]) -> Any:
     """Return for which seeds the paper's rule keeps a fit that is linear in the voltage."""
     return np.array(row["methods"]["paper"]["order"]) == 1
+
+
+def share_of(chosen: Any, confidence: float) -> tuple[float, float]:
+    """Return the exact confidence interval of a share (Clopper and Pearson 1934)."""
+    found = stats.binomtest(int(np.count_nonzero(chosen)), len(chosen)).proportion_ci(confidence)
+    return float(found.low), float(found.high)
 
 
 def paired(row: dict[str, Any]) -> str:

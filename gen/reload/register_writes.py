@@ -47,21 +47,25 @@ def register_writes(hardware: CoreDesign, new_set: OtherSet, version: int) -> li
 def reload_json(hardware: CoreDesign, swap: Swap, version: int) -> dict[str, Any]:
     """Return what a host needs to load a set, and what is proven about it, as JSON values.
 
-    ``writes`` is a list of pairs of a byte address and a word, in order; errors are in the output's unit.
+    ``writes`` is a list of pairs of a byte address and a word, in order; errors are in the output's unit. `calibration`
+    has the set's exact polynomial, as fractions, and `zero_frequency_gain` that of its filter: what a steady result is.
     """
-    output = hardware.datapath.output
+    output, quantized = hardware.datapath.output, swap.new_set.quantized
+    polynomial = quantized.polynomial
     words, _ = bank_size(hardware.architecture)
     return {
         "name": hardware.spec.name,
         "design": hardware.architecture.fingerprint,
         "version": version,
         "words": words,
-        "error_bound": float(swap.new_set.quantized.bound * output.lsb),
-        "error_parts": {part: float(value * output.lsb) for part, value in swap.new_set.quantized.budget.items()},
+        "error_bound": float(quantized.bound * output.lsb),
+        "error_parts": {part: float(value * output.lsb) for part, value in quantized.budget.items()},
         "error_unit": output.unit,
         "restarts": hardware.architecture.restarts,
         "transient_samples": swap.samples,
-        "error_after_transient": float((swap.new_set.quantized.bound + (RESIDUE if swap.samples else 0)) * output.lsb),
+        "error_after_transient": float((quantized.bound + (RESIDUE if swap.samples else 0)) * output.lsb),
         "state_use": float(swap.use),
+        "calibration": None if polynomial is None else [[str(a) for a in row] for row in polynomial.coefficients],
+        "zero_frequency_gain": 1.0 if quantized.filter is None else quantized.filter.dc_gain,
         "writes": [[register.address, word] for register, word in register_writes(hardware, swap.new_set, version)],
     }

@@ -64,7 +64,9 @@ def test_the_figures_of_methods_are_those_of_the_recorded_seeds() -> None:
     assert len(rows) == 9 + 8
     for row in rows:
         for method, figures in row["methods"].items():
-            seeds = found["settings"]["methods"]["variant_seeds"] if "," in row["case"] else found["settings"]["seeds"]
+            own = found["settings"]["methods"]
+            bench = own["bench_seeds"] if row["case"].startswith("bench") else found["settings"]["seeds"]
+            seeds = own["variant_seeds"] if "," in row["case"] else bench
             assert len(figures["accuracy"]) == seeds
             assert max(map(len, figures.values())) == seeds  # fewer intervals: no fit on any day of a week
             expected = spread(figures["accuracy"], found["settings"]["confidence"])
@@ -76,6 +78,7 @@ def test_the_figures_of_methods_are_those_of_the_recorded_seeds() -> None:
 def test_methods_give_the_recorded_figures_again(number: int, tmp_path: Path) -> None:
     """The first seeds of a bench, and of a week with the coil."""
     settings = outcome()["settings"] | {"seeds": 2}
+    settings["methods"] |= {"bench_seeds": 2}
     names = [*settings["bench"]["scenarios"], settings["week"]["scenario"]]
     scenarios = {name: load_scenario(campaign.SCENARIOS / f"{name}.toml") for name in names}
     table = outcome()["ride"]["filters"][-1]["table"]

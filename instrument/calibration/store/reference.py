@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sosmith.gen.calibration.fit import COLUMNS, Progress, untold
+from sosmith.gen.calibration.fit import COLUMNS, UNCERTAINTY_COLUMNS, Progress, untold
 from sosmith.instrument.calibration.bayesian_fit import bayesian_fit
 from sosmith.instrument.calibration.measurement_store import MeasurementStore, as_measurements
 from sosmith.instrument.calibration.self_updating import Addition, add, known_sensor
@@ -21,8 +21,11 @@ from sosmith.model.errors import SpecificationError
 GROSS = 4.0
 """A target that is off by more than so many standard deviations of what may be expected of a day is told."""
 
-ByHand = tuple[float, float, float]
-"""A reading by hand: clearance of the target in mm, voltage in V, temperature in degC."""
+ByHand = Sequence[float]
+"""A reading that is in no file: clearance of the target in mm, voltage in V, temperature in degC.
+
+Then, optionally, their standard uncertainties in the same units, 0 for one that is not stated.
+"""
 
 
 @dataclass(frozen=True)
@@ -68,10 +71,13 @@ class Morning:
         return tuple(found)
 
 
-def by_hand(date: str, readings: Sequence[ByHand]) -> tuple[Path, bytes]:
-    """Return readings that are in no file as one: its name and its content."""
-    rows = [",".join(COLUMNS), *(",".join(map(repr, map(float, one))) for one in readings)]
-    return Path(f"by hand, {date}.csv"), "\n".join([*rows, ""]).encode()
+def by_hand(date: str, readings: Sequence[ByHand], source: str = "by hand") -> tuple[Path, bytes]:
+    """Return readings that are in no file as one: its name, which says where they are from, and its content."""
+    rows = [",".join((*COLUMNS, *UNCERTAINTY_COLUMNS))]
+    for one in readings:
+        stated = [repr(float(value)) if value else "" for value in one[3:]]
+        rows.append(",".join([*(repr(float(value)) for value in one[:3]), *stated, *[""] * (6 - 3 - len(stated))]))
+    return Path(f"{source}, {date}.csv"), "\n".join([*rows, ""]).encode()
 
 
 def reference(

@@ -96,6 +96,27 @@ def load(board: Registers, proven: Mapping[str, Any]) -> Loaded:
     return loaded
 
 
+def check_active(board: Registers, proven: Mapping[str, Any] | None) -> None:
+    """Check that a set is the active one, or with None that the core runs with its own, which it was generated with.
+
+    Raises
+    ------
+    ShortfallError
+        If another set is active, or the last load failed, so that its registers do not tell.
+    """
+    outcome = Outcome(STATUS.field("OUTCOME").of(board.read_register(STATUS.address)))
+    if proven is None:
+        if outcome is not Outcome.NONE:
+            version = board.read_register(VERSION.address)
+            raise ShortfallError(f"the set that is active on the board, version {version}, must be named")
+        return
+    if outcome is not Outcome.ACCEPTED:
+        raise ShortfallError(f"the board's last load must have ended as ACCEPTED, not as {outcome.name}: load the set")
+    _match("DESIGN", proven["design"], board.read_register(DESIGN.address))
+    _match("VERSION", proven["version"], board.read_register(VERSION.address))
+    _match("CRC", proven["writes"][-1][1], board.read_register(CRC.address))
+
+
 def _match(register: str, expected: int, actual: int) -> None:
     if expected != actual:
         raise ShortfallError(f"the board's register {register} must read {expected:#x}, not {actual:#x}")

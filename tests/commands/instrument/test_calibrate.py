@@ -158,7 +158,7 @@ def test_reference_targets_by_hand_and_from_a_file() -> None:
         "8.1,8.01,25.0,2024-03-03,0.03,,",
     ]
     for arguments in (("reference", *DAY), ("reference", "gauges.csv", *by_hand, *DAY)):
-        refused("targets must be given by a file or by --reading, one of both", *arguments)
+        refused("targets must be given by a file, by --reading, or live by --port, one of them", *arguments)
 
 
 def test_bad_rows_are_listed_and_only_kept_out_on_request() -> None:

@@ -25,6 +25,7 @@ from sosmith.commands.instrument.calibrate_options import (
     on_optional_day,
     range_of,
 )
+from sosmith.commands.instrument.calibrate_reference import reference_command
 from sosmith.commands.options import print_tables
 from sosmith.interface.choices import DEFAULT_RANGES, picture_format
 from sosmith.interface.files import write_file
@@ -33,7 +34,7 @@ from sosmith.output_paths import output_option, plot_option
 from sosmith.terminal import JSON_OPTION, note, print_json, show_progress
 
 if TYPE_CHECKING:
-    from sosmith.interface.instrument.calibration_store import Added, Fitted, Referenced
+    from sosmith.interface.instrument.calibration_store import Added, Fitted
 
 _SHOWN = 20
 """Number of refused lines that are printed; JSON has all of them."""
@@ -60,6 +61,9 @@ reaches the required value. To get started:
 @click.group("calibrate", help=_HELP)
 def calibrate() -> None:
     """Group the calibration commands."""
+
+
+calibrate.add_command(reference_command)
 
 
 @calibrate.command("add")
@@ -153,74 +157,6 @@ def _note_addition(file: Path, store: Path, added: Added) -> None:
         raise SpecificationError(f"{file}: every row must be valid{way}, not {len(refusals):,} of {rows:,} refused")
     left_out = f", {_counted(len(refusals), 'row')} skipped" if refusals else ""
     note(f"stored {_counted(added.good, 'measurement')} from {file} in {store}{left_out}")
-
-
-@calibrate.command("reference")
-@click.argument("targets", type=click.Path(path_type=Path), required=False)
-@click.option(
-    "--reading",
-    "readings",
-    type=(float, float, float),
-    multiple=True,
-    metavar="MM V DEGC",
-    help="A reading by hand, in place of TARGETS: clearance of the target in mm, voltage in V, temperature in degC; "
-    "may be given several times.",
-)
-@click.option(
-    "--uncertainty",
-    default="0.02mm",
-    show_default=True,
-    callback=millimetres,
-    help="Standard uncertainty of a target's clearance, where TARGETS has no column uncertainty_mm.",
-)
-@click.option("--surprising", is_flag=True, help="Store readings that look like a slip.")
-@ORDER
-@STORE
-@SENSOR
-@DATE
-@JSON_OPTION
-def reference_command(
-    targets: Path | None,
-    readings: tuple[tuple[float, float, float], ...],
-    uncertainty: float,
-    surprising: bool,
-    order: int | None,
-    store: Path,
-    sensor: str,
-    date: str,
-    as_json: bool,
-) -> None:
-    """Read reference targets in the morning: the curve of the day, and what a reading is worth today.
-
-    TARGETS is a CSV or XLSX file as for `sosmith calibrate add`, with what the sensor reads at targets of known
-    clearance, such as gauge blocks. They count by their own uncertainty, not by the scatter of other measurements.
-    Three to five of them, spread over the clearances that matter, remove most of the error of the day. Prints how far
-    the sensor is off at each target by the calibration before and now, and the intervals of readings on this day.
-
-    \b
-        sosmith calibrate reference gauges.csv --sensor left
-        sosmith calibrate reference --sensor left --reading 2 1.52 21 --reading 5 5.31 21 --reading 8 7.95 21
-    """
-    from sosmith.interface.instrument.calibration_store import CalibrationStore
-
-    if (targets is None) == (not readings):
-        raise SpecificationError("targets must be given by a file or by --reading, one of both")
-    with show_progress() as step:
-        found = CalibrationStore(store).reference(
-            sensor,
-            readings if targets is None else targets,
-            date,
-            uncertainty=uncertainty,
-            surprising=surprising,
-            order=order,
-            progress=step,
-        )
-    if as_json:
-        print_json(found.as_dict())
-    _warn(found)
-    _warn(found.added.fitted)
-    if not as_json:
-        print_tables(found.tables())
 
 
 @calibrate.command("fit")
@@ -518,7 +454,7 @@ def health_command(store: Path, sensor: str, since: str | None, plot: Path | Non
         )
 
 
-def _warn(fitted: Added | Fitted | Referenced) -> None:
+def _warn(fitted: Added | Fitted) -> None:
     for warning in fitted.warnings:
         note(f"warning: {warning}")
 

@@ -414,10 +414,11 @@ class CalibrationStore:
     def reference(
         self,
         sensor: str,
-        targets: str | PathLike[str] | Sequence[tuple[float, float, float]],
+        targets: str | PathLike[str] | Sequence[Sequence[float]],
         date: str,
         *,
         uncertainty: float = 0.02,
+        source: str = "by hand",
         surprising: bool = False,
         order: int | None = None,
         progress: Progress = lambda step, done, total: None,
@@ -429,11 +430,14 @@ class CalibrationStore:
         sensor : str
             Its name; it must have measurements already.
         targets : path, or sequence of tuple of float
-            CSV or XLSX file; or readings, each the target's clearance in mm, voltage in V and temperature in degC.
+            CSV or XLSX file; or readings, each the target's clearance in mm, voltage in V and temperature in degC, and
+            optionally the standard uncertainties of all three, 0 for what is not stated.
         date : str
             The day.
         uncertainty : float
             Standard uncertainty in mm of a target's clearance, where the file states none.
+        source : str
+            Where readings are from that are in no file.
         surprising : bool
             As for `add`.
         order : int or None
@@ -445,7 +449,7 @@ class CalibrationStore:
         if isinstance(targets, str | PathLike):
             path = Path(fspath(targets))
         else:
-            path, content = by_hand(date, targets)
+            path, content = by_hand(date, targets, source)
         with open_store(self.path) as store:
             told = _told(progress, "fitting")
             kind = FitOptions(order=order).settings(store, sensor)["sensor_type"]

@@ -1,0 +1,1 @@
+"""Reference targets before the sensor of a board."""
