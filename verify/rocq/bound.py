@@ -9,12 +9,13 @@ from fractions import Fraction
 from flint import fmpz_poly
 
 from sosmith.verify.certificate_file import Certificate, Operation
-from sosmith.verify.rocq.calibration import Calibration, calibration_of
 from sosmith.verify.rocq.cascade import Cascade, Row, Rows
 from sosmith.verify.rocq.claims import Claim
+from sosmith.verify.rocq.entry import Entry, decimated_entry, direct_entry, real
 from sosmith.verify.rocq.exact import ExactRow, exact_row, sections_of, sections_term
 from sosmith.verify.rocq.polynomials import number
 from sosmith.verify.rocq.ranges import Windows, negative, windows_of
+from sosmith.verify.rocq.settling import Counter
 from sosmith.verify.rocq.start import StartNodes
 
 _MORE_BITS = (4, 12, 28, 60, 124)
@@ -29,10 +30,11 @@ _FINE = 1 << 64
 
 def why_no_bound(certificate: Certificate) -> str | None:
     """Why the theorem cannot be written for this certificate, whose ranges are proven; None if it can."""
-    if certificate.decimation is not None:
-        return "there is a decimator"
     if not certificate.ideal.sections:
         return "there are no sections"
+    entry = certificate.decimation
+    if entry is not None and entry.calibration is not None and entry.calibration.output.zero:
+        return "the decimator takes values of which 0 has another code than 0"
     return None
 
 
@@ -43,6 +45,7 @@ class _Task:
     certificate: Certificate
     cascade: Cascade
     start: StartNodes | None
+    counter: Counter | None
 
     @property
     def wire(self) -> int:
@@ -75,19 +78,37 @@ class _Task:
         return self.certificate.output.zero / self.certificate.output.lsb
 
 
-def bound_claims(certificate: Certificate, cascade: Cascade, start: StartNodes | None) -> Iterator[Claim]:
-    """Write the theorem of a certificate for which `why_no_bound` has nothing to say."""
-    task = _Task(certificate, cascade, start)
-    calibration = calibration_of(certificate, cascade.graph, task.taken)
-    words = f"the input of the filter is within {float(calibration.error):.9g} of the exact one"
-    yield Claim("calibrated_input", words, _calibrated(task, calibration))
+def bound_claims(
+    certificate: Certificate, behind: Certificate, cascade: Cascade, start: StartNodes | None, counter: Counter | None
+) -> Iterator[Claim]:
+    """Write the theorems of a certificate for which `why_no_bound` has nothing to say.
+
+    Parameters
+    ----------
+    certificate, behind : Certificate
+        All of it, and what is behind its decimator, if there is one.
+    cascade : Cascade
+        Of what is behind.
+    start : StartNodes or None
+    counter : Counter or None
+    """
+    task = _Task(certificate, cascade, start, counter)
+    entry = (
+        direct_entry(certificate, cascade.graph, task.taken)
+        if certificate.decimation is None
+        else decimated_entry(certificate, behind, cascade.graph, task.taken)
+    )
+    yield from entry.claims
     parts = ", ".join(f"{name} {float(value):.3g}" for name, value in certificate.claims.budget.items())
     words = f"the output is that of the exact filter and errors, each within its part of the budget, limited: {parts}"
-    yield Claim("error_in_parts", words, _parts(task, calibration))
+    yield Claim("error_in_parts", words, _parts(task, entry))
     yield Claim("bound_is_sum_of_parts", "the bound is the sum of the parts of the budget", _sum(certificate))
     bound = certificate.claims.bound
     words = f"for all inputs the output is within {float(bound):.9g} of its last place of the exact filter, limited"
-    yield Claim("error_is_bounded", words, _bound(task))
+    yield Claim("error_is_bounded", words, _bound(task, entry))
+    if counter is not None:
+        words = f"from sample {counter.samples} on, the same and half a code, whatever the inputs were before the start"
+        yield Claim("settled", words, _settled(task, entry, counter))
     error, unit = certificate.max_error, f" {certificate.output.unit}".rstrip()
     yield Claim("error_is_allowed", f"the bound is at most {float(error):.9g}{unit}", _allowed(certificate))
     gain = certificate.claims.peak_gain
@@ -95,39 +116,8 @@ def bound_claims(certificate: Certificate, cascade: Cascade, start: StartNodes |
         yield Claim("peak_gain", f"gain of the exact filter at most {float(gain):.9g}", _peak_gain(certificate, gain))
 
 
-def _calibrated(task: _Task, calibration: Calibration) -> str:
-    two = len(task.certificate.inputs) > 1
-    second = "x m 1%nat" if two else "0"
-    codes, names = ("x m 0%nat) (x m 1%nat", "a b") if two else ("x m 0%nat", "a")
-    error = calibration.error
-    return f"""\
-(* The exact input of the filter from the codes x of the inputs, in units of the output's last place. *)
-Definition calibrated (x : nat -> Z) : R := (
-{calibration.physical})%R.
-Definition in_codes : list (list Z) := {calibration.whole}.
-Lemma calibrated_in_codes : forall x m,
-  calibrated (x m)
-  = (IZR (ev2 in_codes (at_input ports x 0 m) (at_input ports x 1 m)) / IZR {calibration.denominator})%R.
-Proof.
-  intros x m. change (at_input ports x 0 m) with (x m 0%nat). change (at_input ports x 1 m) with ({second}).
-  unfold calibrated. generalize ({codes}). intros {names}. unfold in_codes. cbn [ev2 ev1].
-  cbv zeta. repeat (rewrite plus_IZR || rewrite mult_IZR). field.
-Qed.
-Theorem calibrated_input : forall x, inputs_within ports x -> forall m,
-  (Rabs (calibrated (x m) - IZR (code core x {task.taken} m)
-    * IZR (units_of (frac_of core {task.taken})) / IZR (steps_of (frac_of core {task.taken})))
-    <= IZR {error.numerator} / IZR {error.denominator})%R /\\ (Rabs (calibrated (x m)) <= IZR {calibration.most})%R.
-Proof.
-  intros x X m. rewrite calibrated_in_codes. apply (calibrated_within core ports x core_is_ordered X).
-  - apply Nat.leb_le. reflexivity.
-  - vm_cast_no_check (eq_refl true).
-  - vm_cast_no_check (eq_refl true).
-Qed.
-"""
-
-
 _PARTS = (
-    ("calibration", "input scaling"),
+    ("calibration", "input scaling", "decimation"),
     ("filter coefficients",),
     ("filter rounding",),
     ("start",),
@@ -142,40 +132,33 @@ def _claimed(certificate: Certificate) -> list[Fraction]:
     return [sum((budget.get(name, Fraction(0)) for name in names), Fraction(0)) for names in _PARTS]
 
 
-def _statement(task: _Task) -> tuple[str, str]:
-    """Return how both theorems begin, and the exact filter's output in them."""
+def _statement(task: _Task, entry: Entry) -> tuple[str, str]:
+    """Return how the theorems begin, and the exact filter's output in them."""
     begins = "from_zero" if task.start is None else "from_first"
-    over = f"IZR {number(task.offset.numerator)} / IZR {task.offset.denominator}"
-    value = f"(y (Z.of_nat n) - {over})" if task.offset else "(y (Z.of_nat n))"
     head = f"""\
-forall x, inputs_within ports x ->
-  forall y, exact_filter exact_sections ({begins} (fun n => calibrated (x n))) y -> forall n,"""
-    return head, value
+forall x, inputs_within {entry.ports} x ->
+  forall y, exact_filter exact_sections ({begins} {entry.exact}) y -> forall n,"""
+    return head, _exactly(task)
 
 
-def _parts(task: _Task, calibration: Calibration) -> str:
-    certificate, cascade, start = task.certificate, task.cascade, task.start
-    port, offset = certificate.output, task.offset
-    rows, exact, more = _decided(task, calibration)
+def _exactly(task: _Task) -> str:
+    over = f"IZR {number(task.offset.numerator)} / IZR {task.offset.denominator}"
+    return f"(y (Z.of_nat n) - {over})" if task.offset else "(y (Z.of_nat n))"
+
+
+def _parts(task: _Task, entry: Entry) -> str:
+    certificate, cascade, start, counter = task.certificate, task.cascade, task.start, task.counter
+    rows, exact, more = _decided(task, entry)
     held = "None" if task.held is None else f"(Some {task.held}%nat)"
-    limits = f"{number(port.lowest)} {number(port.highest)} {number(offset.numerator)} {offset.denominator}"
-    if start is None:
-        entry = "intros n. rewrite Rminus_0_r. reflexivity"
-    else:
-        entry = (
-            f"intros n. apply (start_entry core x begin {task.wire} n core_is_ordered start_is). "
-            f"apply (wire_code core x {task.wire} {start.change} n core_is_ordered). vm_cast_no_check (eq_refl true)"
-        )
+    parts = " ".join(f"({number(part.numerator)}, {part.denominator})" for part in _claimed(certificate))
+    head, exactly = _statement(task, entry)
+    places = f"Parts {task.out} {task.last} ({rows.plan}) {cascade.sections[0].wires[0]} {task.taken} {held}"
+    error, out = entry.error, certificate.output
+    settling = "None" if counter is None else f"(Some {counter.samples}%N)"
     first = "exact I"
     if task.held is not None:
-        first = "intros n. exact (proj2 (started_from core x begin core_is_ordered start_is n))"
-    zero = "0" if start is None else f"(code core x {task.taken} 0)"
-    value = "0%R" if start is None else "(calibrated (x 0%nat))"
-    parts = " ".join(f"({number(part.numerator)}, {part.denominator})" for part in _claimed(certificate))
-    head, exactly = _statement(task)
-    places = f"Parts {task.out} {task.last} ({rows.plan}) {cascade.sections[0].wires[0]} {task.taken} {held}"
-    error = calibration.error
-    rewritten = "" if offset else "replace (y (Z.of_nat n)) with (y (Z.of_nat n) - IZR 0 / IZR 1)%R by field. "
+        first = f"intros j; exact (proj2 (started_from core {entry.codes} begin core_is_ordered start_is j))"
+    value = "0%R" if start is None else f"({entry.exact} 0%nat)"
     return f"""\
 (* The sections of the exact filter, numerators and denominators. *)
 Definition exact_sections : list (list Z * list Z) :=
@@ -184,37 +167,92 @@ Definition exact_sections : list (list Z * list Z) :=
 Definition claimed : budget := Budget {parts}.
 Definition details : parts_ := {places} {"false" if start is None else "true"}
   {exact.parts}
-  {calibration.most} (2 ^ 64) {more} {error.numerator} {error.denominator}.
+  {entry.most} (2 ^ 64) {more} {error.numerator} {error.denominator} {settling}.
+Lemma parts_are_claimed : parts_hold (parts_of core sources forms {cascade.last} window details exact_sections {_limits(task)}) claimed
+  = true.
+Proof. vm_cast_no_check (eq_refl true). Qed.
 Theorem error_in_parts : {head} exists e, in_parts claimed e
-    /\\ IZR (code core x {task.out} n)
-      = limited (IZR {number(port.lowest)}) (IZR {number(port.highest)}) ({exactly} + e).
+    /\\ IZR (code core {entry.codes} {task.out} n)
+      = limited (IZR {number(out.lowest)}) (IZR {number(out.highest)}) ({exactly} + e).
 Proof.
-  intros x X y Y n. {rewritten}revert n. revert y Y.
-  apply (error_parts core x sources forms {cascade.last} window details exact_sections {limits} claimed
-    (fun n => calibrated (x n)) {zero} {value} core_is_ordered sections_are_closed forms_fit).
-  - vm_cast_no_check (eq_refl true).
-  - exact (every_code_in_range x X).
-  - exact (window_is x X).
-  - {entry}.
-  - unfold details. cbn [steady taken]. reflexivity.
-  - unfold details. cbn [steady taken]. reflexivity.
-  - {first}.
-  - exact (calibrated_input x X).
+  intros x X y Y n.
+  destruct (error_parts core {entry.codes} sources forms {cascade.last} window details exact_sections {_limits(task)} claimed 0
+    {entry.exact} {_zero(task, entry.codes)} {value} core_is_ordered sections_are_closed forms_fit parts_are_claimed
+    (every_code_in_range {entry.codes} {entry.within}) (window_is {entry.codes} {entry.within})
+    ltac:({_first_input(task, entry.codes)}) (or_introl eq_refl) ltac:({_EASY}) ltac:({_EASY}) ltac:({first})
+    (calibrated_input x X) y Y n I) as [e [t [P [_ [T E]]]]].
+  exists e. split; [exact P|]. rewrite (T eq_refl), Rplus_0_r in E. {_tidied(task)}exact E.
 Qed.
 """
 
 
-def _bound(task: _Task) -> str:
-    port, bound = task.certificate.output, task.certificate.claims.bound
-    head, exactly = _statement(task)
+_EASY = "unfold details; cbn [steady taken]; reflexivity"
+"""How it is proven what `details` is."""
+
+
+def _limits(task: _Task) -> str:
+    port, offset = task.certificate.output, task.offset
+    return f"{number(port.lowest)} {number(port.highest)} {number(offset.numerator)} {offset.denominator}"
+
+
+def _tidied(task: _Task) -> str:
+    return "" if task.offset else "replace (y (Z.of_nat n) - IZR 0 / IZR 1)%R with (y (Z.of_nat n)) in E by field. "
+
+
+def _zero(task: _Task, codes: str) -> str:
+    """Return what is taken off the samples before the sections."""
+    return "0" if task.start is None else f"(code core {codes} {task.taken} 0)"
+
+
+def _first_input(task: _Task, codes: str) -> str:
+    """Return how it is proven that the sections take the samples less that."""
+    if task.start is None:
+        return "intros j; rewrite Rminus_0_r; reflexivity"
+    return (
+        f"intros j; apply (start_entry core {codes} begin {task.wire} j core_is_ordered start_is); "
+        f"apply (wire_code core {codes} {task.wire} {task.start.change} j core_is_ordered); vm_cast_no_check (eq_refl true)"
+    )
+
+
+def _difference(task: _Task, codes: str, at: str) -> str:
+    port = task.certificate.output
+    code = f"IZR (code core {codes} {task.out} {at})"
+    return f"{code} - limited (IZR {number(port.lowest)}) (IZR {number(port.highest)}) {_exactly(task)}"
+
+
+def _bound(task: _Task, entry: Entry) -> str:
+    bound = task.certificate.claims.bound
+    head, _ = _statement(task, entry)
     return f"""\
 Theorem error_is_bounded : {head}
-  (Rabs (IZR (code core x {task.out} n) - limited (IZR {number(port.lowest)}) (IZR {number(port.highest)}) {exactly})
+  (Rabs ({_difference(task, entry.codes, "n")})
     <= IZR {number(bound.numerator)} / IZR {bound.denominator})%R.
 Proof.
   intros x X y Y n. destruct (error_in_parts x X y Y n) as [e [P E]].
   eapply Rle_trans; [exact (within_sum claimed _ _ _ _ _ P E)|].
   rewrite bound_is_sum_of_parts. apply Rle_refl.
+Qed.
+"""
+
+
+def _settled(task: _Task, entry: Entry, counter: Counter) -> str:
+    """Write the theorem on what is left of anything before: of m samples that the exact filter did not see."""
+    bound, samples = task.certificate.claims.bound, counter.samples
+    codes, within = (text.replace("x", "z", 1) if text == "x" else text.replace(" x", " z") for text in (entry.codes, entry.within))
+    return f"""\
+Theorem settled : forall z, inputs_within {entry.ports} z ->
+  forall m y, exact_filter exact_sections (from_zero {entry.late}) y -> forall n, {samples} <= Z.of_nat n ->
+  (Rabs ({_difference(task, codes, "(m + n)")})
+    <= IZR {number(bound.numerator)} / IZR {bound.denominator} + 1 / 2)%R.
+Proof.
+  intros z X m y Y n N.
+  destruct (error_parts core {codes} sources forms {task.cascade.last} window details exact_sections {_limits(task)} claimed m
+    {entry.late} {_zero(task, codes)} 0%R core_is_ordered sections_are_closed forms_fit parts_are_claimed
+    (every_code_in_range {codes} {within}) (window_is {codes} {within})
+    ltac:({_first_input(task, codes)}) (or_intror eq_refl) ltac:({_EASY}) ltac:({_EASY}) I
+    (fun j => calibrated_input z X (m + j)%nat) y Y n
+    ltac:(destruct m; [exact I|unfold details; cbn [settling_]; lia])) as [e [t [P [T [_ E]]]]].
+  {_tidied(task)}rewrite <- bound_is_sum_of_parts. exact (within_late claimed _ _ _ _ _ _ P T E).
 Qed.
 """
 
@@ -228,12 +266,9 @@ Proof. unfold sum_of, real, claimed. cbn [fst snd of_input of_coefficients of_ro
 
 
 def _allowed(certificate: Certificate) -> str:
-    def real(value: Fraction) -> str:
-        return f"IZR {number(value.numerator)} / IZR {value.denominator}"
-
     parts = [real(value) for value in (certificate.claims.bound, certificate.output.lsb, certificate.max_error)]
     return f"""\
-Theorem error_is_allowed : ({parts[0]} * ({parts[1]}) <= {parts[2]})%R.
+Theorem error_is_allowed : ({parts[0]} * {parts[1]} <= {parts[2]})%R.
 Proof. lra. Qed.
 """
 
@@ -257,7 +292,7 @@ Qed.
 """
 
 
-def _decided(task: _Task, calibration: Calibration) -> tuple[Rows, ExactRow, int]:
+def _decided(task: _Task, entry: Entry) -> tuple[Rows, ExactRow, int]:
     """Return rows that prove the bound, or those with the highest precision."""
     graph = task.cascade.graph
     last, index = graph.node(task.last), len(task.cascade.sections) - 1
@@ -268,23 +303,23 @@ def _decided(task: _Task, calibration: Calibration) -> tuple[Rows, ExactRow, int
         rows = task.cascade.rows(index, task.last, bits)
         near = 84 + size - last.frac + extra
         more = max(near + 8 - (rows.whole.bit_length() - bits), 0)
-        exact = exact_row(sections, calibration.most * _FINE, rows.whole << more, near)
-        if _fits(task, calibration, rows, exact, more):
+        exact = exact_row(sections, entry.most * _FINE, rows.whole << more, near)
+        if _fits(task, entry, rows, exact, more):
             break
     return rows, exact, more
 
 
-def _fits(task: _Task, calibration: Calibration, rows: Rows, exact: ExactRow, more: int) -> bool:
+def _fits(task: _Task, entry: Entry, rows: Rows, exact: ExactRow, more: int) -> bool:
     """Whether `parts_hold` of the theories holds, but for the last stage, which is taken for what it should be."""
     graph, windows = task.cascade.graph, windows_of(task.cascade, task.start)
     taken, last = graph.node(task.taken), graph.node(task.last)
-    entry = task.cascade.sections[0].wires[0]
+    place = task.cascade.sections[0].wires[0]
     f, units, point, whole = max(taken.frac, 0), max(-taken.frac, 0), max(last.frac, 0), rows.whole << more
     up = f + more + point - last.frac
-    others = {place: over * (1 << up) for place, over in rows.row.items()}
-    entering = {entry: others.pop(entry, fmpz_poly()) - exact.row * (1 << point + units)}
+    others = {key: over * (1 << up) for key, over in rows.row.items()}
+    entering = {place: others.pop(place, fmpz_poly()) - exact.row * (1 << point + units)}
     size = sum(abs(int(value)) for value in exact.row.coeffs())
-    error = calibration.error
+    error = entry.error
     at_rest = Fraction(0)
     if task.start is not None:
         gain = _gain(task) if task.held is not None else Fraction(0)

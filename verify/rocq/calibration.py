@@ -64,7 +64,7 @@ def calibration_of(certificate: Certificate, graph: FlatGraph, node: int) -> Cal
     ]
     middles = [*graph.ports, (0, 0)]
     error = radius * unit + _size(_about(apart, middles), [abs(high - low) for low, high in middles])
-    return Calibration(_physical(certificate), rows(whole), denominator, error, -int(-_size(exact, sizes) // 1))
+    return Calibration(formula(certificate), rows(whole), denominator, error, -int(-_size(exact, sizes) // 1))
 
 
 def _gcd(a: int, b: int) -> int:
@@ -124,8 +124,8 @@ def _rational(value: Fraction) -> str:
     return f"{number(value.numerator)} / {value.denominator}" if value.denominator > 1 else number(value.numerator)
 
 
-def _physical(certificate: Certificate) -> str:
-    """Write the ideal polynomial in Horner's form."""
+def formula(certificate: Certificate) -> str:
+    """Write the ideal polynomial in physical units, in Horner's form, as a term of Rocq in `x`, the codes."""
 
     def horner(parts: Sequence[str], variable: str) -> str:
         text = parts[-1]

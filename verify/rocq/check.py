@@ -8,13 +8,15 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from sosmith.model.errors import ToolError
-from sosmith.verify.certificate_file import Certificate, Operation, StageEntry
+from sosmith.verify.certificate_file import Certificate
+from sosmith.verify.decimation import at_lower_rate
 from sosmith.verify.rocq.bound import bound_claims, why_no_bound
 from sosmith.verify.rocq.cascade import cascade_of
 from sosmith.verify.rocq.claims import Claim, gain_claims
 from sosmith.verify.rocq.flat import flattened
 from sosmith.verify.rocq.kernel import LIBRARY, THEORIES, ending, mark, run_kernel, theory_texts
-from sosmith.verify.rocq.ranges import graph_definitions, range_claims, tight_claim
+from sosmith.verify.rocq.ranges import core_definitions, range_claims, tight_claim
+from sosmith.verify.rocq.settling import counter_of
 from sosmith.verify.rocq.start import start_of
 
 DATA = "Claims"
@@ -114,7 +116,7 @@ def head(theories: Sequence[str] = THEORIES) -> str:
     """Return how a file of theorems begins that requires these theories."""
     return f"""\
 (* Written from a certificate: its claims as theorems. The theories beside it say what they mean. *)
-Require Import ZArith Reals List Lra. Import ListNotations.
+Require Import ZArith Reals List Lia Lra. Import ListNotations.
 From {LIBRARY} Require Import {" ".join(theories)}.
 Open Scope Z_scope.
 """
@@ -147,42 +149,30 @@ def theorems(certificate: Certificate) -> Theorems:
     RejectedError
         If its claims cannot be written as theorems.
     """
-    graph = flattened(certificate)
+    behind = at_lower_rate(certificate)
+    graph = flattened(behind)
     claims = list(gain_claims(certificate))
     unchecked = list(_beside(certificate))
-    why = _why_no_ranges(certificate.stages)
-    if why is not None:
-        return Theorems("", claims, (f"ranges: {why}", "error bound: no ranges are proven", *unchecked))
     cascade = cascade_of(graph) if certificate.claims.sections else None
-    start = start_of(graph)
+    start, counter = start_of(graph), counter_of(certificate, graph)
     claims.append(tight_claim())
-    claims += range_claims(graph, cascade, start)
+    if counter is not None:
+        claims.append(counter.claim())
+    claims += range_claims(graph, cascade, start, counter)
     why = why_no_bound(certificate)
     if why is not None or cascade is None:
         unchecked.insert(0, f"error bound: {why}")
     else:
-        claims += bound_claims(certificate, cascade, start)
-    return Theorems(graph_definitions(graph), claims, tuple(unchecked))
+        claims += bound_claims(certificate, behind, cascade, start, counter)
+    return Theorems(core_definitions(graph), claims, tuple(unchecked))
 
 
 def _beside(certificate: Certificate) -> Iterator[str]:
     """Name the claims that no theorem is about."""
-    if certificate.claims.settling is not None:
-        yield "how soon the filter has settled"
     if certificate.claims.online is not None:
         yield "the units of sections in on-line arithmetic"
     if certificate.decimation is not None:
-        yield "decimator and what is before it"
-
-
-def _why_no_ranges(stages: Sequence[StageEntry]) -> str | None:
-    """Why theorems cannot be written for the ranges of these stages; None if they can."""
-    for stage in stages:
-        for node in stage.nodes if stage.role not in {"section", "start"} else ():
-            of = stage.nodes[node.operands[0]] if node.op is Operation.BOUND else node
-            if of.low < node.low or of.high > node.high:
-                return f"{stage.name} limits a range by something else than peak gains"
-    return None
+        yield "what folds into the pass band at the decimator"
 
 
 def _texts(made: Theorems) -> dict[str, str]:

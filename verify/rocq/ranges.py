@@ -10,6 +10,7 @@ from sosmith.verify.rocq.claims import Claim
 from sosmith.verify.rocq.flat import FlatGraph
 from sosmith.verify.rocq.linear import Source
 from sosmith.verify.rocq.polynomials import number
+from sosmith.verify.rocq.settling import Counter
 from sosmith.verify.rocq.start import StartNodes
 
 _FEWER_BITS = (28, 20, 12, 4, -8, -40)
@@ -76,15 +77,21 @@ def negative(row: Row) -> Row:
     return {place: -over for place, over in row.items()}
 
 
-def graph_definitions(graph: FlatGraph) -> str:
-    """Write the graph and the ranges of its inputs."""
+def core_definitions(graph: FlatGraph) -> str:
+    """Write the core's graph and the ranges of its inputs."""
     ports = "; ".join(f"({number(low)}, {number(high)})" for low, high in graph.ports)
     return f"""\
 (* The core: all nodes of all stages in a row, and the ranges of its inputs. *)
-Definition core : graph :=
-  [{graph.term()[1:]}.
 Definition ports : list (Z * Z) := [{ports}].
-Lemma core_is_ordered : ordered core = true.
+{graph_definitions(graph, "core")}"""
+
+
+def graph_definitions(graph: FlatGraph, name: str) -> str:
+    """Write a graph."""
+    return f"""\
+Definition {name} : graph :=
+  [{graph.term()[1:]}.
+Lemma {name}_is_ordered : ordered {name} = true.
 Proof. vm_cast_no_check (eq_refl true). Qed.
 """
 
@@ -97,10 +104,13 @@ def tight_claim() -> Claim:
     return Claim("ranges_are_tight_", "no range is wider than what its operands give", text)
 
 
-def range_claims(graph: FlatGraph, cascade: Cascade | None, start: StartNodes | None) -> Iterator[Claim]:
+def range_claims(
+    graph: FlatGraph, cascade: Cascade | None, start: StartNodes | None, counter: Counter | None
+) -> Iterator[Claim]:
     """Write the theorems: before the sections, section by section, and of all nodes."""
     if cascade is None:
-        yield Claim("every_code_in_range", f"ranges of all {graph.size} nodes", _all(graph.size, None))
+        text = all_in_range("every_code_in_range", "core", "ports", graph.size)
+        yield Claim("every_code_in_range", f"ranges of all {graph.size} nodes", text)
         return
     known = cascade.sections[0].known
     if start is not None:
@@ -118,9 +128,14 @@ def range_claims(graph: FlatGraph, cascade: Cascade | None, start: StartNodes | 
         name, last = f"ranges_of_section_{index}", index + 1 == len(cascade.sections)
         through = graph.size if last else cascade.sections[index + 1].known
         words = f"section {index}: ranges of {len(section.targets)} nodes by peak gains, of all nodes before {through}"
-        yield Claim(name, words, _section(name, before, windows, index, through))
+        yield Claim(name, words, _section(name, before, windows, index, through, counter if last else None))
         before = name
-    yield Claim("every_code_in_range", f"ranges of all {graph.size} nodes", _all(graph.size, before))
+    text = f"""\
+Theorem every_code_in_range : forall x, inputs_within ports x ->
+  forall n i, (i < length core)%nat -> in_range core x i n.
+Proof. exact {before}. Qed.
+"""
+    yield Claim("every_code_in_range", f"ranges of all {graph.size} nodes", text)
 
 
 def windows_of(cascade: Cascade, start: StartNodes | None) -> Windows:
@@ -196,37 +211,39 @@ Qed.
 """
 
 
-def _section(name: str, before: str, windows: Windows, index: int, through: int) -> str:
+def _section(
+    name: str, before: str, windows: Windows, index: int, through: int, counter: Counter | None
+) -> str:
     cascade = windows.cascade
     section = cascade.sections[index]
     plans = "; ".join(f"({target}%nat, {_decided(windows, index, target).plan})" for target in section.targets)
+    given, counts = f"map fst plans_{index}", ""
+    if counter is not None:
+        given = f"{counter.next}%nat :: {given}"
+        counts = f"""intros t n [<-|T]; [exact (proj2 (flagged_from core x flags {counter.samples} core_is_ordered flags_count n))|].
+    revert t n T. """
     return f"""\
 Definition plans_{index} : list (nat * plan) := [{plans}].
 Theorem {name} : forall x, inputs_within ports x -> forall n i, (i < {through})%nat -> in_range core x i n.
 Proof.
-  intros x X. apply (ranges_further {section.known} {through} core ports (map fst plans_{index}) x core_is_ordered).
+  intros x X. apply (ranges_further {section.known} {through} core ports ({given}) x core_is_ordered).
   - vm_cast_no_check (eq_refl true).
   - vm_cast_no_check (eq_refl true).
   - exact X.
   - exact ({before} x X).
-  - apply (targets_in_range core x sources forms {cascade.last} {section.known} window plans_{index} core_is_ordered
+  - {counts}apply (targets_in_range core x sources forms {cascade.last} {section.known} window plans_{index} core_is_ordered
       sections_are_closed forms_fit); [|exact (window_is x X)|exact ({before} x X)].
     vm_cast_no_check (eq_refl true).
 Qed.
 """
 
 
-def _all(size: int, before: str | None) -> str:
-    statement = """\
-Theorem every_code_in_range : forall x, inputs_within ports x ->
-  forall n i, (i < length core)%nat -> in_range core x i n.
-"""
-    if before is not None:
-        return f"{statement}Proof. exact {before}. Qed.\n"
+def all_in_range(name: str, graph: str, ports: str, size: int) -> str:
+    """Write that every code of a graph without memory is in its range."""
     return f"""\
-{statement}\
+Theorem {name} : forall x, inputs_within {ports} x -> forall n i, (i < length {graph})%nat -> in_range {graph} x i n.
 Proof.
-  intros x X. apply (ranges {size} core ports [] x core_is_ordered); try exact X; try (intros i n []).
+  intros x X. apply (ranges {size} {graph} {ports} [] x {graph}_is_ordered); try exact X; try (intros i n []).
   - vm_cast_no_check (eq_refl true).
   - vm_cast_no_check (eq_refl true).
 Qed.

@@ -2,9 +2,10 @@
 
    The code in front of the last rounding is a known response to what enters the sections and to the roundings (`Cascade`);
    the exact filter is a known response to the exact input (`Exact`). Their difference is one response to what enters, and
-   the other roundings; to that come what the calibration adds, the first sample, and the last rounding. *)
+   the other roundings; to that come what the calibration adds, the first sample, and the last rounding. Behind the samples
+   that are flagged as settling the same holds whatever was before, but for the tails of the responses. *)
 Require Import Bool ZArith Reals List Lia Lra. Import ListNotations.
-From Sosmith Require Import Definitions Streams Responses Graph Ranges Linear Gains Cascade Exact.
+From Sosmith Require Import Definitions Streams Responses Graph Ranges Linear Gains Cascade Settling Exact.
 Open Scope Z_scope.
 
 Lemma min_near h a b : (Rabs (Rmin h a - Rmin h b) <= Rabs (a - b))%R.
@@ -102,9 +103,10 @@ Definition rounding_node (g : graph) (out : nat) (lo hi : Z) : option nat :=
 
 (* All that goes into the bound. `entry` is the place of the source that enters the sections, `taken` the node with the
    samples, and `held` that with the first sample; in_p / in_q bounds what the calibration adds at the input. The exact
-   filter is followed with `more` bits than the graph, and the limits of its signals in units of 1 / fine. *)
+   filter is followed with `more` bits than the graph, and the limits of its signals in units of 1 / fine. Of a filter that
+   starts from zero, so many samples are flagged as `settling_`. *)
 Record parts_ := Parts { out : nat; last_ : nat; plan_ : plan; entry : nat; taken : nat; held_ : option nat; steady : bool;
-  exact : list part; least_ : Z; fine : Z; more : Z; in_p : Z; in_q : Z }.
+  exact : list part; least_ : Z; fine : Z; more : Z; in_p : Z; in_q : Z; settling_ : option N }.
 Definition at_most_ (value unit : Z) (a : ratio) : bool := (0 <? snd a) && (value * snd a <=? fst a * unit).
 Lemma at_most_spec value unit a : 0 < unit -> at_most_ value unit a = true -> (IZR value / IZR unit <= real a)%R.
 Proof.
@@ -125,7 +127,9 @@ Qed.
 Definition either (g : graph) (S : list source) (W : windows) (row : list (list Z)) : Z :=
   Z.max (most_of g S W row) (most_of g S W (scale_rows (-1) row)).
 (* The parts as numbers, in units of 1 / (2^F steps_of f K) but for the last one, which is in units of 1 / (2 2^F off_q). *)
-Record values := Values { input_ : Z; coefficients_ : Z; roundings_ : Z; start_ : Z; output_ : Z; unit_ : Z; unit_out : Z }.
+Record values := Values { input_ : Z; coefficients_ : Z; roundings_ : Z; start_ : Z; output_ : Z; unit_ : Z; unit_out : Z; late_ : Z }.
+Definition late_of (g : graph) (S : list source) (W : windows) (d : parts_) (row : list (list Z)) : Z :=
+  match settling_ d with Some n => late_sum (Datatypes.S (N.to_nat n)) row (map (reach g) (used S row)) | None => 0 end.
 Definition parts_of (g : graph) (S : list source) (forms : list (option form)) (k : nat) (W : windows) (d : parts_)
     (sections : list (list Z * list Z)) (lo hi off_p off_q : Z) : option values :=
   match rounding_node g (out d) lo hi with
@@ -149,11 +153,12 @@ Definition parts_of (g : graph) (S : list source) (forms : list (option form)) (
            && (frac_of g a =? 0) && (0 <=? F) && (0 <? K) && (0 <? off_q) && (0 <? in_q d) && (0 <=? in_p d)
            && (0 <? fine d) && (0 <=? more d)
            && (steady d || match held_ d with None => true | Some _ => false end)
+           && match settling_ d with None => true | Some _ => negb (steady d) && forallb (known_source g (length g)) (used S row) end
         then Some (Values (2 ^ F * steps_of f * ((norm1 E * in_p d + in_q d - 1) / in_q d))
                (either g S W entering + 2 ^ F * steps_of f * (Re / fine d + 1))
                (either g S W others + steps_of f * (2 ^ more d * Z.abs alpha) * R) from_first
                (Z.abs (2 * off_q * gamma - 2 ^ F * off_q + 2 * 2 ^ F * off_p) + 2 ^ F * off_q)
-               (2 ^ F * steps_of f * K) (2 * (2 ^ F * off_q)))
+               (2 ^ F * steps_of f * K) (2 * (2 ^ F * off_q)) (steps_of f * (2 ^ more d * Z.abs alpha) * late_of g S W d row))
         else None
       | _, _ => None
       end
@@ -168,24 +173,48 @@ Definition parts_hold (v : option values) (c : budget) : bool :=
       && (close (input_ v) (unit_ v) (of_input c) && close (coefficients_ v) (unit_ v) (of_coefficients c)
           && close (roundings_ v) (unit_ v) (of_roundings c) && close (start_ v) (unit_ v) (of_start c)
           && close (output_ v) (unit_out v) (of_output c))
+      && (2 * late_ v <=? unit_ v)
   | None => false
   end.
 
-(* The code is that of the exact filter and five errors, limited. *)
-Theorem error_parts g x S forms k W d sections lo hi off_p off_q bud (c : nat -> R) (w0 : Z) (c0 : R) :
+Lemma all_within g x S row : (forall n i, (i < length g)%nat -> in_range g x i n) -> ordered g = true ->
+  forallb (known_source g (length g)) (used S row) = true -> Forall2 within (map (drive g x) (used S row)) (map (reach g) (used S row)).
+Proof.
+  intros K G H. rewrite forallb_forall in H. induction (used S row) as [|s l IH]; constructor.
+  - apply (source_within g x (length g) G K). apply H. left. reflexivity.
+  - apply IH. intros t Ht. apply H. right. exact Ht.
+Qed.
+Lemma most_of_shifted g x S l m n : (forall n i, (i < length g)%nat -> in_range g x i n) -> ordered g = true ->
+  forallb (known_source g (length g)) (used S l) = true ->
+  (total l (map (shifted m) (map (drive g x) S)) n <= IZR (most l (map (reach_in g None false) (used S l)) (map (reach_in g None true) (used S l))))%R.
+Proof.
+  intros K G H. rewrite (total_short l _ (length l)) by reflexivity. rewrite !firstn_map. fold (used S l).
+  assert (A : Forall2 within (map (shifted m) (map (drive g x) (used S l))) (map (reach g) (used S l)))
+    by (apply within_shifted, all_within; assumption).
+  pose proof (total_tops l _ _ n A) as T. apply Rle_trans with (1 := T). apply IZR_le.
+  eapply Z.le_trans; [apply prefix_largest|].
+  assert (R0 : forall b, map (reach_in g None b) (used S l) = map (reach g) (used S l)) by (intros b; apply map_ext; intros [i|i k|i k]; reflexivity).
+  unfold most. rewrite !R0. destruct (same_ranges _ _); lia.
+Qed.
+
+(* The code is that of the exact filter and five errors, limited. Of the first m samples, which the exact filter did not see,
+   less than half a code is left once n are behind them. *)
+Theorem error_parts g x S forms k W d sections lo hi off_p off_q bud (m : nat) (c : nat -> R) (w0 : Z) (c0 : R) :
   ordered g = true -> closed k g = true -> every (fits_node g S forms) 0 (firstn k g) = true ->
   parts_hold (parts_of g S forms k W d sections lo hi off_p off_q) bud = true ->
   (forall n i, (i < length g)%nat -> in_range g x i n) -> window_holds g x W ->
   (forall n, nth (entry d) (map (drive g x) S) (fun _ => 0%R) n = (IZR (code g x (taken d) n) - IZR w0)%R) ->
+  (m = O \/ W = None) ->
   w0 = (if steady d then code g x (taken d) 0 else 0) -> c0 = (if steady d then c O else 0%R) ->
   match held_ d with Some j => forall n, code g x j n = w0 | None => True end ->
-  (forall n, (Rabs (c n - IZR (code g x (taken d) n) * IZR (units_of (frac_of g (taken d))) / IZR (steps_of (frac_of g (taken d)))) <= IZR (in_p d) / IZR (in_q d))%R
+  (forall n, (Rabs (c n - IZR (code g x (taken d) (m + n)) * IZR (units_of (frac_of g (taken d))) / IZR (steps_of (frac_of g (taken d)))) <= IZR (in_p d) / IZR (in_q d))%R
     /\ (Rabs (c n) <= IZR (least_ d))%R) ->
   forall y, exact_filter sections (after c0 c) y ->
-  forall n, exists e, in_parts bud e
-    /\ IZR (code g x (out d) n) = limited (IZR lo) (IZR hi) (y (Z.of_nat n) - IZR off_p / IZR off_q + e).
+  forall n, match m, settling_ d with O, _ => True | _, Some s => (N.to_nat s <= n)%nat | _, None => False end ->
+  exists e t, in_parts bud e /\ (Rabs t <= 1 / 2)%R /\ (m = O -> t = 0%R)
+    /\ IZR (code g x (out d) (m + n)) = limited (IZR lo) (IZR hi) (y (Z.of_nat n) - IZR off_p / IZR off_q + e + t).
 Proof.
-  intros G C E H Known Wh Entry W0 C0 Held Near y Y n. unfold parts_hold, parts_of in H.
+  intros G C E H Known Wh Entry MW W0 C0 Held Near y Y n Late. unfold parts_hold, parts_of in H.
   destruct (rounding_node g (out d) lo hi) as [a|] eqn:Er; [|discriminate].
   destruct (op (nth a g blank)) as [| | | | | | |b| | | | | |] eqn:Ea; try discriminate.
   destruct (rows_of g S forms k (length g) (last_ d) (plan_ d)) as [[[row R] K1]|] eqn:Erow; [|discriminate].
@@ -201,24 +230,40 @@ Proof.
   set (re := Re / fine d + 1) in *.
   set (unit := 2 ^ F * steps_of f * K) in *.
   match type of H with match (if ?b then _ else _) with Some _ => _ | None => _ end = _ => destruct b eqn:Hc; [|discriminate] end.
-  cbn [input_ coefficients_ roundings_ start_ output_ unit_ unit_out] in H.
-  apply andb_prop in H. destruct H as [H _]. apply andb_prop in H. destruct H as [H P5]. apply andb_prop in H. destruct H as [H P4].
+  cbn [input_ coefficients_ roundings_ start_ output_ unit_ unit_out late_] in H.
+  apply andb_prop in H. destruct H as [H Half]. apply Z.leb_le in Half. apply andb_prop in H. destruct H as [H _]. apply andb_prop in H. destruct H as [H P5]. apply andb_prop in H. destruct H as [H P4].
   apply andb_prop in H. destruct H as [H P3]. apply andb_prop in H. destruct H as [P1 P2].
   rename Hc into H.
+  apply andb_prop in H. destruct H as [H Settles].
   repeat match type of H with _ && _ = true => let X := fresh "X" in apply andb_prop in H; destruct H as [H X] end.
   rename X0 into More. rename X1 into Fine. apply Z.leb_le in More. apply Z.ltb_lt in Fine.
   apply Nat.ltb_lt in H. apply Nat.ltb_lt in X12. apply Nat.ltb_lt in X11. apply Nat.ltb_lt in X10. apply Z.eqb_eq in X7.
   apply Z.leb_le in X6. apply Z.ltb_lt in X5. apply Z.ltb_lt in X4. apply Z.ltb_lt in X3. apply Z.leb_le in X2.
   assert (Lb : (b < a)%nat) by (apply (operands_before g G a b X12); rewrite Ea; left; reflexivity).
-  set (u := map (drive g x) S) in *.
+  set (u0 := map (drive g x) S) in *. set (u := map (shifted m) u0).
+  assert (Zero : m = O -> u = u0).
+  { intros M0. unfold u. rewrite M0. rewrite (map_ext (shifted 0) (fun z => z)) by reflexivity. apply map_id. }
+  assert (Steady : steady d = true -> m = O).
+  { intros Sd. rewrite Sd in Settles. destruct m; [reflexivity|]. destruct (settling_ d); [discriminate|contradiction]. }
   (* The parts, all of them real numbers. *)
-  destruct (rows_spec g x S forms k (length g) G C E Known (last_ d) (plan_ d) row R K1 n X11 Erow
-    (fun m' _ => Known m' (last_ d) ltac:(pose proof (closed_length k g C); lia))) as [e1 [B1 H1]].
-  fold u in H1. set (v := trace g x (last_ d) n) in *.
+  destruct (rows_spec g x S forms k (length g) G C E Known (last_ d) (plan_ d) row R K1 (m + n) X11 Erow
+    (fun m' _ => Known m' (last_ d) ltac:(pose proof (closed_length k g C); lia))) as [e1 [B1 H0]].
+  fold u0 in H0. set (v := trace g x (last_ d) (m + n)%nat) in *.
+  set (late := (total row u0 (m + n) - total row u n)%R).
+  assert (H1 : (IZR K1 * v = total row u n + (e1 + late))%R) by (unfold late; lra).
+  assert (Now : m = O -> late = 0%R) by (intros M0; unfold late; rewrite (Zero M0), M0; simpl; ring).
+  assert (Bl : (Rabs late <= IZR (late_of g S W d row))%R).
+  { unfold late_of. destruct (settling_ d) as [ns|] eqn:En.
+    - apply andb_prop in Settles. destruct Settles as [_ Settles]. destruct m as [|m'].
+      + rewrite (Now eq_refl), Rabs_R0. apply IZR_le. clear. generalize (map (reach g) (used S row)). induction row as [|l N IH]; intros [|b r]; cbn [late_sum]; try lia.
+        specialize (IH r). pose proof (norm1_pos (skipn (Datatypes.S (N.to_nat ns)) l)). assert (0 <= mag b) by (unfold mag; lia). nia.
+      + unfold late, u. rewrite (total_short row u0 (length row)), (total_short row (map _ u0) (length row)) by reflexivity.
+        rewrite firstn_map. apply total_shifted; [|exact Late]. unfold u0, used. rewrite firstn_map. apply all_within; assumption.
+    - destruct m as [|m']; [|contradiction]. rewrite (Now eq_refl), Rabs_R0. lra. }
   set (mm := 2 ^ more d) in *. assert (M0 : 0 < mm) by (apply Z.pow_pos_nonneg; lia).
   assert (m0 : (0 < IZR mm)%R) by (apply IZR_lt; exact M0).
   assert (Kp : 0 < K) by assumption.
-  set (wcode := fun j => IZR (code g x (taken d) j)) in *.
+  set (wcode := fun j => IZR (code g x (taken d) (m + j))) in *.
   set (ff := IZR (steps_of f)) in *. set (uu := IZR (units_of f)) in *. set (FF := IZR (2 ^ F)).
   assert (ff0 : (0 < ff)%R) by (apply IZR_lt, Z.pow_pos_nonneg; lia). assert (FF0 : (0 < FF)%R) by (apply IZR_lt, Z.pow_pos_nonneg; lia).
   assert (K0 : (0 < IZR K)%R) by (apply IZR_lt; lia). assert (iq0 : (0 < IZR (in_q d))%R) by (apply IZR_lt; lia).
@@ -228,9 +273,11 @@ Proof.
   { intros j. unfold after. destruct (j <? 0); [|apply Near]. rewrite C0. destruct (steady d); [apply Near|].
     rewrite Rabs_R0. apply Rle_trans with (Rabs (c O)); [apply Rabs_pos|apply Near]. }
   destruct (exact_row_fine sections (exact d) (least_ d) (fine d) K Ex Re (after c0 c) y Fine Eex Y Least (Z.of_nat n)) as [e2 [B2 H2]]. fold re in B2.
+  assert (Entered : forall j, nth (entry d) u (fun _ => 0%R) j = (wcode j - IZR w0)%R).
+  { intros j. unfold u. change (fun _ : nat => 0%R) with (shifted m (fun _ => 0%R)). rewrite map_nth. unfold shifted. apply Entry. }
   set (eps := fun j => (after c0 c j - after (IZR w0 * uu / ff) (fun i => wcode i * uu / ff) j)%R).
   assert (Beps : forall j, (Rabs (eps j) <= IZR (in_p d) / IZR (in_q d))%R).
-  { intros j. unfold eps, after. destruct (j <? 0); [|apply Near]. rewrite C0, W0. destruct (steady d); [apply Near|].
+  { intros j. unfold eps, after. destruct (j <? 0); [|apply Near]. rewrite C0, W0. destruct (steady d); [specialize (Steady eq_refl); rewrite Steady in *; apply Near|].
     replace (0 - 0 * uu / ff)%R with 0%R by (field; lra). rewrite Rabs_R0. exact ip0. }
   set (e3 := taps Ex eps (Z.of_nat n)).
   assert (B3 : (Rabs e3 <= IZR cal)%R).
@@ -246,18 +293,21 @@ Proof.
       by (intros; unfold eps; ring).
     rewrite (taps_plus Ex (fun j => 1 * after (IZR w0 * uu / ff) (fun i => wcode i * uu / ff) j)%R), taps_multiple, taps_after.
     rewrite (conv_ext Ex _ (fun j => (uu / ff) * (wcode j - IZR w0))%R) by (intros; field; lra). rewrite conv_multiple. field. lra. }
-  assert (Hb : (IZR (code g x b n) = IZR alpha * v + IZR beta' * IZR w0 + IZR gamma)%R).
-  { rewrite (affine_spec g x (last_ d) (held_ d) n G 100 b alpha beta gamma ltac:(lia) Eaf), !plus_IZR, !mult_IZR.
+  assert (Hb : (IZR (code g x b (m + n)) = IZR alpha * v + IZR beta' * IZR w0 + IZR gamma)%R).
+  { rewrite (affine_spec g x (last_ d) (held_ d) (m + n) G 100 b alpha beta gamma ltac:(lia) Eaf), !plus_IZR, !mult_IZR.
     unfold v, trace, beta', code_if. destruct (held_ d) as [j|]; [rewrite Held; reflexivity|ring]. }
   assert (Hboth : (total both u n = ff * (IZR mm * IZR alpha) * total row u n - FF * uu * conv Ex (fun j => wcode j - IZR w0)%R n)%R).
   { unfold both. rewrite total_add_rows, total_scale_rows, total_place, conv_scale, !mult_IZR, opp_IZR, ?mult_IZR.
-    rewrite (conv_ext Ex (nth (entry d) u (fun _ => 0%R)) (fun j => wcode j - IZR w0)%R) by (intros; apply Entry). fold FF. fold ff. fold uu. ring. }
+    rewrite (conv_ext Ex (nth (entry d) u (fun _ => 0%R)) (fun j => wcode j - IZR w0)%R) by (intros; apply Entered). fold FF. fold ff. fold uu. ring. }
   assert (Apart : total both u n = (total others u n + total entering u n)%R).
   { unfold others, entering. rewrite (total_without (entry d) both), total_place. ring. }
   assert (Either : forall l, forallb (known_source g (length g)) (used S l) = true -> (Rabs (total l u n) <= IZR (either g S W l))%R).
-  { intros l Hl. pose proof (most_of_spec g x S (length g) W G Known Wh l n Hl) as U1.
-    pose proof (most_of_spec g x S (length g) W G Known Wh (scale_rows (-1) l) n) as U2.
-    rewrite used_scaled in U2. specialize (U2 Hl). rewrite total_scale_rows in U2. fold u in U1, U2.
+  { intros l Hl. assert (Most : forall l', used S l' = used S l -> (total l' u n <= IZR (most_of g S W l'))%R).
+    { intros l' Hu. destruct MW as [MZ|WN].
+      - rewrite (Zero MZ). apply (most_of_spec g x S (length g) W G Known Wh). rewrite Hu. exact Hl.
+      - unfold most_of. rewrite WN. apply most_of_shifted; [exact Known|exact G|rewrite Hu; exact Hl]. }
+    pose proof (Most l eq_refl) as U1. pose proof (Most (scale_rows (-1) l) (used_scaled S (-1) l)) as U2.
+    rewrite total_scale_rows in U2.
     assert (M1 : (IZR (most_of g S W l) <= IZR (either g S W l))%R) by (apply IZR_le; unfold either; lia).
     assert (M2 : (IZR (most_of g S W (scale_rows (-1) l)) <= IZR (either g S W l))%R) by (apply IZR_le; unfold either; lia).
     apply Rabs_le. lra. }
@@ -267,13 +317,13 @@ Proof.
     - rewrite mult_IZR, Rabs_mult, abs_IZR, minus_IZR, !mult_IZR. apply Rmult_le_compat_l; [apply Rabs_pos|].
       pose proof (size_spec g x (taken d) 0) as Sz. apply Sz, Known, X10.
     - rewrite Rmult_0_r, Rabs_R0. lra. }
-  set (s := (IZR (code g x b n) / FF)%R).
+  set (s := (IZR (code g x b (m + n)) / FF)%R).
   assert (Main : (FF * ff * IZR K * (s - IZR gamma / FF - y (Z.of_nat n))
-      = total both u n + e4 + ff * (IZR mm * IZR alpha) * e1 - FF * ff * (e3 + e2))%R).
+      = total both u n + e4 + ff * (IZR mm * IZR alpha) * (e1 + late) - FF * ff * (e3 + e2))%R).
   { unfold s. rewrite Hb. unfold e4. rewrite Hboth.
     replace (FF * ff * IZR K * ((IZR alpha * v + IZR beta' * IZR w0 + IZR gamma) / FF - IZR gamma / FF - y (Z.of_nat n)))%R
       with (ff * IZR alpha * (IZR K * v) + ff * IZR K * IZR beta' * IZR w0 - FF * ff * (IZR K * y (Z.of_nat n)))%R by (field; lra).
-    assert (Hv : (IZR K * v = IZR mm * (total row u n + e1))%R) by (rewrite <- H1; unfold K; rewrite mult_IZR; ring).
+    assert (Hv : (IZR K * v = IZR mm * (total row u n + (e1 + late)))%R) by (rewrite <- H1; unfold K; rewrite mult_IZR; ring).
     rewrite Hv, H2, H3. field. lra. }
   assert (R0 : (0 <= IZR R)%R) by (apply Rle_trans with (Rabs e1); [apply Rabs_pos|exact B1]).
   assert (Unit : IZR unit = (FF * ff * IZR K)%R) by (unfold unit; rewrite !mult_IZR; reflexivity).
@@ -282,8 +332,9 @@ Proof.
   assert (oq0 : (0 < IZR off_q)%R) by (apply IZR_lt; lia). assert (Pos : (0 < FF * ff)%R) by (apply Rmult_lt_0_compat; assumption).
   set (ea := (- (FF * ff * e3) / IZR unit)%R). set (eb := ((total entering u n - FF * ff * e2) / IZR unit)%R).
   set (er := ((total others u n + ff * (IZR mm * IZR alpha) * e1) / IZR unit)%R). set (es := (e4 / IZR unit)%R).
-  assert (Split : (s - IZR gamma / FF - y (Z.of_nat n) = ea + eb + er + es)%R).
-  { apply Rmult_eq_reg_l with (IZR unit); [|lra]. rewrite Unit at 1. rewrite Main, Apart. unfold ea, eb, er, es. field. lra. }
+  set (et := (ff * (IZR mm * IZR alpha) * late / IZR unit)%R).
+  assert (Split : (s - IZR gamma / FF - y (Z.of_nat n) = ea + eb + er + es + et)%R).
+  { apply Rmult_eq_reg_l with (IZR unit); [|lra]. rewrite Unit at 1. rewrite Main, Apart. unfold ea, eb, er, es, et. field. lra. }
   assert (Ba : (Rabs ea <= real (of_input bud))%R).
   { apply (part_small ea _ unit _ unit0) with (2 := P1). replace (IZR unit * ea)%R with (- (FF * ff * e3))%R by (unfold ea; field; lra).
     rewrite Rabs_Ropp, Rabs_mult, (Rabs_pos_eq (FF * ff)), !mult_IZR by lra. fold FF. fold ff. apply Rmult_le_compat_l; [lra|exact B3]. }
@@ -300,34 +351,43 @@ Proof.
     apply Rmult_le_compat_l; [|exact B1]. apply Rmult_le_pos; [lra|apply Rmult_le_pos; [lra|apply Rabs_pos]]. }
   assert (Bs : (Rabs es <= real (of_start bud))%R).
   { apply (part_small es _ unit _ unit0) with (2 := P4). replace (IZR unit * es)%R with e4 by (unfold es; field; lra). exact B4. }
+  assert (Bt : (Rabs et <= 1 / 2)%R).
+  { apply Rmult_le_reg_l with (IZR unit); [exact Unit0|]. rewrite <- (Rabs_pos_eq (IZR unit)) at 1 by lra. rewrite <- Rabs_mult.
+    replace (IZR unit * et)%R with (ff * (IZR mm * IZR alpha) * late)%R by (unfold et; field; lra).
+    apply IZR_le in Half. rewrite !mult_IZR, abs_IZR in Half. fold ff in Half. fold mm in Half.
+    rewrite !Rabs_mult, (Rabs_pos_eq ff), (Rabs_pos_eq (IZR mm)) by lra.
+    assert (A0 : (0 <= ff * (IZR mm * Rabs (IZR alpha)))%R) by (repeat apply Rmult_le_pos; try lra; apply Rabs_pos).
+    pose proof (Rmult_le_compat_l _ _ _ A0 Bl). lra. }
   (* The last rounding. *)
-  assert (Ca : code g x a n = code g x b n / 2 ^ F).
-  { rewrite (code_spec g x G a n X12). unfold compute. rewrite Ea. change (frac (nth a g blank)) with (frac_of g a). rewrite X7.
+  assert (Ca : code g x a (m + n) = code g x b (m + n) / 2 ^ F).
+  { rewrite (code_spec g x G a (m + n) X12). unfold compute. rewrite Ea. change (frac (nth a g blank)) with (frac_of g a). rewrite X7.
     fold F. rewrite Z.sub_0_r. reflexivity. }
-  assert (Rounded : (Rabs (IZR (code g x a n) - (s - 1 / 2)) <= 1 / 2)%R).
+  assert (Rounded : (Rabs (IZR (code g x a (m + n)) - (s - 1 / 2)) <= 1 / 2)%R).
   { rewrite Ca. unfold s, FF. apply floor_near. apply Z.pow_pos_nonneg; lia. }
-  assert (Out : IZR (code g x (out d) n) = limited (IZR lo) (IZR hi) (IZR (code g x a n))).
-  { rewrite <- limited_code. f_equal. unfold rounding_node in Er. pose proof (Known n (out d) H) as Ro. unfold in_range in Ro.
+  assert (Out : IZR (code g x (out d) (m + n)) = limited (IZR lo) (IZR hi) (IZR (code g x a (m + n)))).
+  { rewrite <- limited_code. f_equal. unfold rounding_node in Er. pose proof (Known (m + n)%nat (out d) H) as Ro. unfold in_range in Ro.
     destruct (op (nth (out d) g blank)) as [| | | | | | |o'| | |o'| | |] eqn:Eo; try discriminate.
     - destruct ((lo <=? low (nth (out d) g blank)) && (high (nth (out d) g blank) <=? hi)) eqn:Ec; [|discriminate]. injection Er as <-.
       apply andb_prop in Ec. destruct Ec as [Ec1 Ec2]. apply Z.leb_le in Ec1. apply Z.leb_le in Ec2. lia.
     - destruct ((low (nth (out d) g blank) =? lo) && (high (nth (out d) g blank) =? hi)) eqn:Ec; [|discriminate]. injection Er as <-.
       apply andb_prop in Ec. destruct Ec as [Ec1 Ec2]. apply Z.eqb_eq in Ec1. apply Z.eqb_eq in Ec2.
-      rewrite (code_spec g x G (out d) n H). unfold compute. rewrite Eo, Ec1, Ec2. reflexivity. }
+      rewrite (code_spec g x G (out d) (m + n) H). unfold compute. rewrite Eo, Ec1, Ec2. reflexivity. }
   set (shift := (IZR gamma / FF - 1 / 2 + IZR off_p / IZR off_q)%R).
-  set (eo := (IZR (code g x a n) - (s - 1 / 2) + shift)%R).
+  set (eo := (IZR (code g x a (m + n)) - (s - 1 / 2) + shift)%R).
   assert (Bo : (Rabs eo <= real (of_output bud))%R).
   { assert (o0 : 0 < 2 * (2 ^ F * off_q)) by (apply Z.mul_pos_pos; [lia|apply Z.mul_pos_pos; [apply Z.pow_pos_nonneg; lia|lia]]).
     apply (part_small eo _ _ _ o0) with (2 := P5). rewrite plus_IZR, abs_IZR, plus_IZR, minus_IZR, !mult_IZR. fold FF.
-    set (h := (IZR (code g x a n) - (s - 1 / 2))%R) in *.
+    set (h := (IZR (code g x a (m + n)) - (s - 1 / 2))%R) in *.
     replace (2 * (FF * IZR off_q) * eo)%R with ((2 * (FF * IZR off_q)) * h
       + (2 * IZR off_q * IZR gamma - FF * IZR off_q + 2 * FF * IZR off_p))%R by (unfold eo, shift; field; lra).
     eapply Rle_trans; [apply Rabs_triang|]. rewrite Rplus_comm. apply Rplus_le_compat_l.
     assert (W2 : (0 < FF * IZR off_q)%R) by (apply Rmult_lt_0_compat; assumption).
     rewrite Rabs_mult, (Rabs_pos_eq (2 * (FF * IZR off_q))) by lra.
     replace (FF * IZR off_q)%R with (2 * (FF * IZR off_q) * (1 / 2))%R at 2 by field. apply Rmult_le_compat_l; [lra|exact Rounded]. }
-  exists (ea + eb + er + es + eo)%R. split; [exists ea, eb, er, es, eo; repeat split; assumption|].
-  rewrite Out. f_equal. rewrite <- Split. unfold eo, shift. ring.
+  exists (ea + eb + er + es + eo)%R, et. split; [exists ea, eb, er, es, eo; repeat split; assumption|].
+  split; [exact Bt|]. split; [intros MZ; unfold et; rewrite (Now MZ); field; lra|].
+  rewrite Out. f_equal. replace (y (Z.of_nat n)) with (s - IZR gamma / FF - (ea + eb + er + es + et))%R by (rewrite <- Split; ring).
+  unfold eo, shift. ring.
 Qed.
 
 (* So the code is within the sum of the parts of that of the exact filter. *)
@@ -339,4 +399,13 @@ Proof.
   eapply Rle_trans; [apply Rabs_triang|]. apply Rplus_le_compat; [|exact Bs].
   eapply Rle_trans; [apply Rabs_triang|]. apply Rplus_le_compat; [|exact Br].
   eapply Rle_trans; [apply Rabs_triang|]. apply Rplus_le_compat; [exact Ba|exact Bb].
+Qed.
+Theorem within_late c code lo hi y e t : in_parts c e -> (Rabs t <= 1 / 2)%R -> code = limited lo hi (y + e + t) ->
+  (Rabs (code - limited lo hi y) <= sum_of c + 1 / 2)%R.
+Proof.
+  intros P T E. pose proof (within_sum c (limited lo hi (y + e)) lo hi y e P eq_refl) as A. rewrite E.
+  pose proof (limited_near lo hi (y + e + t) (y + e)) as B. replace (y + e + t - (y + e))%R with t in B by ring.
+  replace (limited lo hi (y + e + t) - limited lo hi y)%R
+    with ((limited lo hi (y + e + t) - limited lo hi (y + e)) + (limited lo hi (y + e) - limited lo hi y))%R by ring.
+  eapply Rle_trans; [apply Rabs_triang|]. lra.
 Qed.

@@ -109,3 +109,22 @@ Definition sum_of (c : budget) : R :=
 Definition in_parts (c : budget) (e : R) : Prop := exists a b r s o : R, e = (a + b + r + s + o)%R
   /\ (Rabs a <= real (of_input c))%R /\ (Rabs b <= real (of_coefficients c))%R /\ (Rabs r <= real (of_roundings c))%R
   /\ (Rabs s <= real (of_start c))%R /\ (Rabs o <= real (of_output c))%R.
+
+(* 5. A decimator: running sums in a row, every factor-th of what they give, and as many differences; all in words of `width`
+   bits, so modulo 2^width. What leaves is one number with or without a sign, of which a rounding to nearest drops bits. *)
+Record decimator := Decimator { factor : nat; stages : nat; width : Z; dropped : Z; signed : bool }.
+Fixpoint summed (w : Z) (u : nat -> Z) (n : nat) : Z := (u n + match n with O => 0 | S m => summed w u m end) mod 2 ^ w.
+Definition differed (w : Z) (u : nat -> Z) (n : nat) : Z := (u (S n) - u n) mod 2 ^ w.
+Definition word (d : decimator) (z : Z) : Z :=
+  if signed d then (z + 2 ^ (width d - 1)) mod 2 ^ width d - 2 ^ (width d - 1) else z mod 2 ^ width d.
+(* First the sums take the first sample `stages * factor` times more. *)
+Definition decimate (d : decimator) (u : nat -> Z) (n : nat) : Z :=
+  let entering k := u (k - stages d * factor d)%nat in
+  let sums := Nat.iter (stages d) (summed (width d)) entering in
+  let result := Nat.iter (stages d) (differed (width d)) (fun k => sums (k * factor d)%nat) n in
+  (word d result + 2 ^ dropped d / 2) / 2 ^ dropped d.
+
+(* What it approximates: the mean of the last `factor` values, `stages` times over, at every factor-th sample. *)
+Definition mean (count : nat) (u : signal) : signal := fun k => (taps (repeat 1%Z count) u k / IZR (Z.of_nat count))%R.
+Definition averaged (d : decimator) (u : nat -> R) (n : nat) : R :=
+  Nat.iter (stages d) (mean (factor d)) (from_first u) (Z.of_nat (n * factor d)).
