@@ -32,7 +32,7 @@ _SUM_BITS = 62
 
 @dataclass(frozen=True)
 class ModelVerdict:
-    """The result of the check of a C model: the number of nodes that its statements compute, and of states."""
+    """The result of the check of a C model: the number of nodes whose values its statements give, and of states."""
 
     nodes: int
     states: int
@@ -73,13 +73,12 @@ class _Model:
             )
         require(_PLAIN.fullmatch(self._name) is not None, "the name of a core must be a plain identifier")
         require(self._name not in _HEADERS, f"the name of a core must not be that of a header of C, {self._name}")
-        words = [node for stage in self._behind.stages for node in stage.nodes if node.op is Operation.DELAY]
-        states = self._read_header(Cursor(header, f"{self._name}.h"), len(words))
+        states = self._read_header(Cursor(header, f"{self._name}.h"))
         cursor = Cursor(source, f"{self._name}.c")
         cursor.expect(filled(BEGIN, NAME=self._name))
         stages = Stages("", self._behind.stages, self._behind.inputs, states)
         stages.read(cursor, self._name)
-        require(len(stages.owners) == len(words), "each state of the C model must be that of a delay")
+        require(set(stages.owners) == set(states), "each state of the C model must be that of a stage")
         cursor.expect(filled(RESET, NAME=self._name))
         if self._item.wear:
             cursor.expect(self._wear())
@@ -90,7 +89,7 @@ class _Model:
         cursor.expect(self._block(stages))
         nodes = self._nodes(stages) + self._read_decimator(cursor)
         cursor.end()
-        return ModelVerdict(nodes, len(words))
+        return ModelVerdict(nodes, len(states))
 
     @staticmethod
     def _nodes(stages: Stages) -> int:
@@ -100,7 +99,7 @@ class _Model:
         codes = ", ".join(f"int64_t {port.name}_code" for port in inputs)
         return f"size_t channel, {codes}" if channel else codes
 
-    def _read_header(self, cursor: Cursor, words: int) -> dict[int, str]:
+    def _read_header(self, cursor: Cursor) -> dict[int, str]:
         """Read the header, and return the types of the states by their numbers."""
         before, _, after = HEADER.partition("STATES ")
         fields = {
@@ -118,8 +117,9 @@ class _Model:
             require(name not in states, f"{name} of the C model must be a state once")
             states[name] = kind
             cursor.expect(";")
+        words = 0 if set(states) == {"none"} else len(states)
         wanted = {f"s{k}" for k in range(words)} or {"none"}
-        require(set(states) == wanted, f"the states of the C model must be those of {words} delays")
+        require(set(states) == wanted, f"the states of the C model must be s0 and so on, or none, not {sorted(states)}")
         cursor.expect(filled(after, **fields))
         cursor.end()
         return {k: states[f"s{k}"] for k in range(words)}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 
 from sosmith.verify.c_model.tokens import Token, tokens_of
 from sosmith.verify.graph import RejectedError
@@ -59,6 +60,14 @@ class Cursor:
             if self.next != token.text:
                 raise self.refused(token.text)
             self._place += 1
+
+    def following(self, word: str, pattern: str) -> Iterator[re.Match[str]]:
+        """Return the tokens of a pattern that stand two places behind a word, from here to the end."""
+        texts = [token.text for token in self._tokens[self._place :]]
+        for first, third in zip(texts, texts[2:], strict=False):
+            match = re.fullmatch(pattern, third, re.ASCII) if first == word else None
+            if match is not None:
+                yield match
 
     def accepts(self, mark: str) -> bool:
         """Take a token if it is the next one, and say whether it was."""

@@ -1,7 +1,6 @@
 """What an expression of a C model computes: its type, the range of its values, and its form.
 
-A form is a polynomial in variables and in what is not polynomial: shifts to the right, remainders, quotients and
-choices of forms. Two equal forms have the same value whatever the variables are. Each operation is checked to stay in
+Forms are those of `sosmith.verify.c_model.forms`. Each operation is checked to stay in
 its type, and each conversion to keep the value, so that C computes with integers as such. A shift of a
 negative value to the right is taken to round down, which C leaves to the compiler.
 """
@@ -12,16 +11,14 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from sosmith.verify.c_model.cursor import Cursor
-from sosmith.verify.graph import RejectedError, check_product
+from sosmith.verify.c_model.forms import Form, Forms, number, scaled, total, towards_zero
+from sosmith.verify.graph import RejectedError
 
 BITS = {"int": 32, "int32_t": 32, "int64_t": 64, "__int128": 128}
 """Bits of the signed types, which rise in rank. An int is the type of a small number such as that of places."""
 
 HELD = tuple(kind for kind in BITS if kind != "int")
 """Types of what is held: an int may have 16 bits."""
-
-Form = tuple[tuple[tuple[object, ...], int], ...]
-"""A polynomial: pairs of a sorted product of atoms and its factor, sorted. Atoms are texts, or tuples of forms."""
 
 
 class Value(NamedTuple):
@@ -39,61 +36,6 @@ def fits(kind: str, low: int, high: int) -> bool:
     return -limit <= low and high < limit
 
 
-def variable(name: str) -> Form:
-    """Return the form of a variable."""
-    return (((name,), 1),)
-
-
-def number(value: int) -> Form:
-    """Return the form of a number."""
-    return (((), value),) if value else ()
-
-
-def total(*terms: tuple[Form, int]) -> Form:
-    """Return the sum of forms times numbers."""
-    sums: dict[tuple[object, ...], int] = {}
-    for form, factor in terms:
-        for atoms, value in form:
-            sums[atoms] = sums.get(atoms, 0) + factor * value
-    return _sorted(sums)
-
-
-def product(a: Form, b: Form) -> Form:
-    """Return the product of two forms."""
-    check_product(len(a) * len(b), sum(max((len(atoms) for atoms, _ in form), default=0) for form in (a, b)))
-    sums: dict[tuple[object, ...], int] = {}
-    for left, x in a:
-        for right, y in b:
-            atoms = tuple(sorted((*left, *right), key=repr))
-            sums[atoms] = sums.get(atoms, 0) + x * y
-    return _sorted(sums)
-
-
-def _sorted(sums: Mapping[tuple[object, ...], int]) -> Form:
-    return tuple(sorted(((atoms, value) for atoms, value in sums.items() if value), key=repr))
-
-
-def shifted(form: Form, places: int, low: int, high: int) -> Form:
-    """Return the form of a shift to the right that rounds down; beyond the range all places are the sign."""
-    places = min(places, max(low.bit_length(), high.bit_length()))
-    return form if places == 0 else ((((">>", form, places),), 1),)
-
-
-def masked(form: Form, mask: int) -> Form:
-    """Return the form of the lowest bits."""
-    return () if mask == 0 else (((("&", form, mask),), 1),)
-
-
-def quotient(form: Form, divisor: int) -> Form:
-    """Return the form of a division that rounds towards zero."""
-    return form if divisor == 1 else (((("/", form, divisor),), 1),)
-
-
-def choice(mark: str, left: Form, right: Form, then: Form, other: Form) -> Form:
-    """Return the form of ``left mark right ? then : other``."""
-    return (((("?", mark, left, right, then, other),), 1),)
-
-
 class Reader:
     """Reads expressions.
 
@@ -103,10 +45,12 @@ class Reader:
         Where they stand.
     names : mapping of str to Value
         What names mean, members such as ``w->n0_1`` too.
+    forms : Forms
+        The atoms of their forms.
     """
 
-    def __init__(self, cursor: Cursor, names: Mapping[str, Value]) -> None:
-        self._cursor = cursor
+    def __init__(self, cursor: Cursor, names: Mapping[str, Value], forms: Forms) -> None:
+        self._cursor, self._forms = cursor, forms
         self._names = names
 
     def expression(self) -> Value:
@@ -129,7 +73,7 @@ class Reader:
         self._cursor.expect(":")
         other = self.expression()
         kind = _wider(then.type, other.type)
-        form = choice(mark, left.form, right.form, then.form, other.form)
+        form = self._forms.choice(mark, left.form, right.form, then.form, other.form)
         return Value(kind, min(then.low, other.low), max(then.high, other.high), form)
 
     def _masked(self, left: Value) -> Value:
@@ -139,7 +83,7 @@ class Reader:
             raise self._cursor.refused("a mask of the lowest bits")
         if self._cursor.next in {"<", ">", "&"}:  # which C would take first
             raise self._cursor.refused("brackets around a remainder")
-        return Value(_wider(left.type, mask.type), 0, mask.low, masked(left.form, mask.low))
+        return Value(_wider(left.type, mask.type), 0, mask.low, self._forms.masked(left.form, mask.low.bit_length()))
 
     def _shift(self) -> Value:
         left = self._sum()
@@ -149,12 +93,12 @@ class Reader:
             if not 0 <= places < BITS[left.type]:
                 raise self._cursor.refused("a shift by fewer places than there are")
             if mark == ">>":
-                form = shifted(left.form, places, left.low, left.high)
+                form = self._forms.shifted(left.form, places)
                 left = Value(left.type, left.low >> places, left.high >> places, form)
             elif left.low < 0:
                 raise self._cursor.refused("a shift to the left of what is not negative")
             else:
-                form = total((left.form, 1 << places))
+                form = scaled(left.form, 1 << places)
                 left = self._held(Value(left.type, left.low << places, left.high << places, form))
         return left
 
@@ -176,14 +120,14 @@ class Reader:
                 right = self._cast()
                 ends = [a * b for a in (left.low, left.high) for b in (right.low, right.high)]
                 kind = _wider(left.type, right.type)
-                left = self._held(Value(kind, min(ends), max(ends), product(left.form, right.form)))
+                left = self._held(Value(kind, min(ends), max(ends), self._forms.product(left.form, right.form)))
             else:
                 divisor = self._constant(self._cast(), "a divisor")
                 if divisor.low <= 0:
                     raise self._cursor.refused("a positive divisor")
-                low, high = (_towards_zero(end, divisor.low) for end in (left.low, left.high))
+                low, high = (towards_zero(end, divisor.low) for end in (left.low, left.high))
                 kind = _wider(left.type, divisor.type)
-                left = Value(kind, low, high, quotient(left.form, divisor.low))
+                left = Value(kind, low, high, self._forms.quotient(left.form, divisor.low))
         return left
 
     def _cast(self) -> Value:
@@ -243,7 +187,3 @@ class Reader:
 
 def _wider(a: str, b: str) -> str:
     return a if BITS[a] >= BITS[b] else b
-
-
-def _towards_zero(value: int, divisor: int) -> int:
-    return value // divisor if value >= 0 else -(-value // divisor)

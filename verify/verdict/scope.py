@@ -166,7 +166,7 @@ def _c_model(proofs: Proofs) -> Part:
         return Part(State.NOT_READ, "its text is held by its SHA-256 alone")
     return Part(
         State.PROVEN,
-        f"its statements compute the {proofs.model.nodes} nodes of the graphs and the flags, without overflow; a "
+        f"its statements give what the {proofs.model.nodes} nodes of the graphs do, and the flags, without overflow; a "
         "compiler is assumed that rounds down where it shifts negative numbers to the right",
     )
 

@@ -3,50 +3,57 @@
 from __future__ import annotations
 
 import random
-from math import prod
 
 import pytest
 
 from sosmith.verify.c_model.cursor import Cursor
-from sosmith.verify.c_model.expressions import Form, Reader, Value, variable
+from sosmith.verify.c_model.expressions import Reader, Value
+from sosmith.verify.c_model.forms import Forms
 from sosmith.verify.graph import RejectedError
 
-NAMES = {
-    "a": Value("int64_t", -100, 100, variable("a")),
-    "b": Value("int64_t", 0, 255, variable("b")),
-    "s": Value("int32_t", -(2**31), 2**31 - 1, variable("s")),
-    "i": Value("int", -30000, 30000, variable("i")),
-    "l": Value("int64_t", -(2**62), 2**62, variable("l")),
-    "x": Value("__int128", -(2**100), 2**100, variable("x")),
+RANGES = {
+    "a": ("int64_t", -100, 100),
+    "b": ("int64_t", 0, 255),
+    "s": ("int32_t", -(2**31), 2**31 - 1),
+    "i": ("int", -30000, 30000),
+    "l": ("int64_t", -(2**62), 2**62),
+    "x": ("__int128", -(2**100), 2**100),
 }
+FORMS = Forms()
+NAMES = {name: Value(kind, low, high, FORMS.variable(name, low, high)) for name, (kind, low, high) in RANGES.items()}
 
 
 def read(text: str) -> Value:
     cursor = Cursor(text, "the text")
-    found = Reader(cursor, NAMES).expression()
+    found = Reader(cursor, NAMES, FORMS).expression()
     cursor.end()
     return found
 
 
-def computed(form: Form, values: dict[str, int]) -> int:
+def computed(form: object, values: dict[str, int]) -> int:
     """Return what a form is worth."""
-    return sum(factor * prod(worth(atom, values) for atom in atoms) for atoms, factor in form)
+    assert isinstance(form, tuple)
+    return sum(factor * worth(FORMS.key(atom), values) for atom, factor in form)
 
 
-def worth(atom: object, values: dict[str, int]) -> int:
-    if isinstance(atom, str):
-        return values[atom]
-    assert isinstance(atom, tuple)
-    if atom[0] == ">>":
-        return computed(atom[1], values) >> atom[2]
-    if atom[0] == "&":
-        return computed(atom[1], values) & atom[2]
-    if atom[0] == "/":
-        value = computed(atom[1], values)
-        return abs(value) // atom[2] * (1 if value >= 0 else -1)
-    _, mark, left, right, then, other = atom
+def worth(key: tuple[object, ...], values: dict[str, int]) -> int:
+    mark, *parts = key
+    if mark == "one":
+        return 1
+    if mark == "is":
+        return values[str(parts[0])]
+    if mark == "*":
+        return computed(parts[0], values) * computed(parts[1], values)
+    if mark == ">>":
+        assert isinstance(parts[1], int)
+        return computed(parts[0], values) >> parts[1]
+    if mark == "/":
+        value = computed(parts[0], values)
+        assert isinstance(parts[1], int)
+        return abs(value) // parts[1] * (1 if value >= 0 else -1)
+    _, left, right, then, other = parts
     holds = computed(left, values) < computed(right, values)
-    if mark == ">":
+    if parts[0] == ">":
         holds = computed(left, values) > computed(right, values)
     return computed(then if holds else other, values)
 
