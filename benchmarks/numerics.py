@@ -13,7 +13,7 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
-from benchmarks import published
+from benchmarks import budgets, published
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from scipy import signal
@@ -253,6 +253,10 @@ several samples at once, whose pipeline registers are not in the estimate; secti
 decimates, the filter at the lower rate, against its exact multirate chain.
 
 {sections}
+
+## Error budgets
+
+{budgets.section()}
 
 ## Rounding noise against the cutoff
 

@@ -187,6 +187,11 @@ def quantizers(graph: Graph) -> list[str]:
     return [_name(graph, key) for key in _source_keys(graph) if key[0] in {"error", "truncation"}]
 
 
+def quantized_nodes(graph: Graph) -> list[tuple[int, int]]:
+    """Index of each quantized node, and the fraction bits that are kept of it, in the order of `quantizers`."""
+    return [(index, kept) for kind, index, kept in _source_keys(graph) if kind in {"error", "truncation"}]
+
+
 def _numerators(
     graph: Graph, forms: Sequence[_Form], key: _Key, watched: Sequence[int], denominator: Polynomial
 ) -> dict[int, Polynomial]:

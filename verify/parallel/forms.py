@@ -48,8 +48,8 @@ _MOST_WORK = 1 << 20
 """Terms that may be looked at in a proof; those of the examples take some thousands."""
 
 
-class _Atom(NamedTuple):
-    """An integer: a variable, or the floor of a form."""
+class Atom(NamedTuple):
+    """An integer: a variable, whose `inside` is None, the floor of a form, or a form that is 0 or 1."""
 
     low: int
     high: int
@@ -96,7 +96,7 @@ class Forms:
 
     def __init__(self) -> None:
         self._numbers: dict[Hashable, int] = {}
-        self._atoms: list[_Atom] = []
+        self._atoms: list[Atom] = []
         self._known: ChainMap[_Key, Limits] = ChainMap()
         self._limits: dict[int, tuple[int, int]] = {}
         self._always = self
@@ -113,6 +113,10 @@ class Forms:
     def variable(self, key: Hashable, low: int, high: int) -> Form:
         """Return the integer variable `key`, which lies in low..high."""
         return self._settled(self._atom(key, low, high, None))
+
+    def atom(self, number: int) -> Atom:
+        """Return an atom by its number."""
+        return self._atoms[number]
 
     def is_variable(self, form: Form) -> bool:
         """Whether a form is a variable by itself."""
@@ -312,7 +316,7 @@ class Forms:
     def _atom(self, key: Hashable, low: int, high: int, inside: Form | None) -> int:
         if key not in self._numbers:
             self._numbers[key] = len(self._atoms)
-            self._atoms.append(_Atom(low, high, inside, key))
+            self._atoms.append(Atom(low, high, inside, key))
         return self._numbers[key]
 
     def _settled_form(self, form: Form, meant: Mapping[Hashable, Form], done: dict[int, Form]) -> Form:

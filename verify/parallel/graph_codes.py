@@ -155,6 +155,11 @@ class GraphCodes:
                 self._kept.setdefault(frozenset(code.items()), short)
 
     @property
+    def definitions(self) -> Mapping[Hashable, Form]:
+        """What the variables stand for that stages hand on, by their keys."""
+        return self._definitions
+
+    @property
     def delays(self) -> list[int]:
         """The DELAY nodes."""
         return [index for index, node in enumerate(self.nodes) if node.entry.op is Operation.DELAY]

@@ -32,7 +32,7 @@ from sosmith.verify.parallel.channels import DEST
 from sosmith.verify.parallel.control import RESET, Buffer, Case, Control, UndecidedError, about, cases
 from sosmith.verify.parallel.dependence import Dependence
 from sosmith.verify.parallel.equality import same_word
-from sosmith.verify.parallel.evaluation import Evaluation
+from sosmith.verify.parallel.evaluation import Content, Evaluation
 from sosmith.verify.parallel.forms import Forms, shifted
 from sosmith.verify.parallel.graph_codes import GraphCodes
 from sosmith.verify.parallel.netlist import Netlist
@@ -159,6 +159,22 @@ class Pipeline:
     def at(self, position: int, case: Case) -> Evaluation:
         """Return the logic as the sample at a position sees it."""
         frame = next(self._numbers)
+        content = self.seen_from(position, case, frame)
+
+        def word(name: str, address: Form) -> Form:
+            if not self._netlist.memories[name].statements and address == self.channel:
+                return self.constant_word(name)
+            unknown = self._unknown(name, frame)
+            state = None if self.memories is None else self.memories.word(name, address, position, unknown)
+            return unknown if state is None else state
+
+        def fields(name: str, low: int, width: int) -> Form | None:
+            return self._field(low, width) if name == DATA and position == self._source else None
+
+        return self.logic(content, word, fields=fields)
+
+    def seen_from(self, position: int, case: Case, frame: int) -> Content:
+        """Return what registers and inputs hold for the sample at a position; `frame` numbers what is not known."""
 
         def content(name: str) -> Form:
             if name in self._control.names:
@@ -175,17 +191,7 @@ class Pipeline:
             known = position >= self._source and name not in self._apart and self.behind(name) == position - 1
             return self.content_of(name) if known else self._unknown(name, frame)
 
-        def word(name: str, address: Form) -> Form:
-            if not self._netlist.memories[name].statements and address == self.channel:
-                return self.constant_word(name)
-            unknown = self._unknown(name, frame)
-            state = None if self.memories is None else self.memories.word(name, address, position, unknown)
-            return unknown if state is None else state
-
-        def fields(name: str, low: int, width: int) -> Form | None:
-            return self._field(low, width) if name == DATA and position == self._source else None
-
-        return self.logic(content, word, fields=fields)
+        return content
 
     def constant_word(self, name: str) -> Form:
         """Return the word of a memory that never changes, for the channel of a sample."""

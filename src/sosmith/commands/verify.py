@@ -45,6 +45,13 @@ _NOT_ALL = 4
     metavar="DIR",
     help="Write what Rocq checks into this folder, with a Makefile for another machine.",
 )
+@click.option(
+    "--smt",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="With --files, write the goals of a parallel core's hardware into this folder as SMT-LIB, one text for each "
+    "register, for other solvers.",
+)
 @click.option("--partial", is_flag=True, help="Exit with 0 where nothing is wrong, though a part is not proven.")
 @click.option(
     "--time-limit",
@@ -63,6 +70,7 @@ def verify(
     second_reader: str | None,
     rocq: bool,
     export: Path | None,
+    smt: Path | None,
     partial: bool,
     time_limit: float | None,
     as_json: bool,
@@ -78,10 +86,13 @@ def verify(
         sosmith verify my_core/my.certificate.json
         sosmith verify my_core/my.certificate.json --spec my.toml --files my_core --rebuild
         sosmith verify my_core/my.certificate.json --rocq --export my_core/rocq
+        sosmith verify my_core/my.certificate.json --files my_core --smt my_core/goals
     """
     from sosmith.interface.certificate import Certificate
     from sosmith.model.errors import ShortfallError
 
+    if smt is not None and files is None:
+        raise click.UsageError("--smt must have --files, the folder with the SystemVerilog")
     read = Certificate.load(certificate)
     limit = {} if time_limit is None else {"seconds": time_limit}
     with show_progress() as step:
@@ -97,19 +108,22 @@ def verify(
             )
             written = [] if export is None else read.export_rocq(export)
             checked = read.check_in_rocq(step, **limit) if rocq else None
+            goals = [] if smt is None or files is None else read.export_smt(smt, files=files)
         except ShortfallError as error:
             raise ShortfallError(f"{certificate}: {error}") from None
     if as_json:
         kernel = {
             "rocq": None if checked is None else asdict(checked),
             "rocq_files": [str(path) for path in written],
+            "smt_files": [str(path) for path in goals],
         }
         print_json({"name": read.name, **proof.as_dict(), **kernel})
     else:
         from sosmith.commands.tables.certificate import print_proof
-        from sosmith.commands.tables.rocq import print_rocq
+        from sosmith.commands.tables.rocq import print_goals, print_rocq
 
         print_proof(read.entries, proof)
         print_rocq(checked, written)
+        print_goals(goals)
     if (proof.missing or (checked is not None and checked.unchecked)) and not partial:
         click.get_current_context().exit(_NOT_ALL)

@@ -22,9 +22,10 @@ from sosmith.verify.multirate.cic import DecimatorVerdict
 from sosmith.verify.parallel.check import HardwareVerdict
 from sosmith.verify.program.check import ProgramVerdict
 from sosmith.verify.rocq.check import RocqVerdict, check_in_rocq, rocq_texts
+from sosmith.verify.smt.obligations import obligations
 from sosmith.verify.specified.stated_specification import Agreement
 from sosmith.verify.verdict.door import Stated, judge
-from sosmith.verify.verdict.generated_files import about_of, check_texts
+from sosmith.verify.verdict.generated_files import about_of, ascii_text, check_texts, content_of
 from sosmith.verify.verdict.limits import SECONDS
 from sosmith.verify.verdict.scope import Part, State
 
@@ -326,6 +327,31 @@ class Certificate:
             If the disk is full.
         """
         return list(write_files(Path(fspath(folder)), rocq_texts(self.entries)))
+
+    def export_smt(self, folder: str | PathLike[str], *, files: str | PathLike[str]) -> list[Path]:
+        """Write the goals of the proof of a parallel core's hardware as SMT-LIB, one file for each register.
+
+        Each is to be ``unsat`` in any solver of QF_BV; ``sat`` is a counterexample.
+
+        Parameters
+        ----------
+        folder : path
+            Where the files go.
+        files : path
+            Folder with the core's SystemVerilog, of one channel and one sample a clock.
+
+        Raises
+        ------
+        ShortfallError
+            If the hardware has anything that no goals are written for.
+        SpecificationError
+            If a file cannot be read or written.
+        ToolError
+            If the disk is full.
+        """
+        name = f"{self.name}.sv"
+        goals = obligations(ascii_text(name, content_of(Path(fspath(files)) / name)), self.entries)
+        return list(write_files(Path(fspath(folder)), {f"{register}.smt2": goal for register, goal in goals.items()}))
 
     def text(self) -> str:
         """Return the content of its file as JSON, identical on every run."""

@@ -1,4 +1,4 @@
-"""What Rocq's kernel accepted of a certificate, claim by claim."""
+"""What Rocq's kernel accepted of a certificate, claim by claim, and what was written for other provers."""
 
 from __future__ import annotations
 
@@ -26,3 +26,12 @@ def print_rocq(checked: RocqVerdict | None, written: Sequence[Path]) -> None:
         console.print(f"[bold green]taken as given[/]: {escape(part)}")
     for part in checked.unchecked:
         console.print(f"[bold yellow]not checked by Rocq[/]: {escape(part)}")
+
+
+def print_goals(written: Sequence[Path]) -> None:
+    """Print how many goals were written for solvers."""
+    if written:
+        folder = escape(str(written[0].parent))
+        TableConsole().print(
+            f"[bold green]written[/]: {len(written)} goals in {folder}, to be unsat in any solver of QF_BV"
+        )
