@@ -31,6 +31,9 @@ CERTAIN = math.log(100.0)
 number of days that there are to choose from: by Markov's inequality, a sensor of the type then has at most one false
 alarm in 100 fits."""
 
+COARSE = 1.0
+"""What the evidence may gain where the scatters are not those that are likeliest without a step."""
+
 STEP = 1.5
 """Ratio of neighbouring points of the grid of scatters."""
 
@@ -100,7 +103,10 @@ def step_of(model: Model, plain: Posterior, date: int) -> Step | None:
         return None
     at = plain.scatters.likeliest
     days = range(max(1, len(rows.days) - RECENT), len(rows.days))
-    first = {k: _with_step(model, k).evidence(at.scatter, at.ratio) for k in days}
+    plainly = model.evidence(at.scatter, at.ratio)
+    first = {k: _with_step(model, k).evidence(at.scatter, at.ratio) - plainly for k in days}
+    if max(first.values()) <= POSSIBLE - COARSE:
+        return None
     own = plain.scatters.scatter
     scatters = SCATTERS[(own.min() / STEP <= SCATTERS) & (own.max() * STEP >= SCATTERS)]
     without = model.evidence(scatters, RATIOS)
