@@ -9,15 +9,16 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from sosmith.gen.calibration.fit import Measurements
 from sosmith.instrument.calibration.acceptance import DEFAULT_RANGES
-from sosmith.instrument.calibration.bayesian_fit import bayesian_fit
+from sosmith.instrument.calibration.bayesian_fit import BayesianFit, bayesian_fit
 from sosmith.instrument.calibration.health.monitoring import health_of
+from sosmith.instrument.calibration.mixed_effects.steps import step_of
 from sosmith.instrument.calibration.sensor_type import DEFAULT_TYPE, SENSOR_TYPES
 from sosmith.instrument.calibration.uncertainty import SHARE, of_posterior
 from sosmith.model.arrays import Values
@@ -138,23 +139,31 @@ def one_sensor(case: Case, seed: int) -> dict[str, Any]:
     A sensor that is not calibrated at all, because most of its measurements fit no sensor of the type, is warned of.
     """
     measurements, readings = _sensor(case, seed)
-    inside, widths, told = list[float](), list[float](), False
-    stepped = False
-    for k, days in enumerate(readings):
-        try:
-            made = bayesian_fit(measurements, TYPE, FIRST_DAY + DAYS - 1 + k, DEFAULT_RANGES)
-        except SpecificationError:
-            return {"inside": None, "half_width": None, "warned": True, "step": False}
-        worth = of_posterior(measurements, made)
+    last_day = FIRST_DAY + DAYS - 1
+    try:
+        made = bayesian_fit(measurements, TYPE, last_day, DEFAULT_RANGES)
+    except SpecificationError:
+        return {"inside": None, "half_width": None, "warned": True, "step": False}
+    inside, widths = list[float](), list[float]()
+    for days, one in zip(readings, (made, _day_after(made, last_day + 1)), strict=True):
         V, T, d = (np.concatenate(values) for values in zip(*days, strict=True))
-        held = made.rails.hold(V)
-        half = worth.half_width(V[held], T[held])
-        inside.append(float(np.mean(np.abs(made.fit.polynomial(V[held], T[held]) - d[held]) <= half)))
+        held = one.rails.hold(V)
+        half = of_posterior(measurements, one).half_width(V[held], T[held])
+        inside.append(float(np.mean(np.abs(one.fit.polynomial(V[held], T[held]) - d[held]) <= half)))
         widths.append(float(half.mean()))
-        told = told or bool(made.surprise or made.doubts or made.rails.found or worth.lack.structured or made.step)
-        stepped = stepped or (made.step is not None and made.step.told)
-    alarms = health_of(measurements, TYPE, made.rails.ends).alarms
-    return {"inside": inside, "half_width": widths, "warned": told or bool(alarms), "step": stepped}
+    lack = of_posterior(measurements, made).lack.structured
+    told = bool(made.surprise or made.doubts or made.rails.found or lack or made.step)
+    told = told or bool(health_of(measurements, TYPE, made.rails.ends).alarms)
+    step = made.step is not None and made.step.told
+    return {"inside": inside, "half_width": widths, "warned": told, "step": step}
+
+
+def _day_after(made: BayesianFit, date: int) -> BayesianFit:
+    """Return the calibration for a day without measurements, as a fit of all measurements for that day gives it."""
+    known = made.posterior
+    later = made.model.posterior(known.scatters, known.curves, date)
+    fit = replace(made.fit, polynomial=TYPE.polynomial(later.deviations))
+    return replace(made, fit=fit, posterior=later, plain=True, step=step_of(made.model, later, date))
 
 
 def summed(case: Case, found: Sequence[dict[str, Any]]) -> dict[str, Any]:

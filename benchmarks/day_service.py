@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from sosmith.gen.calibration.fit import Measurements
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.reload.reload import check_swap, other_set
 from sosmith.instrument.calibration.acceptance import DEFAULT_RANGES
-from sosmith.instrument.calibration.bayesian_fit import bayesian_fit
+from sosmith.instrument.calibration.bayesian_fit import BayesianFit, bayesian_fit
 from sosmith.instrument.calibration.mixed_effects.day_polynomial import polynomial_of
 from sosmith.instrument.calibration.mixed_effects.following_day import Following
 from sosmith.instrument.calibration.mixed_effects.model import Posterior, mixture_half_width
@@ -94,9 +95,8 @@ def in_service(
 ) -> Wheel:
     """Read one wheel over the days; with `targets`, two gauges of whole millimetres about it are read each morning."""
     sensor = 2 * seed + wheel
-    known = measured(scenario, sensor)
     first = scenario.document.start.toordinal()
-    made = bayesian_fit(known, TYPE, max(known.days), DEFAULT_RANGES)
+    known, made = _before(scenario, sensor)
     last = made.model.course(made.posterior.scatters)
     before = replace(
         made.posterior, mean=last.mean[-1], factor=last.factor[-1], offset=None, slope=None, curve_factor=None
@@ -138,6 +138,13 @@ def in_service(
         sets=sets,
         refused=refused,
     )
+
+
+@lru_cache(maxsize=2)
+def _before(scenario: ScenarioFile, sensor: int) -> tuple[Measurements, BayesianFit]:
+    """Return the measurements before the service, and the calibration by them."""
+    known = measured(scenario, sensor)
+    return known, bayesian_fit(known, TYPE, max(known.days), DEFAULT_RANGES)
 
 
 def by_hardware(core: CoreDesign, wheels: Sequence[Wheel]) -> list[Values]:

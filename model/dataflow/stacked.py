@@ -47,9 +47,7 @@ def compute_stacked(datapaths: Sequence[Datapath], codes: Codes) -> Codes:
         raise ValueError("datapaths must be without a decimator")
     if any(_structure(one) != _structure(first) for one in datapaths):
         raise ValueError("datapaths must be of one structure")
-    stages = [
-        _Stage([one.stages[k].graph for one in datapaths], codes.shape[1]) for k in range(len(first.stages))
-    ]
+    stages = [_Stage([one.stages[k].graph for one in datapaths], codes.shape[1]) for k in range(len(first.stages))]
     result = np.empty(codes.shape[:2], dtype=np.int64)
     for n, sample in enumerate(np.moveaxis(codes.astype(np.int64), -1, 1)):
         wires = list(sample)
@@ -127,6 +125,6 @@ def _step_of_one(nodes: Sequence[Node], a: int, frac: int) -> _Step:
     if node.op is Op.TRUNCATE:
         return lambda codes: np.where(codes[a] >= 0, codes[a] >> shift, -(-codes[a] >> shift))
     if node.op is Op.CLAMP:
-        low, high = (np.array(ends, dtype=np.int64) for ends in zip(*((one.low, one.high) for one in nodes)))
+        low, high = (np.array([getattr(one, end) for one in nodes], dtype=np.int64) for end in ("low", "high"))
         return lambda codes: np.clip(codes[a], low, high)
     return lambda codes: codes[a]
