@@ -63,9 +63,6 @@ def calibrate() -> None:
     """Group the calibration commands."""
 
 
-calibrate.add_command(reference_command)
-
-
 @calibrate.command("add")
 @click.argument("file", type=click.Path(path_type=Path))
 @STORE
@@ -157,6 +154,9 @@ def _note_addition(file: Path, store: Path, added: Added) -> None:
         raise SpecificationError(f"{file}: every row must be valid{way}, not {len(refusals):,} of {rows:,} refused")
     left_out = f", {_counted(len(refusals), 'row')} skipped" if refusals else ""
     note(f"stored {_counted(added.good, 'measurement')} from {file} in {store}{left_out}")
+
+
+calibrate.add_command(reference_command)
 
 
 @calibrate.command("fit")
