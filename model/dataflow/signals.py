@@ -131,6 +131,8 @@ class StageSums:
         The nodes that count.
     wanted : sequence of int
         Nodes that need a name in any case.
+    expanded : bool
+        Whether sums of sums are one sum, which is shorter; otherwise each node has a name.
 
     Attributes
     ----------
@@ -140,8 +142,10 @@ class StageSums:
         The node of each signal whose range is the narrowest.
     """
 
-    def __init__(self, graph: Graph, signals: Sequence[Signal], live: set[int], wanted: Sequence[int]) -> None:
-        self._graph, self._signals = graph, signals
+    def __init__(
+        self, graph: Graph, signals: Sequence[Signal], live: set[int], wanted: Sequence[int], *, expanded: bool = True
+    ) -> None:
+        self._graph, self._signals, self._expanded = graph, signals, expanded
         self.nodes: dict[Signal, int] = {}
         for index, signal in enumerate(signals):
             if index in live and self._span(index) < self._span(self.nodes.get(signal)):
@@ -154,17 +158,17 @@ class StageSums:
             if graph.nodes[index].op not in _KEPT
             for i in graph.nodes[index].operands
         )
-        self._named = {self._base(index) for index in wanted}
+        self._named = {self._base(index) for index in (wanted if expanded else self._order)}
         for index in self._order:
             node = graph.nodes[index]
-            if node.op in _OF_VALUES or node.op is Op.DELAY:
+            if node.op is Op.DELAY or (node.op in _OF_VALUES and self._factor_of(node) is None):
                 self._named.update(map(self._base, node.operands))
         self._sums: dict[int, Sum] = {}
         for index in self._order:
             self._add(index)
         self.sums = {signals[index]: self._sums[index] for index in self._order if self._is_named_sum(index)}
         for signal, each in self.sums.items():
-            self.sums[signal] = self._shorter(signal, each)
+            self.sums[signal] = self._shorter(signal, each) if expanded else each
 
     def _span(self, index: int | None) -> float:
         return math.inf if index is None else self._graph.nodes[index].high - self._graph.nodes[index].low
@@ -176,7 +180,20 @@ class StageSums:
         return index
 
     def _is_sum(self, node: Node) -> bool:
-        return node.op in _SUMS and (node.op is not Op.FRACTION or self._floor_of(node) in self._floors)
+        if node.op is Op.FRACTION:
+            return self._expanded and self._floor_of(node) in self._floors
+        return node.op in _SUMS or self._factor_of(node) is not None
+
+    def _factor_of(self, node: Node) -> tuple[int, int] | None:
+        """Return the operand and the factor of a product with a number; None if it is none."""
+        if node.op is Op.SCALE:
+            return node.operands[0], node.parameter
+        if node.op is Op.MULTIPLY:
+            for one, other in (node.operands, node.operands[::-1]):
+                factor = self._graph.nodes[self._base(other)]
+                if factor.op is Op.CONSTANT:
+                    return one, factor.parameter
+        return None
 
     def _floor_of(self, node: Node) -> Signal:
         """Return what is left of what a FRACTION takes away from."""
@@ -206,13 +223,14 @@ class StageSums:
             floor = self._floor_of(node)
             assert isinstance(floor.root, Floor)
             return self._term(node.operands[0]).plus(Sum({floor: -1 << floor.root.bits}))
-        if node.op is Op.SCALE:
-            term = self._term(node.operands[0])
-            size = abs(node.parameter)
+        if (scaled := self._factor_of(node)) is not None:
+            index, factor = scaled
+            term = self._term(index)
+            size = abs(factor)
             if len(term.terms) > 1 and size & (size - 1):
-                self._named.add(self._base(node.operands[0]))
-                term = self._term(node.operands[0])
-            return term.times(node.parameter)
+                self._named.add(self._base(index))
+                term = self._term(index)
+            return term.times(factor)
         left, right = (
             self._term(i).times(1 << node.frac - operand.frac)
             for i, operand in zip(node.operands, operands, strict=True)

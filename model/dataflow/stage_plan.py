@@ -151,6 +151,10 @@ class StagePlan:
             self._of_kept.add(floor)
             self._need(self.floored(floor))
 
+    def width(self) -> int:
+        """Return the bits that hold all sums on the way to them, none of them times a power of two."""
+        return max((self._width(self.sums.sums[each], 0) for each in self.needed if each in self.sums.sums), default=1)
+
     def choose_scales(self) -> None:
         """Keep sums of 64 bits so that their most frequent floor is their upper word, as far as all uses allow it."""
         for signal in self.sums.sums:
@@ -183,7 +187,12 @@ class StagePlan:
         own, rest = self.scale(signal), (1 << self.scales[root]) - 1
         if any((value << own) & rest for each, value in whole.terms.items() if each.root == root):
             return False
-        return signal.root != root or self._width(whole, own) <= 64
+        if signal.root != root:
+            return True
+        factors = [(each, factor << own) for each, factor in whole.terms.items() if each.root != root]
+        if any(bits_of(self.node(each)) > 32 or not _is_short(factor) for each, factor in factors):
+            return False  # then the sum would cost more than its floor is worth
+        return self._width(whole, own) <= 64
 
     def _width(self, whole: Sum, scale: int) -> int:
         """Return the bits that hold each term of a sum and all on the way to it, in any order."""
@@ -199,6 +208,23 @@ def term_range(plan: StagePlan, signal: Signal, factor: int, scale: int) -> Span
     node = plan.node(signal)
     ends = (node.low * factor << scale, node.high * factor << scale)
     return Span(min(ends), max(ends))
+
+
+def halves(factor: int) -> list[int]:
+    """Split a factor of more than 32 bits into a multiple of ``2**32`` and a rest of 32 bits; powers of two stay."""
+    if abs(factor) < 1 << 31 or _is_power(factor):
+        return [factor]
+    upper = (factor + (1 << 31)) >> 32
+    return [each for each in (upper << 32, factor - (upper << 32)) if each]
+
+
+def _is_power(factor: int) -> bool:
+    return abs(factor) & (abs(factor) - 1) == 0
+
+
+def _is_short(factor: int) -> bool:
+    """Whether a product by a factor is one by 32 bits, with a power of two besides at most."""
+    return all(_is_power(part) or abs(part) < 1 << 31 for part in halves(factor))
 
 
 def _depth(root: Root) -> int:

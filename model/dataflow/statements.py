@@ -15,7 +15,7 @@ from typing import NamedTuple
 from sosmith.model.dataflow.c_types import TYPES, Range, Span, bits_of, literal
 from sosmith.model.dataflow.graph import Graph, Node, Op
 from sosmith.model.dataflow.signals import Floor, Signal, StageSums, Sum, live_nodes, signals_of
-from sosmith.model.dataflow.stage_plan import StagePlan, term_range
+from sosmith.model.dataflow.stage_plan import StagePlan, halves, term_range
 
 
 class StageText(NamedTuple):
@@ -55,9 +55,14 @@ def statements_of(
     for index, graph in enumerate(graphs):
         following = graph.outputs if index + 1 < len(graphs) else exported
         wanted = [i for i in following if i in live[index]]
-        sums = StageSums(graph, signals[index], live[index], wanted)
         before = stages[-1] if stages else None
-        stages.append(StagePlan(index, graph, signals[index], sums, wanted, before))
+        widest = max(bits_of(graph.nodes[i]) for i in live[index])
+        for expanded in (True, False):
+            sums = StageSums(graph, signals[index], live[index], wanted, expanded=expanded)
+            plan = StagePlan(index, graph, signals[index], sums, wanted, before)
+            if plan.width() <= max(widest, 64):
+                break
+        stages.append(plan)
     for stage in stages:
         stage.choose_scales()
     offset = 0
@@ -152,6 +157,8 @@ class _Writer:
         if node.op is Op.MULTIPLY:
             ends = [Span(*sorted((ranges[0].low * end, ranges[0].high * end))) for end in ranges[1]]
             kind = bits_of(*ranges, *ends)
+            if kind == 64 and bits_of(*ranges) == 32:
+                return f"product({names[0]}, {names[1]})"
             return self._narrowed(signal, kind, f"{self._cast(kind, names[0], ranges[0])} * {names[1]}")
         kind, name = bits_of(*ranges), names[0]
         dropped = plan.graph.nodes[node.operands[0]].frac - node.frac
@@ -180,7 +187,7 @@ class _Writer:
         text = self._grouped(ordered) if kind == min(TYPES) else ""
         if not text:
             for each, factor in ordered:
-                for part in _halves(factor):
+                for part in halves(factor):
                     text = self._joined(text, kind, each, part)
         if constant or not text:
             size = abs(constant)
@@ -206,11 +213,15 @@ class _Writer:
 
     def _joined(self, text: str, kind: int, each: Signal, factor: int) -> str:
         """Add a term to a sum."""
-        name = self._cast(kind, self._plan.name(each), self._plan.values(each))
-        if not text:
-            return name if factor == 1 else f"{name} * {literal(factor)}"
-        size = abs(factor)
-        return f"{text} {'-' if factor < 0 else '+'} {name}" + ("" if size == 1 else f" * {literal(size)}")
+        name, values = self._plan.name(each), self._plan.values(each)
+        size = abs(factor) if text else factor
+        if size == 1:
+            term = self._cast(kind, name, values)
+        elif kind == 64 and bits_of(values, Span(size, size)) == 32 and size & (size - 1):
+            term = f"product({name}, {literal(size)})"
+        else:
+            term = f"{self._cast(kind, name, values)} * {literal(size)}"
+        return f"{text} {'-' if factor < 0 else '+'} {term}" if text else term
 
     @staticmethod
     def _cast(kind: int, name: str, values: Range) -> str:
@@ -230,12 +241,3 @@ def _on_the_way(spans: Sequence[Span]) -> list[Span]:
     low = sum(min(each.low, 0) for each in spans)
     high = sum(max(each.high, 0) for each in spans)
     return [*spans, Span(low, high)]
-
-
-def _halves(factor: int) -> list[int]:
-    """Split a factor of more than 32 bits into a multiple of ``2**32`` and a rest of 32 bits; powers of two stay."""
-    size = abs(factor)
-    if size < 1 << 31 or size & (size - 1) == 0:
-        return [factor]
-    upper = (factor + (1 << 31)) >> 32
-    return [each for each in (upper << 32, factor - (upper << 32)) if each]

@@ -156,12 +156,26 @@ class Reader:
         if self._cursor.next.isdigit():
             value = int(self._cursor.take(r"\d{1,9}"))
             return Value("int", value, value, number(value))
+        if self._cursor.accepts("product"):
+            return self._called()
         name = self._cursor.take(r"[A-Za-z_]\w*")
         if self._cursor.accepts("->"):
             name += "->" + self._cursor.take(r"\w+")
         if name not in self._names:
             raise self._cursor.refused(f"something other than {name!a}, which has no value here")
         return self._names[name]
+
+    def _called(self) -> Value:
+        """Read the arguments of the function that multiplies 32 by 32 bits, and return the product."""
+        self._cursor.expect("(")
+        left = self.expression()
+        self._cursor.expect(",")
+        right = self.expression()
+        if max(BITS[left.type], BITS[right.type]) > 32:
+            raise self._cursor.refused("factors of 32 bits")
+        self._cursor.expect(")")
+        ends = [a * b for a in (left.low, left.high) for b in (right.low, right.high)]
+        return Value("int64_t", min(ends), max(ends), self._forms.product(left.form, right.form))
 
     def _literal(self, bits: int) -> Value:
         self._cursor.expect("(")

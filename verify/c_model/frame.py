@@ -1,11 +1,16 @@
 """What stands around the stages of a C model: token for token, it can only be what is written here.
 
-Why it is right. `step` runs the stages one after the other on one sample. `tick` runs stage k with sample n - k, the
-last stage first: what stage k takes was stored by stage k - 1 at the tick before, with sample n - k, and no other stage
-stores it. `partial_tick` runs those stages alone whose sample is one of 0..samples - 1. `without_status` runs the ticks
-0..samples + behind - 1 in their order, those with all stages four at a time; so each stage works on each sample once,
-in order, and its states, which no other stage has, are those of `step`. A decimator adds modulo 2**64, without a sign;
-its differences are the moving sums, which fit 64 bits with a sign.
+Why it is right. `product` is ``a * b`` for all numbers of 32 bits: with ``a = 2**16 A + x`` and ``b = 2**16 B + y``, x
+and y from 0 to 2**16 - 1, A and B from -2**15 to 2**15 - 1, it is ``2**32 A B + 2**16 (A y + x B) + x y``. With ``f = A
+y + (x y >> 16)`` and ``g = x B + f % 2**16`` that is ``2**32 (A B + (f >> 16) + (g >> 16)) + 2**16 (g % 2**16) + x y %
+2**16``; f, g and the upper part fit 32 bits with a sign, x y without.
+
+`step` runs the stages one after the other on one sample. `tick` runs stage k with sample n - k, the last stage first:
+what stage k takes was stored by stage k - 1 at the tick before, with sample n - k, and no other stage stores it.
+`partial_tick` runs those stages alone whose sample is one of 0..samples - 1. `without_status` runs the ticks 0..samples
++ behind - 1 in their order, those with all stages four at a time; so each stage works on each sample once, in order,
+and its states, which no other stage has, are those of `step`. A decimator adds modulo 2**64, without a sign; its
+differences are the moving sums, which fit 64 bits with a sign.
 """
 
 from __future__ import annotations
@@ -22,6 +27,20 @@ BEGIN = """
 #else
 #define ALWAYS_INLINE inline
 #endif
+
+static ALWAYS_INLINE int64_t product(int32_t a, int32_t b) {
+#if defined(__thumb__) && !defined(__thumb2__)
+    const int32_t upper_a = a >> 16, upper_b = b >> 16;
+    const int32_t lower_a = a & INT32_C(65535), lower_b = b & INT32_C(65535);
+    const uint32_t lowest = (uint32_t)lower_a * (uint32_t)lower_b;
+    const int32_t first = upper_a * lower_b + (int32_t)(lowest >> 16);
+    const int32_t second = lower_a * upper_b + (first & INT32_C(65535));
+    const int32_t upper = upper_a * upper_b + (first >> 16) + (second >> 16);
+    return upper * INT64_C(4294967296) + ((uint32_t)second << 16 | (lowest & UINT32_C(65535)));
+#else
+    return (int64_t)a * b;
+#endif
+}
 """
 
 RESET = "void NAME_reset(NAME_state *state) { memset(state, 0, sizeof *state); }"
