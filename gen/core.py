@@ -103,9 +103,7 @@ def design_core(
     asked = AskedRealization(_known(realization or spec.hardware.realization), source, widths_of)
     response, decimates = response_of(spec, kind, progress)
     _check_realization(spec, asked, response)
-    calibration, budget, calibrates = _calibration_hardware(
-        spec, response, _budget(spec, response.pre_stage, board), board
-    )
+    calibration, budget, calibrates = _calibration_hardware(spec, response, _budget(spec, response, board), board)
     search = Search(
         spec=spec,
         response=response,
@@ -172,13 +170,19 @@ def response_of(
         fit=fitted,
         pre_stage=pre_stage,
         ideal=ideal,
+        factor=_own_factor(spec, kind),
     )
     return response, decimates
 
 
-def _budget(spec: Specification, pre_stage: PreStage | None, board: Board | None) -> Budget:
+def _own_factor(spec: Specification, core: str) -> int:
+    """Return by how much a filter decimates by itself: an FIR filter does, one with poles has a decimator before it."""
+    return int(spec.filter.decimate or 1) if spec.filter.is_fir and core != "calibration" else 1
+
+
+def _budget(spec: Specification, response: Response, board: Board | None) -> Budget:
     """Return the time and the multiplier blocks that there are for a core."""
-    hardware = spec.hardware
+    hardware, pre_stage = spec.hardware, response.pre_stage
     return Budget(
         clock=hardware.clock,
         sample_rate=spec.sample_rate,
@@ -186,9 +190,9 @@ def _budget(spec: Specification, pre_stage: PreStage | None, board: Board | None
         reload=hardware.reload,
         protect=hardware.protect,
         blocks=blocks_for(hardware.multipliers, board),
-        decimate=1 if pre_stage is None else pre_stage.decimator.factor,
+        decimate=response.factor if pre_stage is None else pre_stage.decimator.factor,
         samples_per_clock=hardware.samples_per_clock,
-        hold=pre_stage is not None and spec.filter.hold,
+        hold=spec.filter.hold and (pre_stage is not None or response.factor > 1),
     )
 
 
@@ -255,7 +259,7 @@ def pre_stage_in(
     ShortfallError
         If the factor that is asked for lets too much fold into the pass band, or takes too many bits.
     """
-    if spec.filter.decimate is None or core == "calibration":
+    if spec.filter.decimate is None or core == "calibration" or spec.filter.is_fir:
         return None, {}
     pre_stage, reason = pre_stage_of(
         spec.filter,
@@ -314,7 +318,7 @@ def refuse_decimated_channels(design: CoreDesign, where: str) -> None:
         If it does.
     """
     channels = design.spec.channels
-    if design.datapath.decimator is not None and channels > 1:
+    if design.datapath.samples_per_result > 1 and channels > 1:
         raise SpecificationError(
             f"{design.spec.path}: not yet available: channels must be 1 with filter.decimate {where}, not {channels}"
         )

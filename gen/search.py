@@ -25,6 +25,7 @@ from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.gen.word_lengths.selection import Progress, Selection
 from sosmith.gen.word_lengths.settling import samples_to_settle, with_settling
 from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.dataflow.downsampler import Downsampler
 from sosmith.model.errors import ShortfallError
 from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
@@ -48,6 +49,8 @@ class Response:
         What stands before the filter; None if all samples go in.
     ideal : Filter or None
         The filter; None of a calibration alone.
+    factor : int
+        Results for each of which one leaves, of a filter that decimates by itself; 1 if all do.
     """
 
     inputs: tuple[Port, ...]
@@ -56,6 +59,7 @@ class Response:
     fit: Fit | None
     pre_stage: PreStage | None
     ideal: Filter | None
+    factor: int = 1
 
 
 class AskedRealization(NamedTuple):
@@ -188,7 +192,8 @@ class Search:
                 ideal=ideal,
                 polynomial=response.polynomial if pre_stage is None else None,
                 realization=realization,
-                steady=spec.hardware.start == "steady",
+                # A filter that decimates is filled with its first sample.
+                steady=spec.hardware.start == "steady" and response.factor == 1,
             )
         return self._plans[realization]
 
@@ -206,11 +211,20 @@ class Search:
         wear = () if spec.wear is None else spec.wear.codes(spec.output)
         # Constants that are loaded may make the filter slower, and the count is not among them.
         spare = 3 if spec.hardware.reload else 1
-        flagged = replace(with_settling(datapath, spare * samples_to_settle(datapath)), wear=wear)
+        filled = self.response.factor > 1 and spec.hardware.start == "steady"
+        settles = 0 if filled else spare * samples_to_settle(datapath)
+        flagged = replace(with_settling(datapath, settles), wear=wear)
+        if self.response.factor > 1:
+            flagged = replace(flagged, downsampler=self._downsampler(datapath, filled=filled))
         if pre_stage is None:
             whole = replace(flagged, calibrated=codes)
             return fitting(kind, self.budget, whole, self.board, look_ahead=look_ahead)
         return fitting(kind, self.budget, pre_stage.before(flagged, codes), self.board, calibration=self.calibration)
+
+    def _downsampler(self, datapath: Datapath, *, filled: bool) -> Downsampler:
+        """Return what hands on some results of a filter alone, which remembers so many samples."""
+        remembered = sum(len(stage.graph.delays) for stage in datapath.stages)
+        return Downsampler(factor=self.response.factor, filled=max(1, remembered) if filled else 0)
 
     def _may_look_ahead(self, plain: Candidate) -> bool:
         """Say whether look-ahead may take the place of plain loops: if nothing is asked for that excludes it."""

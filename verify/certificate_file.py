@@ -190,6 +190,16 @@ class DecimationEntry(_Part):
     calibration: CalibrationEntry | None = None
 
 
+class DownsamplingEntry(_Part):
+    """An FIR filter of which every `factor`-th result leaves, the first one that of the first sample.
+
+    That sample goes in `filled` times before it counts.
+    """
+
+    factor: Annotated[int, Field(strict=True, ge=2, le=1 << 10)]
+    filled: Annotated[int, Field(strict=True, ge=0, le=1 << 10)]
+
+
 class GainEntry(_Part):
     """Worst-case peak gains of a section as built: of the whole section, and of its recursion 1/A alone."""
 
@@ -339,6 +349,7 @@ class Certificate(_Part):
     max_error: Rational
     ideal: IdealEntry
     decimation: DecimationEntry | None = None
+    downsampling: DownsamplingEntry | None = None
     stages: Annotated[tuple[StageEntry, ...], Field(min_length=1, max_length=256)]
     claims: ClaimsEntry
 

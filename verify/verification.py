@@ -103,6 +103,7 @@ def verify(certificate: Certificate, progress: Progress = lambda step, done, tot
 def _verified(certificate: Certificate, progress: Progress) -> Verdict:
     budget, nodes = _before_decimator(certificate, progress)
     progress("graphs", 0, 0)
+    _check_downsampling(certificate)
     rounded = rounding(certificate)
     decimation, certificate = certificate.decimation, at_lower_rate(certificate)
     stages = certificate.stages
@@ -158,6 +159,26 @@ def _verified(certificate: Certificate, progress: Progress) -> Verdict:
     budget["output rounding"] = last_rounding
     _compare_budget(certificate, budget)
     return Verdict(budget, nodes + sum(len(stage.nodes) for stage in stages), ranges, margin)
+
+
+def _check_downsampling(certificate: Certificate) -> None:
+    """Check that what leaves out results has a filter before it that remembers no more than what fills it.
+
+    Each result that leaves is one of the filter, for samples before it that are in range: so the bound holds of it.
+    """
+    entry = certificate.downsampling
+    if entry is None:
+        return
+    require(certificate.decimation is None, "a filter that decimates must have no decimator before it")
+    poles = any(len(section.denominator) > 1 for section in certificate.ideal.sections)
+    fir = bool(certificate.ideal.sections) and not poles and certificate.ideal.polynomial is None
+    require(fir, "a filter that decimates must be an FIR filter alone")
+    require(certificate.ideal.start is None, "a filter that decimates must be filled, not started beside its sections")
+    delays = [node for stage in certificate.stages for node in stage.nodes if node.op is Operation.DELAY]
+    require(
+        entry.filled == 0 or entry.filled >= len(delays),
+        f"a filter that decimates must be filled {len(delays)} times, not {entry.filled}",
+    )
 
 
 def _before_decimator(certificate: Certificate, progress: Progress) -> tuple[dict[str, Fraction], int]:

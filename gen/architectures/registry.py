@@ -10,12 +10,13 @@ from sosmith.gen.architectures.architecture import Architecture
 from sosmith.gen.architectures.blocks import Blocks
 from sosmith.gen.architectures.budget import Budget
 from sosmith.gen.architectures.folded import Folded
+from sosmith.gen.architectures.folded_fir import FoldedFir
 from sosmith.gen.architectures.online import Online
 from sosmith.gen.architectures.parallel import Parallel
 from sosmith.gen.architectures.serial import Serial
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.specification.choices import AUTO
-from sosmith.gen.specification.combinations import Option
+from sosmith.gen.specification.combinations import FIR_DECIMATE, Option
 from sosmith.model.dataflow.datapath import Datapath
 
 SMALLEST_FIRST: tuple[type[Architecture], ...] = (Serial, Folded, Parallel, Online)
@@ -27,6 +28,8 @@ ARCHITECTURES: dict[str, type[Architecture]] = {each.terms.name: each for each i
 
 def candidates(wanted: str, blocks: Blocks, options: tuple[Option, ...] = ()) -> tuple[type[Architecture], ...]:
     """Architectures to try for the one that the specification asks for beside `options`, the smallest first."""
+    if FIR_DECIMATE in options:  # the terms leave no other
+        return (FoldedFir,)
     if wanted != AUTO:
         return (ARCHITECTURES[wanted],)
     return tuple(each for each in SMALLEST_FIRST if each.is_tried(blocks) and each.terms.takes(options))

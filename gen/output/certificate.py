@@ -43,6 +43,7 @@ from sosmith.verify.certificate_file import (
     Certificate,
     ClaimsEntry,
     DecimationEntry,
+    DownsamplingEntry,
     FieldEntry,
     FileEntry,
     GainEntry,
@@ -109,6 +110,7 @@ def certificate(
             start="steady" if quantized.steady else None,
         ),
         decimation=_decimation(quantized),
+        downsampling=_downsampling(quantized),
         stages=tuple(_stage(stage) for stage in datapath.stages),
         claims=_claims(quantized, sections).model_copy(update={"online": None if online is None else _units(online)}),
     )
@@ -130,6 +132,11 @@ def _decimation(quantized: Quantized) -> DecimationEntry | None:
         bands=tuple(BandEntry(gain=on_grid(peak.gain), at=peak.at) for peak in decimation.bands(filter_)),
         calibration=None if quantized.calibration is None else _calibration(quantized.calibration),
     )
+
+
+def _downsampling(quantized: Quantized) -> DownsamplingEntry | None:
+    down = quantized.datapath.downsampler
+    return None if down is None else DownsamplingEntry(factor=down.factor, filled=down.filled)
 
 
 def _calibration(quantized: Quantized) -> CalibrationEntry:
@@ -173,7 +180,7 @@ def _item(design: CoreDesign) -> ItemEntry:
         ahead=None if architecture.calibration is None else architecture.calibration.name,
         channels=architecture.channels,
         samples=architecture.samples_per_clock,
-        start="steady" if design.quantized.steady else "zero",
+        start="steady" if design.quantized.starts_steady else "zero",
         hold=architecture.hold,
         protect=architecture.protect,
         reload=architecture.reload,

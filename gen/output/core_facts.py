@@ -12,7 +12,12 @@ import numpy as np
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.filter.impulse_invariance import Aliasing
 from sosmith.gen.filter.response import FilterFacts
-from sosmith.gen.output.decimation_facts import DecimationFacts, decimation_facts
+from sosmith.gen.output.decimation_facts import (
+    DecimationFacts,
+    DownsamplingFacts,
+    decimation_facts,
+    downsampling_facts,
+)
 from sosmith.gen.proof.limit_cycles import limit_cycles, recursions
 from sosmith.gen.proof.linear_model import linear_model
 from sosmith.gen.proof.settling import SETTLED
@@ -297,6 +302,8 @@ class CoreFacts:
         Aliasing of an impulse-invariant filter; None for all others.
     decimation : DecimationFacts or None
         The decimator before the filter; None without one.
+    downsampling : DownsamplingFacts or None
+        What an FIR filter leaves out that decimates by itself; None for any other.
     cost : Cost
         Operators of the online architecture, or else of the parallel one.
     clock : float
@@ -329,6 +336,7 @@ class CoreFacts:
     limit_cycles: tuple[LimitCycleFacts, ...]
     aliasing: Aliasing | None
     decimation: DecimationFacts | None
+    downsampling: DownsamplingFacts | None
     cost: Cost
     clock: float
 
@@ -336,6 +344,11 @@ class CoreFacts:
     def name(self) -> str:
         """Name of the core."""
         return self.interface.name
+
+    @property
+    def lower_rate(self) -> DecimationFacts | DownsamplingFacts | None:
+        """What is known of results that are fewer than samples; None where all samples have one."""
+        return self.decimation or self.downsampling
 
     @property
     def unit(self) -> str:
@@ -396,6 +409,7 @@ def core_facts(design: CoreDesign) -> CoreFacts:
         limit_cycles=tuple(_limit_cycles(name, graph, output) for name, graph in parts),
         aliasing=None if quantized.filter is None else quantized.filter.aliasing,
         decimation=decimation_facts(design),
+        downsampling=downsampling_facts(design),
         cost=architecture.cost,
         clock=float(design.spec.hardware.clock),
     )
@@ -412,7 +426,7 @@ def interface_facts(design: CoreDesign) -> InterfaceFacts:
         outputs=StreamFacts(fields=fields((datapath.output,)), dest_width=width, flags=flags, lanes=lanes),
         reset_cycles=design.architecture.reset_cycles,
         latency_cycles=design.architecture.latency_cycles,
-        samples_per_result=1 if datapath.decimator is None else datapath.decimator.factor,
+        samples_per_result=datapath.samples_per_result,
         copies_per_result=design.architecture.copies_per_result,
     )
 
@@ -420,7 +434,7 @@ def interface_facts(design: CoreDesign) -> InterfaceFacts:
 def _start(quantized: Quantized) -> str | None:
     if not quantized.sections:
         return None
-    return "steady" if quantized.steady else "zero"
+    return "steady" if quantized.starts_steady else "zero"
 
 
 def _settling(design: CoreDesign) -> SettlingFacts | None:

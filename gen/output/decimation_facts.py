@@ -143,6 +143,57 @@ class DecimationFacts:
         return tree
 
 
+@dataclass(frozen=True, kw_only=True)
+class DownsamplingFacts:
+    """An FIR filter that decimates by itself.
+
+    Attributes
+    ----------
+    factor : int
+        Samples for each result.
+    filled : int
+        Times that the first sample goes in before it counts; 0 from zero.
+    sample_rate : float
+        Rate of the results, in Hz.
+    held : bool
+        Whether each result is handed out once for each of its samples.
+    cycles_per_result : int
+        Clocks between results at the highest rate.
+    delay : float
+        Group delay of the filter at zero frequency, in s.
+    """
+
+    factor: int
+    filled: int
+    sample_rate: float
+    held: bool
+    cycles_per_result: int
+    delay: float
+
+    @property
+    def entries(self) -> dict[str, Any]:
+        """All of it as a tree."""
+        return asdict(self)
+
+
+def downsampling_facts(core: CoreDesign) -> DownsamplingFacts | None:
+    """Collect the facts about a filter that decimates by itself; None for any other core."""
+    down, filter_ = core.datapath.downsampler, core.quantized.filter
+    if down is None or filter_ is None:
+        return None
+    ((taps, _),) = filter_.exact
+    symmetric = taps in {taps[::-1], tuple(-tap for tap in taps[::-1])}
+    delay = Fraction(len(taps) - 1, 2) if symmetric or not sum(taps) else group_delay(filter_.exact)
+    return DownsamplingFacts(
+        factor=down.factor,
+        filled=down.filled,
+        sample_rate=float(core.spec.sample_rate / down.factor),
+        held=core.architecture.hold,
+        cycles_per_result=core.architecture.cycles_per_result,
+        delay=float(delay / core.spec.sample_rate),
+    )
+
+
 def decimation_facts(core: CoreDesign) -> DecimationFacts | None:
     """Collect the facts about the decimator of a core; None for a core without one."""
     decimation, decimator, filter_ = core.quantized.decimation, core.datapath.decimator, core.quantized.filter

@@ -90,8 +90,8 @@ def _title(design: CoreDesign, facts: CoreFacts) -> str:
     hardware = " ".join(filter(None, (facts.architecture, facts.realization)))
     channels = "1 channel" if facts.channels == 1 else f"{facts.channels} channels"
     rate = frequency(float(design.spec.sample_rate))
-    if facts.decimation is not None:
-        rate += f", decimated by {facts.decimation.factor}"
+    if facts.lower_rate is not None:
+        rate += f", decimated by {facts.lower_rate.factor}"
     return f"{inputs} to {output.port.name}, {channels} at {rate}, {hardware}"
 
 
@@ -110,8 +110,8 @@ def _timing(design: CoreDesign, facts: CoreFacts) -> Sequence[str]:
     lanes = facts.interface.inputs.lanes
     if lanes > 1:
         taken, its = f"A beat of {lanes} samples is taken every {every} at best", "its beat"
-    if facts.decimation is not None:
-        decimation = facts.decimation
+    if facts.lower_rate is not None:
+        decimation = facts.lower_rate
         taken = f"{decimation.factor} samples are taken every {decimation.cycles_per_result} clocks at best"
         taken += ", and a result is handed out as many times" * decimation.held
         its = "the last of its samples"

@@ -116,15 +116,15 @@ def _possible(design: CoreDesign, source: str) -> tuple[int, ...]:
 def _check(design: CoreDesign) -> None:
     """Check that a core takes one sample at a time, and has a result for each."""
     refuse_decimated_channels(design, "on a board")
-    lanes, decimator = design.architecture.samples_per_clock, design.datapath.decimator
+    lanes, factor = design.architecture.samples_per_clock, design.datapath.samples_per_result
     if lanes > 1:
         raise SpecificationError(
             f"{design.spec.path}: hardware.samples_per_clock must be 1 on a board, whose serial line never brings "
             f"several samples a clock, not {lanes}"
         )
-    if decimator is not None and not design.architecture.hold:
+    if factor > 1 and not design.architecture.hold:
         raise SpecificationError(
-            f"{design.spec.path}: filter.hold must be true with filter.decimate = {decimator.factor} on a board, which "
+            f"{design.spec.path}: filter.hold must be true with filter.decimate = {factor} on a board, which "
             "returns a result for each sample, not false"
         )
 

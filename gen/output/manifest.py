@@ -6,7 +6,7 @@ from dataclasses import asdict
 from typing import Any
 
 from sosmith.gen.output.core_facts import CoreFacts, LimitCycleFacts, SectionFacts, StreamFacts
-from sosmith.gen.output.decimation_facts import DecimationFacts
+from sosmith.gen.output.decimation_facts import DecimationFacts, DownsamplingFacts
 from sosmith.gen.version import __version__
 from sosmith.model.dataflow.program import Program
 
@@ -41,7 +41,7 @@ def manifest(facts: CoreFacts) -> dict[str, Any]:
         "error_unit": facts.unit,
         "limit_cycles": [limit_cycle_entry(cycles) for cycles in facts.limit_cycles],
         "aliasing": None if facts.aliasing is None else _entry(facts.aliasing),
-        "decimation": None if facts.decimation is None else _decimation(facts.decimation),
+        "decimation": None if facts.lower_rate is None else _decimation(facts.lower_rate),
         "cost": {
             "multipliers": [list(size) for size in facts.cost.multipliers],
             "adder_bits": facts.cost.adder_bits,
@@ -56,7 +56,7 @@ def limit_cycle_entry(cycles: LimitCycleFacts) -> dict[str, Any]:
     return _entry(cycles) | {"lyapunov": weights}
 
 
-def _decimation(facts: DecimationFacts) -> dict[str, Any]:
+def _decimation(facts: DecimationFacts | DownsamplingFacts) -> dict[str, Any]:
     return {name: list(value) if isinstance(value, tuple) else value for name, value in facts.entries.items()}
 
 

@@ -83,6 +83,8 @@ def reference_digest(design: CoreDesign) -> str:
 
 def _decimation(design: CoreDesign) -> dict[str, Any]:
     decimator = design.datapath.decimator
+    if design.datapath.downsampler is not None:
+        return {"decimation": [design.datapath.downsampler.factor]}
     return {} if decimator is None else {"decimation": [decimator.factor, decimator.stages]}
 
 

@@ -139,7 +139,7 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
         "sqnr_db": sqnr_db(run.golden, run.error),
         "sound": sound_entry(evidence, statistics),
         "frequency_response": _response_summary(measures),
-        "decimation": None if facts.decimation is None else facts.decimation.entries,
+        "decimation": None if facts.lower_rate is None else facts.lower_rate.entries,
         "accuracy_percent": _accuracy(evidence),
         "uncertainty": evidence.uncertainty,
         "start_up": None if facts.settling is None else asdict(facts.settling),

@@ -244,8 +244,8 @@ def run_of(
     unsettled = (status >> Flag.SETTLING & 1).astype(np.bool_) if datapath.settles else None
     received = np.asarray(received, dtype=_smallest(datapath.output))
     del expected, flags, status  # the exact chain takes as much memory
-    if datapath.decimator is not None:  # only samples that bring a result can be compared
-        traces = [trace.every(datapath.decimator.factor) for trace in traces]
+    if datapath.samples_per_result > 1:  # only samples that bring a result can be compared
+        traces = [trace.every(datapath.samples_per_result) for trace in traces]
     run = Run(
         scenario=traces[0].name,
         instants=Instants(len(traces[0]), float(traces[0].sample_rate)),

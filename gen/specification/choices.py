@@ -63,5 +63,8 @@ CALIBRATION_INPUTS = ("voltage", "temperature")
 MAX_DECIMATION = 1024
 """Largest factor by which samples are decimated before a filter; all are powers of two."""
 
+MAX_DOWNSAMPLING = 64
+"""Largest factor by which an FIR filter decimates."""
+
 MAX_RATIO = Fraction(1, 4)
 """Largest cutoff behind a decimator, as a share of the lower sample rate."""

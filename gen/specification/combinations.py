@@ -133,11 +133,20 @@ PROTECT = Option(
 DECIMATE = Option(
     name="decimate",
     key="filter.decimate",
-    of=lambda d: d.filter.decimate,
+    of=lambda d: None if d.filter.is_fir else d.filter.decimate,
     without="left out",
     asks=lambda value: value is not None,
     shows_value=False,
     first=True,
+)
+FIR_DECIMATE = Option(
+    name="decimate by FIR",
+    key="filter.decimate",
+    of=lambda d: d.filter.decimate if d.filter.is_fir else None,
+    without="left out",
+    asks=lambda value: value is not None,
+    first=True,
+    words="an FIR filter that decimates",
 )
 SEVERAL = Option(
     name="samples_per_clock",
@@ -177,7 +186,19 @@ FEW_MULTIPLIERS = Option(
     asks=lambda value: value not in {None, 0},
 )
 
-OPTIONS = (FIR, CHANNELS, RELOAD, PROTECT, DECIMATE, SEVERAL, LOOK_AHEAD, ZERO, NO_MULTIPLIERS, FEW_MULTIPLIERS)
+OPTIONS = (
+    FIR,
+    CHANNELS,
+    RELOAD,
+    PROTECT,
+    DECIMATE,
+    FIR_DECIMATE,
+    SEVERAL,
+    LOOK_AHEAD,
+    ZERO,
+    NO_MULTIPLIERS,
+    FEW_MULTIPLIERS,
+)
 """All options, in the order in which tables show them."""
 
 
@@ -211,24 +232,26 @@ _ONE_BLOCK = Refusal(Verdict.REFUSED, "its program needs one", only="'auto' or a
 
 _FIXED = Refusal(Verdict.REFUSED, "adders multiply by constants that are fixed")
 
-PARALLEL = Terms("parallel", apart={(RELOAD, NO_MULTIPLIERS): _FIXED})
+PARALLEL = Terms("parallel", {FIR_DECIMATE: LATER}, apart={(RELOAD, NO_MULTIPLIERS): _FIXED})
 FOLDED = Terms("folded", {SEVERAL: _SLOW, LOOK_AHEAD: _SLOW, NO_MULTIPLIERS: _ONE_BLOCK})
-SERIAL = Terms("serial", {SEVERAL: _SLOW, LOOK_AHEAD: _SLOW})
+SERIAL = Terms("serial", {SEVERAL: _SLOW, LOOK_AHEAD: _SLOW, FIR_DECIMATE: LATER})
 ONLINE = Terms(
     "online",
     {SEVERAL: _SLOW, LOOK_AHEAD: _SLOW}
-    | dict.fromkeys((FIR, CHANNELS, RELOAD, PROTECT, DECIMATE, NO_MULTIPLIERS, FEW_MULTIPLIERS), LATER),
+    | dict.fromkeys((FIR, CHANNELS, RELOAD, PROTECT, DECIMATE, FIR_DECIMATE, NO_MULTIPLIERS, FEW_MULTIPLIERS), LATER),
 )
 
 TERMS = {terms.name: terms for terms in (PARALLEL, FOLDED, SERIAL, ONLINE)}
 """All architectures by name; `sosmith.gen.architectures.registry` has a class for each."""
 
 _APART: dict[tuple[Option, Option], Refusal] = {
-    (FIR, DECIMATE): LATER,
     (FIR, LOOK_AHEAD): Refusal(Verdict.NO_USE, "it has no recursion, and registers between its sums without that"),
     **dict.fromkeys(((DECIMATE, each) for each in (RELOAD, PROTECT, ZERO)), LATER),
-    **dict.fromkeys(((SEVERAL, each) for each in (CHANNELS, RELOAD, PROTECT, DECIMATE)), LATER),
+    **dict.fromkeys(((FIR_DECIMATE, each) for each in (RELOAD, PROTECT)), LATER),
+    **dict.fromkeys(((SEVERAL, each) for each in (CHANNELS, RELOAD, PROTECT, DECIMATE, FIR_DECIMATE)), LATER),
     **dict.fromkeys(((LOOK_AHEAD, each) for each in (CHANNELS, PROTECT, DECIMATE)), LATER),
+    (FIR_DECIMATE, LOOK_AHEAD): Refusal(Verdict.NO_USE, "it has no recursion"),
+    (FIR_DECIMATE, NO_MULTIPLIERS): LATER,
     (LOOK_AHEAD, RELOAD): _FIXED,
     (LOOK_AHEAD, FEW_MULTIPLIERS): Refusal(
         Verdict.REFUSED, "all its products by constants are made of adders", only="'auto' or 0"

@@ -21,7 +21,7 @@ from sosmith.gen.specification.choices import (
 )
 from sosmith.gen.specification.combinations import check_combinations
 from sosmith.gen.specification.converters import ADCS, DACS, OUTPUT
-from sosmith.gen.specification.schema import MAX_ORDER, ConverterTable, Document, FilterTable, InputTable
+from sosmith.gen.specification.schema import MAX_ORDER, ConverterTable, Document, FilterTable, InputTable, OutputTable
 from sosmith.gen.specification.uncertainty import check_coefficients
 from sosmith.gen.specification.values import UnfitError, identifier, key_text, listed, literal, one_of, together
 from sosmith.model.converters.i2s_converter import I2sConverter
@@ -39,6 +39,7 @@ _BY_ORDER = ("order", "cutoff")
 _BY_EDGES = ("passband_edge", "stopband_edge", "passband_loss", "stopband_loss")
 _BY_SECTIONS = ("sos", "sos_file")
 _BY_TAPS = ("taps", "taps_file")
+_DECIMATE = "filter.decimate"
 _FORMS = (
     "given by order and cutoff, by passband_edge, stopband_edge, passband_loss and stopband_loss, "
     "by one of sos and sos_file, or by one of taps and taps_file"
@@ -347,7 +348,7 @@ def _check_margin(
     table: FilterTable, frequencies: Sequence[Fraction], kind: str, sample_rate: Fraction, where: str
 ) -> None:
     """Check that no pole lies too close to the unit circle, at the rate at which the filter works."""
-    factor = 1 if table.decimate in {None, AUTO} else int(table.decimate)
+    factor = 1 if table.decimate in {None, AUTO} or table.is_fir else int(table.decimate)
     margin = MARGIN * sample_rate
     if all(margin / factor <= frequency <= sample_rate / 2 - margin for frequency in frequencies):
         return
@@ -383,9 +384,12 @@ def _check_decimation(document: Document) -> None:
     table = document.filter
     if table.decimate is None and table.hold:
         raise UnfitError("false without filter.decimate, as every sample has a result", "true", where="filter.hold")
-    if table.decimate is None or table.is_fir:  # the table of combinations has the second
+    if table.decimate is None:
         return
-    given, where = literal(table.decimate), "filter.decimate"
+    if table.is_fir:
+        _check_downsampling(document)
+        return
+    given, where = literal(table.decimate), _DECIMATE
     if table.order is None or table.cutoff is None:
         raise UnfitError("left out unless the filter is given by order and cutoff", given, where=where, later=True)
     if table.kind != "lowpass":
@@ -406,6 +410,31 @@ def _check_decimation(document: Document) -> None:
     if document.converter:
         tables = ", ".join(map(literal, document.converter))
         raise UnfitError("left out with filter.decimate", tables, where="converter", later=True)
+
+
+def _check_downsampling(document: Document) -> None:
+    """Check that what else is asked for is there beside an FIR filter that decimates."""
+    if document.calibration is not None:
+        raise UnfitError("left out with an FIR filter", literal(document.filter.decimate), where=_DECIMATE, later=True)
+    if document.converter:
+        tables = ", ".join(map(literal, document.converter))
+        raise UnfitError("left out with filter.decimate", tables, where="converter", later=True)
+    ((name, port),) = document.input.items()
+    ratio = _lsb(port) / _lsb(document.output)
+    if port.signed is False and port.range[0] != 0:
+        raise UnfitError("from 0 on with filter.decimate", literal(port.range), where=f"input.{name}.range", later=True)
+    if ratio.numerator & (ratio.numerator - 1) or ratio.denominator & (ratio.denominator - 1):
+        raise UnfitError(
+            f"such with filter.decimate that one LSB of {name} is a power of two of those of the output",
+            literal(document.output.range),
+            where="output.range",
+            later=True,
+        )
+
+
+def _lsb(port: InputTable | OutputTable) -> Fraction:
+    low, high = port.range
+    return Fraction((high - low) / 2**port.bits)
 
 
 def _check_output(document: Document) -> None:

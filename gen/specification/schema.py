@@ -23,6 +23,7 @@ from sosmith.gen.specification.choices import (
     KIND_HINTS,
     KINDS,
     MAX_DECIMATION,
+    MAX_DOWNSAMPLING,
     MAX_TAPS,
     METHODS,
     PIPELINES,
@@ -105,8 +106,10 @@ def read_samples_per_clock(value: object) -> int:
     return value
 
 
-def read_decimate(value: object) -> int | str:
-    """Read a factor of decimation, or "auto"."""
+def read_decimate(value: object, info: ValidationInfo) -> int | str:
+    """Read a factor of decimation, or "auto"; one of an FIR filter need not be a power of two."""
+    if info.data.get("family") in FIR_FAMILIES or any(info.data.get(key) for key in ("taps", "taps_file")):
+        return whole(2, MAX_DOWNSAMPLING)(value)
     is_power = isinstance(value, int) and not isinstance(value, bool) and value > 1 and not value & (value - 1)
     if value == AUTO or (is_power and cast("int", value) <= MAX_DECIMATION):
         return cast("int | str", value)

@@ -94,6 +94,12 @@ class Quantized:
         return any(isinstance(stage, StartStage) for stage in self.datapath.stages)
 
     @property
+    def starts_steady(self) -> bool:
+        """Whether it starts from its first sample: beside the sections, or by what fills a filter that decimates."""
+        down = self.datapath.downsampler
+        return self.steady or (down is not None and down.filled > 0)
+
+    @property
     def first_sample(self) -> FirstSample | None:
         """The first sample as the last stage adds it; None if it does not."""
         return cast("OutputStage", self.datapath.stages[-1]).held
@@ -110,7 +116,7 @@ class Quantized:
     def exact(self, codes: Codes) -> Values:
         """Compute what the datapath approximates, in double precision; `codes` are (samples, channels, inputs)."""
         sos = None if self.filter is None else self.filter.sos
-        return exact_chain(codes, self.datapath, self.polynomial, sos, steady=self.steady)
+        return exact_chain(codes, self.datapath, self.polynomial, sos, steady=self.starts_steady)
 
     @cached_property
     def filter_facts(self) -> FilterFacts | None:

@@ -36,6 +36,7 @@ def c_header(datapath: Datapath) -> str:
         wear=datapath.wear,
         channels=len(datapath.wear) if _takes_channel(datapath) else 0,
         decimator=whole.decimator,
+        downsampler=whole.downsampler,
     )
 
 
@@ -51,6 +52,7 @@ def c_source(datapath: Datapath) -> str:
     """Return the text of ``<name>.c``.
 
     Behind a decimator, the functions of the datapath work at the lower rate, and one more takes samples at the higher.
+    Where one result out of several leaves, they have all results, and one more function hands on those.
 
     Without status, each stage works one sample behind the stage before it, as in a pipeline: then none waits for
     another, which a processor hides only where its window of instructions is long enough for the whole chain.
@@ -83,6 +85,12 @@ def c_source(datapath: Datapath) -> str:
         limits=", ".join(f"{{{warning}, {critical}}}" for warning, critical in datapath.wear),
         wear_flags=" | ".join(f"(code >= limit[{k}]) << {flag.value}" for k, flag in judged),
         decimator=whole.decimator,
+        downsampler=whole.downsampler,
+        rails=" || ".join(
+            f"{name} == {end}"
+            for name, port in zip(names, datapath.inputs, strict=True)
+            for end in (port.lowest, port.highest)
+        ),
         rail=f"{1 << Flag.INPUT_AT_RAIL:#04x}",
         channel="channel, " if _takes_channel(datapath) else "",
         of_input=f"{1 << Flag.INPUT_AT_RAIL | 1 << Flag.OUTSIDE_CALIBRATION:#04x}",

@@ -87,7 +87,7 @@ _ALIGNMENT = 16
 
 
 class Pushed:
-    """A compiled datapath with a decimator, which takes one sample of one channel at a time.
+    """A compiled datapath of which one result out of several leaves, which takes one sample of one channel at a time.
 
     Parameters
     ----------

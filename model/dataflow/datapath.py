@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
@@ -16,6 +17,7 @@ import numpy.typing as npt
 from sosmith.model.arrays import Codes
 from sosmith.model.dataflow.compiled import block_for
 from sosmith.model.dataflow.decimator import Decimator
+from sosmith.model.dataflow.downsampler import Downsampler, gathered
 from sosmith.model.dataflow.graph import Graph
 from sosmith.model.dataflow.status import Flag
 from sosmith.model.port import Port
@@ -67,6 +69,8 @@ class Datapath:
     calibration : Datapath or None
         What stands before the decimator, at the rate of the input, and whose output that takes. None if it takes the
         input itself.
+    downsampler : Downsampler or None
+        What hands on one result out of several behind the last stage; None if all leave. Not beside a decimator.
     """
 
     name: str
@@ -77,10 +81,13 @@ class Datapath:
     wear: tuple[tuple[int, int], ...] = ()
     decimator: Decimator | None = None
     calibration: Datapath | None = None
+    downsampler: Downsampler | None = None
 
     def __post_init__(self) -> None:
         if not self.calibrated:
             object.__setattr__(self, "calibrated", tuple((port.lowest, port.highest) for port in self.inputs))
+        if self.decimator is not None and self.downsampler is not None:
+            raise ValueError("downsampler must be left out behind a decimator")
         first, last = self.stages[0].graph, self.stages[-1].graph
         if self.calibration is not None:
             self._check_calibration(self.calibration)
@@ -147,9 +154,15 @@ class Datapath:
             return self.calibration.result_range
         return self.inputs[0].lowest, self.inputs[0].highest
 
+    @property
+    def samples_per_result(self) -> int:
+        """Samples of a channel for each result: the first one brings one, and then every so many of them."""
+        lowers = self.decimator or self.downsampler
+        return 1 if lowers is None else lowers.factor
+
     def results(self, samples: int) -> int:
         """Count the results of so many samples of a channel."""
-        return samples if self.decimator is None else self.decimator.count(samples)
+        return -(-samples // self.samples_per_result)
 
     @property
     def settles(self) -> bool:
@@ -189,6 +202,7 @@ class Datapath:
         checked = self._checked(codes)
         block = self._entering(checked[:, np.newaxis, :] if checked.ndim == 2 else checked)
         result, _ = block_for(self.behind_decimator, block.shape[0] * block.shape[1])(block)
+        result = self._handed_on(result)
         return result[:, 0] if checked.ndim == 2 else result
 
     def compute_status(self, codes: Codes) -> npt.NDArray[np.uint8]:
@@ -208,7 +222,13 @@ class Datapath:
                 f"codes must be of {len(self.wear)} channels, for each of which wear is judged, not {block.shape[1]}"
             )
         if self.decimator is None:
-            result, status = block_for(self, block.shape[0] * block.shape[1])(block, with_status=True)
+            filled = self._entering(block)
+            result, status = block_for(self, filled.shape[0] * filled.shape[1])(filled, with_status=True)
+            if self.downsampler is not None:
+                _, flags = self._flagged(block)
+                result, status = self._handed_on(result), self._handed_on(status)
+                status &= ~np.uint8(_OF_INPUT)
+                status |= _in_columns(partial(gathered, factor=self.downsampler.factor), flags)
         else:
             taken, flags = self._flagged(block)
             entering = _in_columns(self.decimator.compute, taken)[:, :, np.newaxis]
@@ -236,12 +256,14 @@ class Datapath:
                 else np.array(self.calibration.compute_exact(taken), dtype=np.int64)
             )
             taken = self.decimator.compute(column)[:, np.newaxis]
+        elif self.downsampler is not None:
+            taken = self.downsampler.preceded(taken)
         for sample in taken.tolist():
             wires = sample
             for stage, state in zip(self.stages, states, strict=True):
                 wires = stage.graph.step(wires, state)
             results.append(wires[0])
-        return results
+        return results if self.downsampler is None else results[self.downsampler.filled :: self.downsampler.factor]
 
     def _flagged(self, block: Codes) -> tuple[Codes, npt.NDArray[np.uint8]]:
         """Codes that the decimator takes, and the flags of the inputs behind them; both (samples, channels)."""
@@ -254,10 +276,17 @@ class Datapath:
 
     def _entering(self, block: Codes) -> Codes:
         """Codes that the first stage takes, for input codes of shape (samples, channels, inputs)."""
+        if self.downsampler is not None:
+            return self.downsampler.preceded(block)
         if self.decimator is None:
             return block
         taken = block[:, :, 0] if self.calibration is None else self.calibration.compute(block)
         return _in_columns(self.decimator.compute, taken)[:, :, np.newaxis]
+
+    def _handed_on(self, values: npt.NDArray[_Kind]) -> npt.NDArray[_Kind]:
+        """Return what leaves of results at the rate of the stages, or of what is known of these."""
+        down = self.downsampler
+        return values if down is None else np.ascontiguousarray(values[down.filled :: down.factor])
 
     def _checked(self, codes: Codes) -> Codes:
         array = np.asarray(codes)

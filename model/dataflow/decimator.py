@@ -24,6 +24,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sosmith.model.arrays import Codes, Values
+from sosmith.model.dataflow.downsampler import gathered
 from sosmith.model.port import Port
 
 _Flags = TypeVar("_Flags", np.bool_, np.uint8)
@@ -201,10 +202,4 @@ class Decimator:
         ----------
         flags : array of bool or of an integer type, shape (samples,)
         """
-        if not len(flags):
-            return flags
-        last = np.arange(self.count(len(flags))) * self.factor
-        flags_of_results: npt.NDArray[_Flags] = np.bitwise_or.reduceat(
-            flags[: last[-1] + 1], np.maximum(last - self.factor + 1, 0)
-        )
-        return flags_of_results
+        return gathered(flags, self.factor)

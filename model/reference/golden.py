@@ -33,21 +33,25 @@ def exact_chain(
     polynomial, sos, steady
         As for `calibrated` and `filtered`.
     """
-    factor = 1 if datapath.decimator is None else datapath.decimator.factor
-    golden = np.empty((-(-len(codes) // factor), codes.shape[1]))
+    factor, down = datapath.samples_per_result, datapath.downsampler
+    golden = np.empty((datapath.results(len(codes)), codes.shape[1]))
     for k in range(codes.shape[1]):
         # A decimator's sums reach over all samples; what it leaves is fewer.
-        size = BLOCK if factor == 1 else max(len(codes), 1)
+        size = BLOCK if datapath.decimator is None else max(len(codes), 1)
         filtering = Filtering(sos, datapath.output, steady=steady)
-        for start in range(0, len(codes), size):
-            entering = entering_filter(codes[start : start + size, k], datapath, polynomial)
-            golden[start : start + len(entering), k] = filtering(entering)
+        for first in range(0, len(codes), size):
+            entering = entering_filter(codes[first : first + size, k], datapath, polynomial)
+            results = filtering(entering)
+            start = first
+            if down is not None:
+                results, start = results[-first % factor :: factor], -(-first // factor)
+            golden[start : start + len(results), k] = results
     return golden
 
 
 def exact_before_filter(codes: Codes, datapath: Datapath, polynomial: Polynomial | None) -> Values:
     """Compute the calibration alone at the samples that bring a result, shape (results, channels)."""
-    codes = codes[:: 1 if datapath.decimator is None else datapath.decimator.factor]
+    codes = codes[:: datapath.samples_per_result]
     values = np.empty(codes.shape[:2])
     for k in range(codes.shape[1]):
         for start in range(0, len(codes), BLOCK):

@@ -14,7 +14,21 @@ from dataclasses import dataclass
 
 from sosmith.verify.c_model.cursor import Cursor
 from sosmith.verify.c_model.expressions import HELD
-from sosmith.verify.c_model.frame import BEGIN, BLOCK, DECIMATOR, HEADER, RESET, STEP, SUMS, WEAR, filled, ticks
+from sosmith.verify.c_model.frame import (
+    BEGIN,
+    BLOCK,
+    DECIMATOR,
+    DOWNSAMPLED,
+    DOWNSAMPLER,
+    FILL,
+    HEADER,
+    RESET,
+    STEP,
+    SUMS,
+    WEAR,
+    filled,
+    ticks,
+)
 from sosmith.verify.c_model.stages import Stages
 from sosmith.verify.certificate_file import Certificate, ItemEntry, Operation, PortEntry
 from sosmith.verify.decimation import at_lower_rate
@@ -107,7 +121,7 @@ class _Model:
             "NAME": self._name,
             "PARAMETERS": self._parameters(self._behind.inputs, self._channel),
             "WEAR": f"uint8_t {self._name}_wear_flags(size_t channel, int64_t code);" if self._item.wear else "",
-            "DECIMATOR": self._decimator_words(DECIMATOR),
+            "DECIMATOR": self._decimator_words(DECIMATOR) + self._downsampler_words(DOWNSAMPLER),
         }
         cursor.expect(filled(before, **fields))
         states: dict[str, str] = {}
@@ -204,6 +218,8 @@ class _Model:
     def _read_decimator(self, cursor: Cursor) -> int:
         """Read what stands before a decimator, and that; return the number of nodes."""
         entry = self._certificate.decimation
+        if self._certificate.downsampling is not None:
+            cursor.expect(self._downsampler_words(DOWNSAMPLED))
         if entry is None:
             return 0
         nodes = 0
@@ -219,6 +235,25 @@ class _Model:
         )
         cursor.expect(self._decimator_words(SUMS))
         return nodes
+
+    def _downsampler_words(self, text: str) -> str:
+        """Return a text about results that are left out with its words; an empty one where all leave."""
+        entry = self._certificate.downsampling
+        if entry is None:
+            return ""
+        inputs = self._certificate.inputs
+        arguments = self._channel + ", ".join(f"{port.name}_code" for port in inputs)
+        rails = [f"{port.name}_code == {end}" for port in inputs for end in (port.lowest, port.highest)]
+        return filled(
+            text,
+            NAME=self._name,
+            TAKEN=self._parameters(inputs, self._channel),
+            STARTED="started," if entry.filled else "",
+            FILL=filled(FILL, FILLED=entry.filled, ARGUMENTS=arguments) if entry.filled else "",
+            ARGUMENTS=arguments,
+            SEEN=" || ".join(rails),
+            FACTOR=entry.factor,
+        )
 
     def _decimator_words(self, text: str) -> str:
         """Return a text about a decimator with its words; an empty one without a decimator."""

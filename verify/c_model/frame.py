@@ -10,7 +10,8 @@ what stage k takes was stored by stage k - 1 at the tick before, with sample n -
 `partial_tick` runs those stages alone whose sample is one of 0..samples - 1. `without_status` runs the ticks 0..samples
 + behind - 1 in their order, those with all stages four at a time; so each stage works on each sample once, in order,
 and its states, which no other stage has, are those of `step`. A decimator adds modulo 2**64, without a sign; its
-differences are the moving sums, which fit 64 bits with a sign.
+differences are the moving sums, which fit 64 bits with a sign. Where one result out of several leaves, all are
+computed; the first sample goes in as often as it must, and results then are counted from 0.
 """
 
 from __future__ import annotations
@@ -194,6 +195,43 @@ DECIMATOR
 #endif
 
 #endif
+"""
+
+DOWNSAMPLED = """
+int NAME_push(NAME_decimator *state, TAKEN, int64_t *result, uint8_t *status) {
+    uint8_t flags;
+    int64_t code;
+    int found = 0;
+    FILL
+    code = step(&state->filter, ARGUMENTS, &flags);
+    state->at_rail |= SEEN;
+    if (state->phase == 0) {
+        *result = code;
+        if (status)
+            *status = (uint8_t)((flags & ~0x01) | (state->at_rail ? 0x01 : 0));
+        state->at_rail = 0;
+        found = 1;
+    }
+    state->phase = (state->phase + 1) % FACTOR;
+    return found;
+}
+"""
+
+FILL = """
+    if (!state->started) {
+        for (size_t k = 0; k < FILLED; k++)
+            step(&state->filter, ARGUMENTS, NULL);
+        state->started = 1;
+    }
+"""
+
+DOWNSAMPLER = """
+typedef struct {
+    unsigned phase, STARTED at_rail;
+    NAME_state filter;
+} NAME_decimator;
+
+int NAME_push(NAME_decimator *state, TAKEN, int64_t *result, uint8_t *status);
 """
 
 DECIMATOR = """

@@ -76,6 +76,11 @@ class HardwareVerdict:
     clearing: int
 
     @property
+    def interval(self) -> int:
+        """Clocks between samples at the highest rate."""
+        return 1
+
+    @property
     def progress(self) -> Progress:
         """Within how many clocks samples are taken and results leave, while the sink is ready.
 

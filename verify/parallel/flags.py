@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 from sosmith.verify.certificate_file import Certificate, Operation
 from sosmith.verify.graph import RejectedError, require
-from sosmith.verify.parallel.forms import shifted
+from sosmith.verify.parallel.forms import Forms, shifted
 from sosmith.verify.parallel.graph_codes import GraphCodes, LanePorts
 from sosmith.verify.parallel.netlist import Netlist
-from sosmith.verify.parallel.pipeline import Pipeline
 from sosmith.verify.program.normal_form import Form, constant, plus
 from sosmith.verify.specified.words import words_of
 
@@ -29,7 +28,18 @@ class Flag(NamedTuple):
     value: Form
 
 
-def wear_limits(pipeline: Pipeline, netlist: Netlist, certificate: Certificate, prefix: str) -> Limits | None:
+class ConstantWords(Protocol):
+    """What words of memories that never change are, as forms."""
+
+    @property
+    def forms(self) -> Forms:
+        """The atoms."""
+
+    def constant_word(self, name: str) -> Form:
+        """Return the word of a memory for the channel of a sample."""
+
+
+def wear_limits(pipeline: ConstantWords, netlist: Netlist, certificate: Certificate, prefix: str) -> Limits | None:
     """Return the limits of wear for the channel of a sample; None if wear is not judged, or nothing says whether it is.
 
     Raises

@@ -117,7 +117,9 @@ def _checked(certificate: Certificate, tree: Mapping[str, Any], margin: Fraction
     require(bool(sections) or core == "calibration", "the filter must not be left out")
     if sections:
         stated = tree.get("hardware", {}).get("start", _START)
-        _equal("the start of the filter", certificate.ideal.start or "zero", stated)
+        down = certificate.downsampling
+        filled = down is not None and down.filled > 0
+        _equal("the start of the filter", "steady" if filled else certificate.ideal.start or "zero", stated)
         flagged = certificate.claims.settling is not None
         _equal("whether samples are flagged until the filter has settled", flagged, stated == "zero")
     if not sections:
@@ -135,7 +137,8 @@ def _filter_distance(
     table.pop("hold", None)  # how often a result leaves, which changes none
     correction = Fraction(0)
     if decimates != "auto":
-        _equal("the factor of the decimator", 1 if entry is None else entry.factor, decimates or 1)
+        lowers = entry or certificate.downsampling
+        _equal("the factor of the decimator", 1 if lowers is None else lowers.factor, decimates or 1)
     if entry is not None:
         _equal("the edge of the pass band", entry.edge, _number(table["cutoff"]) / rate)
         rate, correction = rate / entry.factor, entry.correction
@@ -145,6 +148,10 @@ def _filter_distance(
         table["taps"] = taps_in(folder / table.pop("taps_file"))
     try:
         wanted = stated_filter(table, rate, correction)
+        require(
+            certificate.downsampling is None or "taps" in table or wanted.table.is_fir,
+            "a filter that decimates by itself must be an FIR filter",
+        )
         if wanted.table.is_fir:
             _check_losses(certificate.ideal.sections, wanted.table)
             return None

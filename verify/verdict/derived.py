@@ -12,6 +12,7 @@ from sosmith.verify.bounds.l1_response import fraction
 from sosmith.verify.certificate_file import (
     Certificate,
     DecimationEntry,
+    DownsamplingEntry,
     ItemEntry,
     NodeEntry,
     Operation,
@@ -224,6 +225,25 @@ def decimation_of(certificate: Certificate, item: ItemEntry, entry: DecimationEn
             "largest": Figure(largest * amplitude, _GRID * amplitude),
         }
     return facts
+
+
+def downsampling_of(
+    certificate: Certificate, item: ItemEntry, entry: DownsamplingEntry, rate: Fraction
+) -> dict[str, Any]:
+    """Return what is known of an FIR filter that decimates; `rate` is that of the samples, in Hz."""
+    taps = certificate.ideal.sections[0].numerator
+    symmetric = any(tuple(sign * tap for tap in reversed(taps)) == tuple(taps) for sign in (1, -1))
+    total = sum(taps, Fraction(0))
+    centre = Fraction(len(taps) - 1, 2)
+    if not symmetric and total:
+        centre = sum((k * tap for k, tap in enumerate(taps)), Fraction(0)) / total
+    return {
+        "factor": entry.factor,
+        "filled": entry.filled,
+        "sample_rate": Figure(rate / entry.factor),
+        "held": item.hold,
+        "delay": Figure(centre / rate, above=_GRID, below=_GRID),
+    }
 
 
 def _ahead(certificate: Certificate, item: ItemEntry, entry: DecimationEntry) -> dict[str, Any] | None:

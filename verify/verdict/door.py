@@ -21,6 +21,7 @@ from sosmith.verify.program.check import ProgramVerdict, check_program
 from sosmith.verify.reader.rtlil.check import check_rtlil
 from sosmith.verify.reader.rtlil.kept import check_kept
 from sosmith.verify.reader.source import read_source
+from sosmith.verify.ring.check import check_rings
 from sosmith.verify.specified.calibration_fit import Refit, check_fit
 from sosmith.verify.specified.stated_specification import Agreement, check_specification
 from sosmith.verify.specified.words import words_of
@@ -198,7 +199,11 @@ def _hardware_proven(
     program: ProgramVerdict | None = None
     hardware: HardwareVerdict | None = None
     unit: UnitVerdict | None = None
-    if item.architecture in {"folded", "serial"}:
+    if certificate.downsampling is not None:
+        require(item.architecture == "folded", f"an FIR filter that decimates must be folded, not {item.architecture}")
+        progress("hardware", 0, 0)
+        hardware = check_rings(text, certificate, item)
+    elif item.architecture in {"folded", "serial"}:
         progress("program", 0, 0)
         behind = None if certificate.decimation is None else f"{certificate.name}_behind"
         program = check_program(

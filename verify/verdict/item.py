@@ -43,6 +43,12 @@ def core_of(certificate: Certificate) -> str:
     return "instrument" if certificate.ideal.sections else "calibration"
 
 
+def start_of(certificate: Certificate) -> str:
+    """Return how a filter starts: from its first sample, or from zero."""
+    down = certificate.downsampling
+    return "steady" if down is not None and down.filled else certificate.ideal.start or "zero"
+
+
 def check_item(certificate: Certificate, item: ItemEntry) -> None:
     """Check that what a certificate says of its item agrees with what it proves.
 
@@ -55,10 +61,11 @@ def check_item(certificate: Certificate, item: ItemEntry) -> None:
     _same("core", item.core, core_of(certificate))
     if certificate.about is not None and "core" in certificate.about.options:
         _same("core", certificate.about.options["core"], item.core)
-    _same("start", item.start, certificate.ideal.start or "zero")
+    _same("start", item.start, start_of(certificate))
     _same("architecture", item.architecture == "online", certificate.claims.online is not None, "online")
     _same("ahead", item.ahead is not None, entry is not None and entry.calibration is not None, "there")
-    require(entry is not None or not item.hold, "hold of the item must not be stated without a decimator")
+    lowers = entry is not None or certificate.downsampling is not None
+    require(lowers or not item.hold, "hold of the item must not be stated without a decimator")
     require(item.channels == 1 or item.samples == 1, "several samples a clock must be those of one channel")
     _same("flags", [*item.flags.items()], [*_STATUS.items()])
     _check_codes(certificate, item)

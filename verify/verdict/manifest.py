@@ -12,15 +12,17 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
-from sosmith.verify.certificate_file import Certificate, ItemEntry, PortEntry, StreamEntry
+from sosmith.verify.certificate_file import Certificate, DownsamplingEntry, ItemEntry, PortEntry, StreamEntry
 from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.parallel.check import HardwareVerdict
 from sosmith.verify.program.check import ProgramVerdict
+from sosmith.verify.ring.verdict import RingVerdict
 from sosmith.verify.specified.words import table_of, words_of
 from sosmith.verify.unit.check import UnitVerdict
 from sosmith.verify.verdict.derived import (
     bound_of,
     decimation_of,
+    downsampling_of,
     formats_of,
     operators_of,
     parts_of,
@@ -63,9 +65,16 @@ class Manifest:
         if isinstance(verdict, UnitVerdict):
             clocks = verdict.progress.cleared + verdict.pace.opening, verdict.pace.latency, verdict.pace.interval
         else:
-            clocks = verdict.clearing, verdict.latency, 1
+            clocks = verdict.clearing, verdict.latency, verdict.interval
+        if isinstance(verdict, RingVerdict):
+            self._held_clocks(verdict)
         for key, value in zip(_CLOCKS, clocks, strict=True):
             _compare(key, self.tree[key], value)
+
+    def _held_clocks(self, verdict: RingVerdict) -> None:
+        key = "decimation.cycles_per_result"
+        _compare(key, self.tree["decimation"]["cycles_per_result"], verdict.result_clocks)
+        self.open.remove(key)
 
     def hold_program(self, verdict: ProgramVerdict | None) -> None:
         """Hold the schedule against the program of the hardware and what its words hold; None if it was not read."""
@@ -150,7 +159,7 @@ def _check(manifest: Manifest, certificate: Certificate, item: ItemEntry) -> Non
     _check_realization(tree, sections, _asked_for(certificate))
     _check_decimation(manifest, certificate, item)
     _check_reload(manifest, certificate, item)
-    program = item.architecture in {"folded", "serial"}
+    program = item.architecture in {"folded", "serial"} and certificate.downsampling is None
     require((tree["schedule"] is not None) == program, f"the manifest must{'' if program else ' not'} have a schedule")
     if tree["aliasing"] is not None:
         manifest.open.append("aliasing")
@@ -223,6 +232,9 @@ def _check_realization(tree: Mapping[str, Any], sections: Sequence[Sequence[Recu
 
 def _check_decimation(manifest: Manifest, certificate: Certificate, item: ItemEntry) -> None:
     facts, entry = manifest.tree["decimation"], certificate.decimation
+    if certificate.downsampling is not None:
+        _check_downsampling(manifest, certificate, item, certificate.downsampling)
+        return
     require(
         (facts is not None) == (entry is not None),
         f"the manifest must{'' if entry else ' not'} have a decimation, as in the certificate",
@@ -237,6 +249,18 @@ def _check_decimation(manifest: Manifest, certificate: Certificate, item: ItemEn
             _check_ahead(manifest, facts.get("calibration"), value)
         else:
             _compare(f"decimation.{key}", facts[key], value)
+    manifest.open += [f"decimation.{key}" for key in facts if key not in wanted]
+
+
+def _check_downsampling(
+    manifest: Manifest, certificate: Certificate, item: ItemEntry, entry: DownsamplingEntry
+) -> None:
+    facts, about = manifest.tree["decimation"], certificate.about
+    assert about is not None
+    rate = Fraction(words_of(about.specification).get("sample_rate", 0))
+    wanted = downsampling_of(certificate, item, entry, rate)
+    for key, value in wanted.items():
+        _compare(f"decimation.{key}", facts[key], value)
     manifest.open += [f"decimation.{key}" for key in facts if key not in wanted]
 
 

@@ -30,16 +30,16 @@ def bench_files(design: CoreDesign, facts: PackageFacts) -> dict[str, str]:
     sent, results = hex_in.count("\n"), hex_out.count("\n")
     # The samples of a result, each with a pause of the source.
     each = max(2, facts.core.cycles_per_sample)
-    gathered = each * interface.samples_per_result if facts.core.decimation is not None else 0
+    gathered = each * interface.samples_per_result if facts.core.lower_rate is not None else 0
     values = {
         "name": facts.name,
         "parts": stimuli.parts,
         "transfers": sent,
         "results": results,
-        "counted": "beats" if lanes > 1 else "results" if facts.core.decimation is not None else "samples",
+        "counted": "beats" if lanes > 1 else "results" if facts.core.lower_rate is not None else "samples",
         "lanes": lanes,
         "line": max(into.width, out.width + out.user_width) // 4 + 8,
-        "decimation": facts.core.decimation,
+        "decimation": facts.core.lower_rate,
         "copies": interface.copies_per_result,
         "width_in": into.sample_width,
         "width_out": out.sample_width,

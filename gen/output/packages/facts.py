@@ -59,8 +59,8 @@ class PackageFacts:
         parts = [core.core, *([core.realization] if core.realization else []), core.architecture]
         if core.interface.inputs.lanes > 1:
             parts.append(f"{core.interface.inputs.lanes} samples a clock")
-        if core.decimation is not None:
-            parts.append(f"decimated by {core.decimation.factor}")
+        if core.lower_rate is not None:
+            parts.append(f"decimated by {core.lower_rate.factor}")
         inputs = ", ".join(field.port.name for field in core.interface.inputs.fields)
         (output,) = core.interface.outputs.fields
         error = f"error at most {core.error_bound:.6g} {core.unit}".strip()

@@ -21,7 +21,7 @@ def wrapper_files(facts: PackageFacts) -> dict[str, str]:
         "registers_out": [("result" if lanes == 1 else f"result_{k}", field) for k, field in enumerate(results)],
         "sample": "sample" if lanes == 1 else "beat",
         "beats": "results" if lanes == 1 else "beats",
-        "decimation": facts.core.decimation,
+        "decimation": facts.core.lower_rate,
         "dest": facts.interface.inputs.dest_width,
         "width_in": facts.interface.inputs.width,
         "width_out": facts.interface.outputs.width,

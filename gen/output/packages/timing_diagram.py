@@ -70,7 +70,7 @@ def _diagram(facts: PackageFacts) -> dict[str, Any]:
         ends = [f"{lane} to {lane + lanes - 1}" for lane in (0, lanes)]
         inputs, outputs = ([f"{what} {numbers}" for numbers in ends] for what in ("samples", "results"))
         text = f"{lanes} results {latency} clocks after their samples, a beat of {lanes} samples {rate}"
-    decimation = facts.core.decimation
+    decimation = facts.core.lower_rate
     if decimation is not None:
         waves, inputs = _HELD if decimation.held else _DECIMATED, ["sample 0", f"sample {decimation.factor}"]
         text = f"a result at most {latency} clocks after its sample, which is one of {decimation.factor}"

@@ -38,6 +38,6 @@ class ModelLine:
 def model_of(design: CoreDesign, verilog: str = "", *, window: int = 4, baud: int = 1_000_000) -> Device:
     """Return the model of a board with a core, whose SystemVerilog is `verilog`."""
     own_identity = identity(design, verilog, baud=baud, clock=float(design.spec.hardware.clock))
-    decimates = design.datapath.decimator is not None
+    decimates = design.datapath.samples_per_result > 1
     core = HeldCore(design.datapath) if decimates else IntegerCore(design.datapath, design.spec.channels)
     return Device(own_identity, core, window=window)

@@ -138,8 +138,7 @@ def trace(tell: Tell, *, text: str, path: str, source: str, seconds: float | Non
     tell("step", "exact result")
     exact = design.run_exact(**inputs.inputs)
     error = hardware - exact
-    decimator = design.core.datapath.decimator
-    every = 1 if decimator is None else decimator.factor  # only samples with a result can be compared
+    every = design.core.datapath.samples_per_result  # only samples with a result can be compared
     edges = np.unique(np.linspace(0, len(error), min(POINTS, len(error)) + 1).astype(int))
     truth = [None] * error[0].size if inputs.truth is None else _columns(inputs.truth[::every])
     return {

@@ -14,7 +14,7 @@ from sosmith.gen.facts.design_tables import budget_table, limit_cycles_table, un
 from sosmith.gen.facts.table import Table
 from sosmith.gen.filter.decimation import SAMPLED
 from sosmith.gen.output.core_facts import CoreFacts, SectionFacts
-from sosmith.gen.output.decimation_facts import DecimationFacts, RateCosts
+from sosmith.gen.output.decimation_facts import DecimationFacts, DownsamplingFacts, RateCosts
 from sosmith.gen.quantity import count, quantity
 from sosmith.gen.specification.specification import Specification
 from sosmith.gen.specification.wear_limits import WearSpec
@@ -73,6 +73,8 @@ def _overview(core: CoreDesign, facts: CoreFacts, uncertainty: InstrumentBudget 
         rows.append(("aliasing", f"at most {deviation:.3g} % of the gain, {dc:.3g} % at zero frequency"))
     if facts.decimation is not None:
         rows += _decimation(facts.decimation, facts.unit)
+    if facts.downsampling is not None:
+        rows += _downsampling(facts.downsampling)
     rows += [*_calibration(core, uncertainty), *facts.reasons.items()]
     rows.append(("output", f"{facts.output.bits} bits, one LSB = {facts.lsb:.6g}{unit}"))
     if spec.wear is not None:
@@ -81,6 +83,14 @@ def _overview(core: CoreDesign, facts: CoreFacts, uncertainty: InstrumentBudget 
     if facts.channels > 1:
         rows.append(("channels", f"{facts.channels:,}, each at {float(spec.sample_rate):,.6g} Hz"))
     return rows
+
+
+def _downsampling(downsampling: DownsamplingFacts) -> Iterator[tuple[str, str]]:
+    """Say which results of an FIR filter leave."""
+    rate = f"at {downsampling.sample_rate:,.6g} Hz"
+    yield "decimation", f"one result for {downsampling.factor} samples, {rate}; no other is computed"
+    if downsampling.held:
+        yield "results", f"each {downsampling.factor} times, at the rate of the samples"
 
 
 def _decimation(decimation: DecimationFacts, unit: str) -> Iterator[tuple[str, str]]:

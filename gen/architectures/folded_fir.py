@@ -1,0 +1,107 @@
+"""The folded architecture of an FIR filter that decimates: one multiplier, and samples in a ring of memory."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from sosmith.gen.architectures.architecture import Architecture
+from sosmith.gen.architectures.blocks import Blocks
+from sosmith.gen.fpga.boards import Board
+from sosmith.gen.specification.combinations import FOLDED
+from sosmith.gen.word_lengths.fir_steps import FewSteps
+from sosmith.gen.word_lengths.objective import Objective
+from sosmith.hdl.plan.tap_steps import TapSteps, tap_steps
+from sosmith.model.dataflow.downsampler import Downsampler
+
+if TYPE_CHECKING:
+    from amaranth.lib.wiring import Component
+
+
+@dataclass(frozen=True)
+class FoldedFir(Architecture):
+    """One multiplier takes the steps of every N-th result alone, a step at each clock."""
+
+    terms = FOLDED
+    checked = "each result is the one of the datapath's graphs, for all samples, stalls and resets"
+
+    @classmethod
+    def is_tried(cls, blocks: Blocks) -> bool:
+        """Return True: it is the only one."""
+        del blocks
+        return True
+
+    @classmethod
+    def objective(cls, board: Board | None, *, adders: bool = False) -> Objective:
+        """Return the number of steps."""
+        del board, adders
+        return FewSteps()
+
+    @cached_property
+    def plan(self) -> TapSteps:
+        """The steps, and their clocks."""
+        return tap_steps(self.datapath)
+
+    @property
+    def _down(self) -> Downsampler:
+        down = self.datapath.downsampler
+        assert down is not None
+        return down
+
+    @property
+    def copies_per_result(self) -> int:
+        """Times that each result is handed out."""
+        return self._down.factor if self.hold else 1
+
+    @property
+    def multiplier_blocks(self) -> int:
+        """Multiplier blocks that it takes."""
+        return 1
+
+    @property
+    def memory_bits(self) -> int:
+        """Bits of the samples that it keeps of a channel, once."""
+        return self.plan.words * self.datapath.inputs[0].bits
+
+    @property
+    def _latency_cycles(self) -> int:
+        return self.plan.latency_cycles(self.channels)
+
+    @property
+    def _cycles_per_sample(self) -> int:
+        clocks = self.plan.cycles_per_result(self._down.factor, self.channels)
+        return max(clocks, self.plan.last_step + 1 + self.copies_per_result)
+
+    @property
+    def _cleared_cycles(self) -> int:
+        return self.plan.reset_cycles(self.channels)
+
+    @property
+    def cycles_per_result(self) -> int:
+        """Clocks between results of a channel at the highest rate."""
+        return self._cycles_per_sample
+
+    @property
+    def cycles_per_sample(self) -> int:
+        """Clocks between samples at the highest rate, on average, rounded up."""
+        return -(-self.cycles_per_result // self._down.factor)
+
+    @property
+    def clocks_per_sample(self) -> float:
+        """Clocks between samples at the highest rate, on average."""
+        clocks, share = self.cycles_per_result, self._down.factor
+        return clocks / share if clocks % share else clocks // share
+
+    def _core(self, *, before: bool = False) -> Component:
+        del before
+        from sosmith.hdl.cores.ring import RingCore  # only what makes hardware loads Amaranth
+
+        return RingCore(self.datapath, self.channels, copies=self.copies_per_result)
+
+    def reason(self, why: str, available: int) -> str:
+        """Say in a sentence that it was chosen and `why`, with `available` clocks for each result."""
+        return (
+            f"{self.name}: {why}; takes {self.cycles_per_result:,} of {available:,} clocks for "
+            f"{self._down.factor} samples"
+        )

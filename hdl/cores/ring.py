@@ -1,0 +1,394 @@
+"""An FIR filter that decimates: samples in a ring of memory, one multiplier, and its steps for every N-th sample alone.
+
+::
+
+                                 +---------+  bits
+    s_axis_tdata --> [sample] -->| ring    |---> [first] ---+
+                 several channels| words   |                v
+    [pointer] - offset - 1 ----->|         |                + or - ---> [pair] --> * --> [product] --> + --> [total]
+                                 +---------+                ^        bits + 1      ^                   ^       |
+                                 | ring    |---> [second] --+                      |                   |       |
+                             +-->| again   |                                       |      half at first|-------+
+                             |   +---------+                                       |                           |
+    [step] --> [table] ------+-- offsets, sign, coefficient -----------------------+       limited, rounded <--+
+                                                                                                 |
+    m_axis_tdata, m_axis_tuser  <-- [code], [flags], as often as a result leaves  <--------------+
+
+With samples x0, x1, .. for N = 2 and a filter of S steps, one channel, once the ring is filled::
+
+    clock          0    1    2    ..   S+5   S+6   S+7   S+8
+    accepted       x0                  (wait for the sum)   x1    x2
+    step                0    1    ..   S+4
+    m_axis_tvalid                            1
+
+A step that the table has in one row reads its taps one clock later, adds them two later, multiplies three later, and is
+in the sum four later; so offsets, sign and coefficient of a step stand in three rows of the table, one below the other.
+The sum begins with half a step of the output, so that it is rounded by what is left out of it.
+
+`pointer` is where the next sample goes. Before the first one the ring is filled, a word a clock: with zeros, or with
+that sample as often as it has words. With one channel that sample waits on the stream until then.
+
+With several channels a sample is kept, with its channel, while the control word of that is read: whether it has been
+filled, `pointer`, `phase`, `rail` and `counted`. After a reset all control words are cleared, one a clock.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, signed
+from amaranth.lib import data
+from amaranth.lib.memory import Memory
+
+from sosmith.hdl.axi_stream import extended
+from sosmith.hdl.memory_ports import read_port, write_port
+from sosmith.hdl.pipelined_logic import limits
+from sosmith.hdl.plan.streams import channel_bits
+from sosmith.hdl.plan.tap_steps import PIPELINE, tap_steps
+from sosmith.hdl.shell.shell import Shell
+from sosmith.hdl.status import at_rail, status_of_result
+from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.dataflow.downsampler import Downsampler
+from sosmith.model.dataflow.graph import Op
+
+_NO_COLLISIONS = {"no_rw_check": 1}
+"""Attribute of memories: no word is used that is read at the clock at which it is written."""
+
+
+class _Kept(NamedTuple):
+    """What is kept of a channel from one sample to the next."""
+
+    pointer: Value
+    phase: Value
+    rail: Value
+    counted: Value
+
+
+class _Taken(NamedTuple):
+    """A sample that is taken at this clock, and what it changes."""
+
+    taken: Signal
+    completes: Value
+    rail: Value
+    counted: Value
+    after: _Kept
+
+
+class RingCore(Shell):
+    """An FIR filter that decimates, for any number of channels in any order.
+
+    Latency and throughput: those of `sosmith.hdl.plan.tap_steps.TapSteps`. With several channels a sample of a channel
+    that does not exist is accepted and dropped.
+
+    Parameters
+    ----------
+    datapath : Datapath
+        What it computes: one FIR section that keeps samples, the output stage, and a downsampler.
+    channels : int
+        Number of channels.
+    copies : int
+        Times that each result leaves.
+
+    Members
+    -------
+    aclk, aresetn, s_axis_*, m_axis_*
+        As those of `sosmith.hdl.shell.shell.Shell`.
+    """
+
+    def __init__(self, datapath: Datapath, channels: int = 1, *, copies: int = 1) -> None:
+        if datapath.downsampler is None:
+            raise ValueError("datapath must have a downsampler")
+        self._down: Downsampler = datapath.downsampler
+        self._steps = tap_steps(datapath)
+        self._copies = copies
+        super().__init__(datapath, channels)
+
+    def fill(self, m: Module) -> None:
+        """Build control, rings and the multiplier."""
+        (port,) = self.datapath.inputs
+        self._idle, self._running = Signal(name="idle"), Signal(name="running")
+        self._step = Signal(range(self._steps.last_step + 1), name="step", reset_less=True)
+        self._pointer = Signal(range(self._steps.words), name="pointer")
+        self._channel = Signal(channel_bits(self.channels), name="channel")
+        ready = Signal(name="result_leaves")
+        if self.channels == 1:
+            (code,) = self.codes(self.s_axis_tdata)
+            taken, write = self._one_channel(m, code)
+        else:
+            kept = Signal(signed(port.bits) if port.signed else port.bits, name="sample", reset_less=True)
+            taken, write = self._several_channels(m, kept)
+        rail, counted = self._of_result(m, taken)
+        with m.If(taken.taken & taken.completes):
+            m.d.sync += [self._running.eq(1), self._step.eq(0)]
+        ends = Signal(name="ends")
+        m.d.comb += ends.eq(self._running & (self._step == self._steps.last_step))
+        with m.If(self._running & ~ends):
+            m.d.sync += self._step.eq(self._step + 1)
+        with m.If(ends & ready):
+            m.d.sync += self._running.eq(0)
+        total = self._multiply(m, write)
+        self._give(m, total, ends, ready, rail, counted)
+
+    # What is kept of a channel.
+
+    @property
+    def _settles(self) -> bool:
+        return self.datapath.settles
+
+    @property
+    def _settling_samples(self) -> int:
+        """Samples that are flagged after a start from zero; 0 without the flag."""
+        graph = self.datapath.stages[-1].graph
+        return next((graph.nodes[i].high for i in graph.delays), 0)
+
+    def _sizes(self) -> dict[str, int]:
+        return {
+            "pointer": (self._steps.words - 1).bit_length(),
+            "phase": (self._down.factor - 1).bit_length(),
+            "rail": 1,
+            "counted": self._settling_samples.bit_length(),
+        }
+
+    def _taken(self, m: Module, taken: Signal, kept: _Kept, code: Value) -> _Taken:
+        """Return what a sample changes: the place of the next one, and whether it brings a result."""
+        completes = Signal(name="completes")
+        rail = Signal(name="rail_now")
+        m.d.comb += [
+            completes.eq(~kept.phase.any()),
+            rail.eq(kept.rail | at_rail(self.datapath.inputs, code)),
+        ]
+        settling = kept.counted < self._settling_samples if self._settles else Const(0, 1)
+        last = self._down.factor - 1
+        after = _Kept(
+            pointer=(kept.pointer + 1)[: len(kept.pointer)],
+            phase=Mux(kept.phase == last, 0, kept.phase + 1)[: len(kept.phase)],
+            rail=rail & ~completes,
+            counted=(kept.counted + settling)[: len(kept.counted)],
+        )
+        return _Taken(taken, completes, rail, kept.counted, after)
+
+    def _one_channel(self, m: Module, code: Value) -> tuple[_Taken, tuple[Value, Value, Value]]:
+        """Take the samples of one channel; return also address and word of the ring, and when it is written."""
+        filling, steady = Signal(init=1, name="filling"), self._down.filled > 0
+        kept = {
+            name: self._pointer if name == "pointer" else Signal(bits, name=name)
+            for name, bits in self._sizes().items()
+        }
+        taken, fills = Signal(name="taken"), Signal(name="fills")
+        m.d.comb += [
+            self._idle.eq(~self._running & ~filling),
+            self.s_axis_tready.eq(self._idle),
+            taken.eq(self._idle & self.s_axis_tvalid),
+            fills.eq(filling & self.s_axis_tvalid if steady else filling),
+        ]
+        sample = self._taken(m, taken, _Kept(**kept), self.s_axis_tdata)
+        with m.If(fills):
+            m.d.sync += self._pointer.eq(sample.after.pointer)
+            with m.If(self._pointer.all()):
+                m.d.sync += filling.eq(0)
+        with m.If(taken):
+            m.d.sync += [kept[name].eq(getattr(sample.after, name)) for name in kept]
+        word = code if steady else Mux(filling, 0, code)
+        return sample, (self._pointer, word, taken | fills)
+
+    def _several_channels(self, m: Module, sample: Signal) -> tuple[_Taken, tuple[Value, Value, Value]]:
+        """Take the samples of all channels, each with its control word; return the same."""
+        (code,) = self.codes(self.s_axis_tdata)
+        steady = self._down.filled > 0
+        clearing, waits = Signal(init=1, name="clearing"), Signal(name="waits")
+        filling, fresh = Signal(name="filling"), Signal(name="fresh", reset_less=True)
+        dest = self.s_axis_tdest
+        layout = data.StructLayout({"started": 1, **self._sizes()})
+        m.submodules.control_memory = memory = Memory(
+            shape=layout.size, depth=self.channels, init=[], attrs=_NO_COLLISIONS
+        )
+        reader, writer = read_port(memory, "control"), write_port(memory, "control")
+        word = data.View(layout, reader.data)
+        accepted, taken = Signal(name="accepted"), Signal(name="taken")
+        m.d.comb += [
+            self._idle.eq(~self._running & ~filling & ~clearing & ~waits),
+            self.s_axis_tready.eq(self._idle),
+            accepted.eq(self._idle & self.s_axis_tvalid & (dest < self.channels)),
+            reader.addr.eq(dest),
+            reader.en.eq(self._idle),
+            taken.eq(waits & (fresh | word.started)),
+        ]
+        with m.If(accepted):
+            m.d.sync += [waits.eq(1), fresh.eq(0), sample.eq(code), self._channel.eq(dest)]
+        fields = {name: Signal(bits, name=f"{name}_before") for name, bits in self._sizes().items()}
+        m.d.comb += [net.eq(Mux(fresh, 0, getattr(word, name))) for name, net in fields.items()]
+        now = _Kept(**fields)
+        change = self._taken(m, taken, now, sample)
+        with m.If(waits):
+            m.d.sync += [waits.eq(0), self._pointer.eq(change.after.pointer)]
+            with m.If(~taken):
+                m.d.sync += [filling.eq(1), self._pointer.eq(0)]
+        with m.If(filling):
+            m.d.sync += self._pointer.eq(self._pointer + 1)
+            with m.If(self._pointer.all()):
+                m.d.sync += [filling.eq(0), waits.eq(1), fresh.eq(1)]
+        with m.If(clearing):
+            m.d.sync += self._channel.eq(self._channel + 1)
+            with m.If(self._channel == self.channels - 1):
+                m.d.sync += clearing.eq(0)
+        kept = Cat(Const(1, 1), *(getattr(change.after, name) for name in self._sizes()))
+        m.d.comb += [
+            writer.addr.eq(self._channel),
+            writer.data.eq(Mux(clearing, 0, kept)),
+            writer.en.eq(clearing | taken),
+        ]
+        place = Mux(filling, self._pointer, now.pointer)
+        value = sample if steady else Mux(filling, 0, sample)
+        return change, (place, value, filling | taken)
+
+    def _of_result(self, m: Module, sample: _Taken) -> tuple[Value, Value]:
+        """Keep what a result has from the sample that brings it: whether a code was at a rail, and the count."""
+        rail = Signal(name="result_rail", reset_less=True)
+        counted = Signal(len(sample.counted), name="result_counted", reset_less=True)
+        with m.If(sample.taken & sample.completes):
+            m.d.sync += [rail.eq(sample.rail), counted.eq(sample.counted)]
+        return rail, counted
+
+    # The sum.
+
+    def _multiply(self, m: Module, write: tuple[Value, Value, Value]) -> Signal:
+        """Build the table of steps, the rings, and the multiplier; return the sum."""
+        plan, graph = self._steps, self.datapath.stages[-1].graph
+        (port,) = self.datapath.inputs
+        pairs = plan.pairs
+        alone = pairs and any(step.second is None for step in plan.steps)
+        differs = any(step.sign < 0 for step in plan.steps)
+        bits = (plan.words - 1).bit_length()
+        factor_bits = 1 + max(_bits(step.coefficient) for step in plan.steps)
+        layout = data.StructLayout(
+            {
+                "first": bits,
+                "second": bits if pairs else 0,
+                "alone": int(alone),
+                "minus": int(differs),
+                "coefficient": signed(factor_bits),
+            }
+        )
+        rows = [0] * (1 << (plan.last_step).bit_length())
+        at = {name: field.offset for name, field in layout}
+        for k, step in enumerate(plan.steps):
+            second = step.first if step.second is None else step.second
+            rows[k] |= step.first << at["first"] | (second << at["second"] if pairs else 0)
+            rows[k + 1] |= (step.second is None) * alone << at["alone"] | (step.sign < 0) << at["minus"]
+            rows[k + 2] |= (step.coefficient & ((1 << factor_bits) - 1)) << at["coefficient"]
+        m.submodules.steps_memory = table = Memory(shape=layout.size, depth=len(rows), init=rows)
+        reader = read_port(table, "steps")
+        m.d.comb += [reader.addr.eq(self._step), reader.en.eq(1)]
+        row = data.View(layout, reader.data)
+        taps = [self._ring(m, name, getattr(row, name), write) for name in ("first", "second")[: 1 + pairs]]
+        pair = Signal(signed(port.bits + 1 + (not port.signed)), name="pair", reset_less=True)
+        first, second = taps[0], taps[-1]
+        other: Value = Mux(row.alone, 0, second) if alone else second
+        both: Value = first if not pairs else Mux(row.minus, first - other, first + other) if differs else first + other
+        product = Signal(signed(len(pair) + factor_bits), name="product", reset_less=True)
+        # On the grid of the sum, which may be finer by what an offset of the output needs.
+        m.d.sync += [pair.eq(both), product.eq(pair * row.coefficient)]
+        grid, begin = self._rounding()
+        source = graph.nodes[graph.inputs[0]]
+        last = graph.nodes[graph.outputs[0]]
+        whole = graph.nodes[last.operands[0]] if last.op is Op.CLAMP else last
+        span = max(grid, 0)
+        total = Signal(signed(max(_bits(whole.low), _bits(whole.high)) + 1 + span), name="total", reset_less=True)
+        shift = grid - source.frac
+        base = Mux(self._step == PIPELINE, Const(begin, signed(len(total))), total)
+        m.d.sync += total.eq(base + (product << shift))
+        return total
+
+    def _rounding(self) -> tuple[int, int]:
+        """Return the fraction bits of the sum, and what it begins with: offset of the output, and half a step."""
+        graph = self.datapath.stages[-1].graph
+        constants = [node for node in graph.nodes if node.op is Op.CONSTANT and node.name != "samples"]
+        grid = max([graph.nodes[graph.inputs[0]].frac, *(node.frac for node in constants)])
+        return grid, sum(node.parameter << grid - node.frac for node in constants)
+
+    def _ring(self, m: Module, name: str, offset: Value, write: tuple[Value, Value, Value]) -> Value:
+        """Make a memory of the samples of all channels; return what a tap of the sample before the pointer is."""
+        (port,) = self.datapath.inputs
+        words = self._steps.words
+        m.submodules[f"ring_{name}_memory"] = memory = Memory(
+            shape=signed(port.bits) if port.signed else port.bits,
+            depth=words * self.channels,
+            init=[],
+            attrs=_NO_COLLISIONS,
+        )
+        reader, writer = read_port(memory, f"ring_{name}"), write_port(memory, f"ring_{name}")
+        place = Signal(range(words), name=f"place_{name}")
+        m.d.comb += [
+            place.eq(self._pointer + ~offset),  # - 1 - offset
+            reader.addr.eq(Cat(place, self._channel)),
+            reader.en.eq(1),
+            writer.addr.eq(Cat(write[0], self._channel)),
+            writer.data.eq(write[1]),
+            writer.en.eq(write[2]),
+        ]
+        return reader.data
+
+    def _give(self, m: Module, total: Signal, ends: Value, ready: Signal, rail: Value, counted: Value) -> None:
+        """Round and limit the sum, and hand it on with its flags, as often as it leaves."""
+        output = self.datapath.output
+        graph = self.datapath.stages[-1].graph
+        last = graph.nodes[graph.outputs[0]]
+        grid, _ = self._rounding()
+        value: Value = total[grid:].as_signed() if grid > 0 else (total << -grid)
+        code: Value = value
+        saturated = Signal(name="output_saturated")
+        if last.op is Op.CLAMP:
+            below, above = Signal(name="below"), Signal(name="above")
+            m.d.comb += [net.eq(outside) for net, outside in zip((below, above), limits(last, value), strict=True)]
+            m.d.comb += saturated.eq(below | above)
+            code = Mux(below, Const(last.low), Mux(above, Const(last.high), value))
+        limited = Signal(signed(output.bits) if output.signed else output.bits, name="limited")
+        m.d.comb += limited.eq(code)
+        settling = counted < self._settling_samples if self._settles else Const(0, 0)
+        status = status_of_result(
+            m,
+            self.datapath,
+            limited,
+            inputs=Cat(rail, Const(0, 1)),
+            saturated=saturated,
+            settling=settling,
+            channel=self._channel,
+            enable=Const(1),
+        )
+        held = Signal(len(limited), name="code", reset_less=True)
+        live = self.live_flags
+        flags = Signal(len(live), name="flags", reset_less=True)
+        dest = Signal(channel_bits(self.channels), name="dest", reset_less=True)
+        leaves = Signal(name="leaves")
+        m.d.comb += [ready.eq(~self.m_axis_tvalid | leaves)]
+        passes = self.m_axis_tvalid & self.m_axis_tready
+        if self._copies > 1:
+            copies = Signal(range(self._copies), name="copies", reset_less=True)
+            m.d.comb += leaves.eq(passes & ~copies.any())
+            with m.If(passes):
+                m.d.sync += copies.eq(copies - 1)
+            with m.If(ends & ready):
+                m.d.sync += copies.eq(self._copies - 1)
+        else:
+            m.d.comb += leaves.eq(passes)
+        with m.If(leaves):
+            m.d.sync += self.m_axis_tvalid.eq(0)
+        with m.If(ends & ready):
+            m.d.sync += [
+                self.m_axis_tvalid.eq(1),
+                held.eq(limited),
+                flags.eq(Cat(status.flags[bit] for bit in live)),
+                dest.eq(self._channel),
+            ]
+        whole = held.as_signed() if output.signed else held
+        m.d.comb += [
+            self.m_axis_tdata.eq(extended(whole, len(self.m_axis_tdata))),
+            self.m_axis_tuser.eq(flags),
+        ]
+        if self.channels > 1:
+            m.d.comb += self.m_axis_tdest.eq(dest)
+
+
+def _bits(value: int) -> int:
+    """Count the bits of a number without its sign."""
+    return (-value - 1 if value < 0 else value).bit_length()

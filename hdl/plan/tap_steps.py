@@ -1,0 +1,128 @@
+"""The steps of one multiplier that computes an FIR filter from samples in a ring, and their clocks.
+
+A step adds two samples of one magnitude of tap, or takes one alone, and multiplies by the coefficient. Coefficients are
+integers on one grid, the finest that any of them needs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.sections.fir import FirSection, Form
+
+PIPELINE = 4
+"""Clocks from the address of a step to its product's place in the sum: step, taps, sum of two, product."""
+
+
+@dataclass(frozen=True)
+class TapStep:
+    """A product.
+
+    Attributes
+    ----------
+    coefficient : int
+        In units of ``2**-frac`` of `TapSteps`.
+    first : int
+        Delay in samples of a tap.
+    second : int or None
+        That of the other one; None if there is none.
+    sign : int
+        Sign of the second one, 1 or -1.
+    """
+
+    coefficient: int
+    first: int
+    second: int | None = None
+    sign: int = 1
+
+
+@dataclass(frozen=True)
+class TapSteps:
+    """All steps of a filter.
+
+    Attributes
+    ----------
+    section : FirSection
+        In a form that keeps samples: direct, or symmetric.
+    """
+
+    section: FirSection
+
+    def __post_init__(self) -> None:
+        if self.section.form is Form.TRANSPOSED:
+            raise ValueError("form must be one that keeps samples, not transposed")
+
+    @property
+    def frac(self) -> int:
+        """Fraction bits of all coefficients."""
+        return max(product.frac for product in self.section.products)
+
+    @cached_property
+    def steps(self) -> tuple[TapStep, ...]:
+        """The products; a tap alone counts twice with half of its coefficient, if all such can."""
+        steps: list[TapStep] = []
+        for product in self.section.products:
+            coefficient = product.coefficient << self.frac - product.frac
+            taps = list(product.taps)
+            while taps:
+                (first, sign), *rest = taps
+                if rest and self.section.form is Form.SYMMETRIC:
+                    second, other = rest.pop(0)
+                    steps.append(TapStep(sign * coefficient, first, second, sign * other))
+                else:
+                    steps.append(TapStep(sign * coefficient, first))
+                taps = rest
+        alone = [step for step in steps if step.second is None]
+        if len(alone) < len(steps) and not any(step.coefficient % 2 for step in alone):
+            return tuple(
+                replace(step, coefficient=step.coefficient // 2, second=step.first) if step.second is None else step
+                for step in steps
+            )
+        return tuple(steps)
+
+    @property
+    def pairs(self) -> bool:
+        """Whether any step adds two samples."""
+        return any(step.second is not None for step in self.steps)
+
+    @property
+    def words(self) -> int:
+        """Samples that the ring of a channel holds, a power of two from 2 on."""
+        return max(2, 1 << (self.section.length - 1).bit_length())
+
+    @property
+    def last_step(self) -> int:
+        """Number of the clock at which the sum is complete, from the first step on."""
+        return len(self.steps) + PIPELINE
+
+    def cycles_per_result(self, factor: int, channels: int) -> int:
+        """Clocks between results of a channel at the highest rate; each takes `factor` samples."""
+        return factor * (1 + (channels > 1)) + self.last_step + 1
+
+    def latency_cycles(self, channels: int) -> int:
+        """Most clocks from the edge that accepts a sample to the edge that can output its result.
+
+        With several channels, that of the first sample of one, which fills the ring.
+        """
+        filled = self.words + 2 if channels > 1 else 0
+        return filled + self.last_step + 2
+
+    def reset_cycles(self, channels: int) -> int:
+        """Clocks after a reset until a sample on offer is accepted: while the ring is filled, or channels cleared."""
+        return channels if channels > 1 else self.words
+
+
+def tap_steps(datapath: Datapath) -> TapSteps:
+    """Return the steps of a datapath that is one FIR filter.
+
+    Raises
+    ------
+    ValueError
+        If it has anything before its filter, or that keeps no samples.
+    """
+    section, *others = datapath.stages
+    if not isinstance(section, FirSection) or len(others) != 1:
+        raise ValueError(f"stages must be an FIR filter and the output, not {len(datapath.stages)}")
+    return TapSteps(section)

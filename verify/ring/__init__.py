@@ -1,0 +1,1 @@
+"""Proves hardware that keeps its samples in rings of memory, clock by clock."""
