@@ -51,6 +51,10 @@ class Objective(Protocol):
         """Whether a coefficient of fewer signed digits takes less, though it has as many bits."""
 
     @property
+    def floors_products(self) -> bool:
+        """Whether a product may drop bits by itself, before it is added to others."""
+
+    @property
     def factor_bits(self) -> int | None:
         """Bits of a constant, with its sign, beyond which a product takes more; None if there is no such step."""
 
@@ -82,6 +86,7 @@ class SmallArea:
     unsuited = "not for this filter"
     hopeless = 2.5  # trimming saved less than half in every design seen
     few_digits = False
+    floors_products = True
     factor_bits = MULTIPLIER_BITS
 
     def of_graph(self, graph: Graph) -> float:
@@ -118,6 +123,7 @@ class FewAdders:
     unsuited = "not for this filter"
     hopeless = SmallArea.hopeless
     few_digits = True
+    floors_products = True
     factor_bits = None
 
     def of_graph(self, graph: Graph) -> float:
@@ -160,6 +166,7 @@ class ShortProgram:
     bit_serial: bool = False
 
     few_digits = False
+    floors_products = False  # products are added up with all their bits
     beyond = "longer even with one digit for each value"
     unsuited = "not to be folded"
     hopeless = 1.5  # trimming saved less than a fifth in every design seen

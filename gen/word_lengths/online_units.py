@@ -40,6 +40,7 @@ class OnlineUnits:
     unsuited = "no direct form"
     hopeless = 2.5  # as for the parallel architecture
     few_digits = False
+    floors_products = False
     factor_bits = None
 
     def of_graph(self, graph: Graph) -> float:
