@@ -9,8 +9,9 @@ stage in between, made when it is first asked for::
          |                                                                        ^
          +--> node b ---->[b_passed1]-----> node d ---------->[d_passed2]---------+
 
-Every signal is as wide as the range of its node asks, and signed only if that holds negative codes. Intermediate
-results are exact; bits are dropped only by FLOOR, TRUNCATE and FRACTION.
+Every signal is as wide as the range of its node asks, and signed only if that holds negative codes; a sum has no bits
+above those that are used of it. Intermediate results are exact, but for bits above; other bits are dropped only by
+FLOOR, TRUNCATE and FRACTION. What is added below all bits of a number is put there without an adder.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from amaranth.lib.wiring import Component
 
 from sosmith.hdl.adders import multiples
 from sosmith.hdl.constant_banks import Pair, chosen
+from sosmith.hdl.plan.used_bits import used_bits
 from sosmith.model.dataflow.adder_graph import by_operand
 from sosmith.model.dataflow.graph import Graph, Node, Op
 
@@ -80,6 +82,7 @@ class PipelinedLogic:
         self._passed: dict[tuple[int, int], Value] = {}
         self._adders = adders
         self._multiples: dict[int, Value] = {}
+        self._used = used_bits(graph)
         self.names = unique_names(graph)
         self.wires: list[Value] = []
 
@@ -93,8 +96,10 @@ class PipelinedLogic:
         if own > pipeline_stage:
             # A state that is updated in a later pipeline stage: if the sample before is still there, the update is due.
             return Mux(self._valid[own], self.wires[node.operands[0]], self.wires[index])
+        if node.op in {Op.FLOOR, Op.FRACTION} and self._is_state_of(node.operands[0], pipeline_stage):
+            return logic(self._graph, node, [self.wires[node.operands[0]]])
         if (index, pipeline_stage) not in self._passed:
-            register = Signal(shape_of(node), name=f"{self.names[index]}_passed{pipeline_stage}", reset_less=True)
+            register = Signal(self._shape(index), name=f"{self.names[index]}_passed{pipeline_stage}", reset_less=True)
             self._passed[index, pipeline_stage] = register
             before = self.at(index, pipeline_stage - 1)  # may make another register, which loads by its own rule
             with self._m.If(self._takes[pipeline_stage - 1]):
@@ -111,7 +116,7 @@ class PipelinedLogic:
             elif node.op is Op.SHIFT or self._is_once(index):  # the same code
                 self.wires.append(self.at(node.operands[0], own))
             else:
-                wire = Signal(shape_of(node), name=name, attrs={"keep": 1} if index in apart else {})
+                wire = Signal(self._shape(index), name=name, attrs={"keep": 1} if index in apart else {})
                 if node.op is not Op.DELAY:
                     pair = self._constants.get(index)
                     factor = None if pair is None else chosen(pair, self._banks[own])
@@ -120,6 +125,15 @@ class PipelinedLogic:
                     value = self._multiple(index) if of_adders else logic(self._graph, node, operands, factor)
                     self._m.d.comb += wire.eq(value)
                 self.wires.append(wire)
+
+    def _is_state_of(self, index: int, pipeline_stage: int) -> bool:
+        """Whether a node is a state in its own pipeline stage, so that bits of it take no registers of their own."""
+        return self._graph.nodes[index].op is Op.DELAY and self._pipeline_stages[index] == pipeline_stage
+
+    def _shape(self, index: int) -> Shape:
+        """Shape of a node's signal: of a sum, as many bits as are used, which may not hold its range."""
+        node = self._graph.nodes[index]
+        return Shape(self._used[index], signed=node.signed) if node.op in {Op.ADD, Op.SUBTRACT} else shape_of(node)
 
     def _is_once(self, index: int) -> bool:
         """Whether a node is a product by the constant 1, whose name would else compete with that of its operand."""
@@ -187,6 +201,9 @@ def logic(graph: Graph, node: Node, operands: list[Value], factor: Value | None 
     if node.op is Op.CONSTANT:
         return Const(node.parameter, shape_of(node))
     if node.op in {Op.ADD, Op.SUBTRACT}:
+        joined = _joined(operands, fracs, node) if node.op is Op.ADD else None
+        if joined is not None:
+            return joined
         a, b = _aligned(operands, fracs, node.frac)
         return a + b if node.op is Op.ADD else a - b
     if node.op is Op.SCALE:
@@ -225,6 +242,17 @@ def limits(node: Node, operand: Value) -> tuple[Value, Value]:
         if low in {0, -high - 1}:
             below = top if low == 0 else top & ~value[bits:-1].all()
     return below, above
+
+
+def _joined(operands: list[Value], fracs: list[int], node: Node) -> Value | None:
+    """Return a sum whose one operand, never negative, has all its bits below those of the other; else None."""
+    for upper, lower in ((0, 1), (1, 0)):
+        a, b = operands[upper], operands[lower]
+        zeros, low = node.frac - fracs[upper], node.frac - fracs[lower]
+        if not b.shape().signed and low + len(b) <= zeros:
+            sum_of_both = Cat(Const(0, low), b, Const(0, zeros - low - len(b)), a)
+            return sum_of_both.as_signed() if a.shape().signed else sum_of_both
+    return None
 
 
 def _aligned(operands: list[Value], fracs: list[int], frac: int) -> Iterator[Value]:

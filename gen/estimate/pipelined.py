@@ -8,7 +8,7 @@ from functools import cached_property
 
 from sosmith.hdl.plan.interleaving import schedule
 from sosmith.hdl.plan.look_ahead import TurnPlan
-from sosmith.hdl.plan.pipeline import known_early, pipeline_stages
+from sosmith.hdl.plan.pipeline import inner_sums, pipeline_stages
 from sosmith.model.dataflow.graph import Graph, Op
 
 SUMS = {Op.ADD, Op.SUBTRACT}
@@ -54,7 +54,7 @@ class Pipelined:
     def of_one(cls, graph: Graph, adders: Collection[int]) -> Pipelined:
         """Return the plan for one channel."""
         stages = pipeline_stages(graph)
-        return cls(graph, tuple(stages), adders, apart=known_early(graph, stages))
+        return cls(graph, tuple(stages), adders, apart=inner_sums(graph, stages))
 
     @classmethod
     def of_channels(cls, graph: Graph, channels: int, adders: Collection[int], *, rewrites: bool) -> Pipelined:

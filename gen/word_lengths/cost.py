@@ -6,6 +6,7 @@ from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from sosmith.hdl.plan.used_bits import used_bits
 from sosmith.model.dataflow.adder_graph import adder_bits, adder_graph, by_operand, signed_digits
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.graph import Graph, Node, Op
@@ -15,6 +16,10 @@ MULTIPLIER_BITS = 18
 
 _LUTS_PER_ADDER_BIT, _LUTS_PER_SPLIT = 1.04, 30.7
 """Fitted by benchmarks/cost_model.py to synthesis results of the examples on ECP5, within 40 %."""
+
+_ADDERS_PER_EXTRA_BIT = 3
+"""Adder bits for each bit of `Cost.extra_bits`: Yosys gates the other operand and adds it up with its sign, which takes
+some 60 LUT4 for a signed operand of 19 bits on an ECP5."""
 
 LUTS_OF_A_BLOCK = 864
 """LUT4 that a multiplier block counts as: an ECP5-25 has 24,192 LUT4 and 28 blocks (Lattice FPGA-DS-02012, family
@@ -114,7 +119,7 @@ class Cost:
     @property
     def luts(self) -> int:
         """Estimated number of LUT4 on an ECP5; a carry cell counts as two."""
-        adder_bits = self.adder_bits + self.extra_bits
+        adder_bits = self.adder_bits + _ADDERS_PER_EXTRA_BIT * self.extra_bits
         return round(_LUTS_PER_ADDER_BIT * adder_bits + _LUTS_PER_SPLIT * self.splits)
 
     @property
@@ -146,13 +151,15 @@ def cost_of_graphs(
     multiplications: list[Multiplication] = []
     adders = registers = 0
     for graph, products in zip(graphs, from_adders or [()] * len(graphs), strict=True):
-        nodes = graph.nodes
+        nodes, used = graph.nodes, used_bits(graph)
         adders += (bits or _bits_of_products)(graph, products)
         for index, node in enumerate(nodes):
             if index in products:
                 continue
+            if graph.concatenated(node) is not None:
+                continue
             if node.op is Op.ADD or node.op is Op.SUBTRACT or graph.is_gate(node):
-                adders += node.width
+                adders += used[index]
             elif node.op is Op.TRUNCATE:  # an adder makes negative values round up
                 adders += nodes[node.operands[0]].width
             elif node.op is Op.DELAY:

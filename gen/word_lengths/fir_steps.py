@@ -25,7 +25,9 @@ class FewSteps:
     beyond = "more steps"
     unsuited = "they keep no samples"
     hopeless = math.inf
+    negligible = 0.0
     few_digits = False
+    floors_products = False
     factor_bits = None
 
     def of_graph(self, graph: Graph) -> float:

@@ -55,6 +55,10 @@ class Objective(Protocol):
         """Whether a coefficient of fewer signed digits takes less, though it has as many bits."""
 
     @property
+    def floors_products(self) -> bool:
+        """Whether a product may drop bits by itself, before it is added to others."""
+
+    @property
     def factor_bits(self) -> int | None:
         """Bits of a constant, with its sign, beyond which a product takes more; None if there is no such step."""
 
@@ -87,6 +91,7 @@ class SmallArea:
     hopeless = 2.5  # trimming saved less than half in every design seen
     negligible = 0.0
     few_digits = False
+    floors_products = True
     factor_bits = MULTIPLIER_BITS
 
     def of_graph(self, graph: Graph) -> float:
@@ -124,6 +129,7 @@ class FewAdders:
     hopeless = SmallArea.hopeless
     negligible = 0.0
     few_digits = True
+    floors_products = True
     factor_bits = None
 
     def of_graph(self, graph: Graph) -> float:
@@ -167,6 +173,7 @@ class ShortProgram:
 
     negligible = 1 / 128  # bits of words that take no instruction
     few_digits = False
+    floors_products = False  # products are added up with all their bits
     beyond = "longer even with one digit for each value"
     unsuited = "not to be folded"
     hopeless = 1.5  # trimming saved less than a fifth in every design seen

@@ -41,6 +41,7 @@ class OnlineUnits:
     negligible = 0.0
     hopeless = 2.5  # as for the parallel architecture
     few_digits = False
+    floors_products = False
     factor_bits = None
 
     def of_graph(self, graph: Graph) -> float:

@@ -3,9 +3,11 @@
 The start keeps to the error allowed. Each step is the one that saves the most estimated size for the error it costs;
 the search ends when no further step fits. A step drops bits of one quantizer, of the calibration or of one
 coefficient, which may become either neighbour of its ideal value; or it starts to quantize a product's operand so that
-it fits one hardware multiplier. Where products are made of adders, a coefficient may also become a number near its
-ideal value that has fewer signed digits. Where no step fits any more, what lowers the error and costs nothing is
-taken: neighbouring values of one or two coefficients, and bits of quantizers, as memory words may have room for them.
+it fits one hardware multiplier. Where every bit of a sum takes an adder, all products of a section may drop bits, too;
+and where no step is left, one that errs too much is tried with more bits elsewhere. Where products are made of adders,
+a coefficient may also become a number near its ideal value that has fewer signed digits. Where no step fits any more,
+what lowers the error and costs nothing is taken: neighbouring values of one or two coefficients, and bits of
+quantizers, as memory words may have room for them.
 
 All errors here are linear estimates in double precision: the gain to the output for a quantizer, the response of the
 derivative for a coefficient, so that errors of several coefficients may cancel. They only guide the choice; the result
@@ -35,7 +37,7 @@ from sosmith.gen.word_lengths.cost import MULTIPLIER_BITS
 from sosmith.gen.word_lengths.input_stage import InputStage
 from sosmith.gen.word_lengths.objective import SMALL_AREA, Objective
 from sosmith.model.arithmetic.recursive_filters import lfilter, sosfilt
-from sosmith.model.dataflow.graph import Range
+from sosmith.model.dataflow.graph import Op, Range
 from sosmith.model.errors import ShortfallError
 
 Array = npt.NDArray[np.float64] | npt.NDArray[np.float32]
@@ -57,6 +59,9 @@ _FEW = 16
 
 _WORTH = 2.0**-10
 """Share of the error that a step which costs nothing must save."""
+
+_UNNOTICED = 2.0**-10
+"""Error at the output, in LSBs, with which products begin to drop bits."""
 
 _STEPS = (1, 2, 3)
 """Bits that one step may drop: several, as a shorter fraction may save something only once it is the shortest one."""
@@ -237,9 +242,45 @@ class Search:
                 if best is None or merit > best[0]:
                     best = merit, candidate, after, size - saved
             if best is None:
-                break
+                exchange = self._exchange(choice, size, allowed, calibration=calibration)
+                if exchange is None:
+                    break
+                choice, size = exchange
+                error = self.error(choice)
+                continue
             _, choice, error, size = best
         return choice
+
+    def _exchange(
+        self, choice: Choice, size: float, allowed: float, *, calibration: bool
+    ) -> tuple[Choice, float] | None:
+        """Return a smaller choice that has bits less in one place and more in others, and its size; None without one.
+
+        Bits that cost next to nothing go first, as those of products; what that took may be worth more elsewhere.
+        """
+        best: tuple[Choice, float] | None = None
+        steps = self._steps(choice, calibration=calibration) if self._objective.floors_products else ()
+        for candidate in steps:
+            other, error, smallest = candidate, self.error(candidate), size if best is None else best[1]
+            for _ in range(len(choice.formats) * max(_STEPS)):
+                if error <= allowed or self.size(other) >= smallest:
+                    break
+                longer = [(each, self.error(each), self.size(each)) for each in self._longer(other)]
+                before, grown = error, self.size(other)
+                merits = [(before - after) / max(larger - grown, 1.0) for _, after, larger in longer]
+                other, error, _ = longer[merits.index(max(merits))]
+            if error <= allowed and (smaller := self.size(other)) < smallest:
+                best = other, smaller
+        return best
+
+    def _longer(self, choice: Choice) -> Iterator[Choice]:
+        """Yield choices where one section keeps one bit more, of its products or of another quantizer."""
+        for k, form in enumerate(choice.formats):
+            products = self._estimates[k].products
+            places = [(name,) for name in form.fracs if name not in products]
+            for names in (*places, tuple(name for name in products if name in form.fracs)):
+                kept = {**form.fracs, **{name: form.fracs[name] + 1 for name in names}}
+                yield choice.with_format(k, replace(form, fracs=kept))
 
     def with_closer_coefficients(self, choice: Choice) -> Choice:
         """Return the same formats with coefficients whose error is smaller, of no more bits."""
@@ -273,7 +314,7 @@ class Search:
     def _moved(self, choice: Choice) -> Iterator[Choice]:
         """Yield formats with one coefficient, or two if there are few, next to what they were."""
         places = [(k, name) for k, form in enumerate(choice.formats) for name in form.coefficients]
-        moves = [((place, by),) for place in places for by in (-1, 1)]
+        moves: list[tuple[tuple[tuple[int, str], int], ...]] = [((place, by),) for place in places for by in (-1, 1)]
         if len(places) <= _FEW:
             moves += [(*one, *other) for one, other in combinations(moves, 2) if one[0][0] != other[0][0]]
         for move in moves:
@@ -307,6 +348,8 @@ class Search:
                     yield form.with_frac(name, frac - step)
         for name, frac in fits.items():
             yield form.with_frac(name, frac)
+        if self._objective.floors_products:
+            yield from self._shorter_products(k, form)
         for name, (integer, frac) in form.coefficients.items():
             if self._objective.few_digits:
                 for nearest in with_fewer_digits(integer, self._estimates[k].ideal[name] * 2.0**frac):
@@ -316,6 +359,18 @@ class Search:
                 if abs(integer).bit_length() > step + 1:
                     for neighbour in {math.floor(exact), math.ceil(exact)} - {0}:
                         yield form.with_coefficient(name, lowest_terms(neighbour, frac - step))
+
+    def _shorter_products(self, k: int, form: SectionFormat) -> Iterator[SectionFormat]:
+        """Yield formats whose products all drop more bits: one that keeps more keeps the words long."""
+        estimate = self._estimates[k]
+        if not estimate.products:
+            return
+        kept = [form.fracs[name] for name in estimate.products if name in form.fracs]
+        gain = sum(estimate.gains[name] for name in estimate.products)
+        most = min(kept) if kept else _bits_below(gain, _UNNOTICED) + 1
+        for step in _STEPS:
+            if most >= step:
+                yield replace(form, fracs={**form.fracs, **dict.fromkeys(estimate.products, most - step)})
 
     def error(self, choice: Choice) -> float:
         """Estimated sum of the errors of input stage, coefficients and rounding, in output LSBs."""
@@ -401,7 +456,7 @@ class Search:
         graph = section.graph
         output = graph.nodes[graph.outputs[0]]
         optional = section.optional_quantizers
-        operands = {node.name: node for node in graph.nodes if node.name in optional}
+        operands = {node.name: node for node in graph.nodes if node.name in optional and node.op is not Op.SCALE}
         fits = {
             name: node.frac - (node.width - MULTIPLIER_BITS)
             for name, node in operands.items()
@@ -451,6 +506,8 @@ class _Estimate:
         Largest centred error at every such node for each of the section's quantizers, if it rounds to integers.
     optional : tuple of str
         Names in `gains` of the quantizers that are optional.
+    products : tuple of str
+        Those of them that are products.
     """
 
     ideal: dict[str, float]
@@ -459,6 +516,7 @@ class _Estimate:
     limits: dict[str, tuple[float, float]]
     spreads: dict[str, dict[str, float]]
     optional: tuple[str, ...]
+    products: tuple[str, ...]
 
     def limits_of(self, node: str, fracs: Mapping[str, int]) -> tuple[float, float]:
         """Limits of a node with quantizers: they can make a nonnegative node negative, which adds a sign bit."""
@@ -492,9 +550,15 @@ def _estimates(rows: Sequence[Sequence[float]], realization: str, windows: Seque
                 },
                 spreads={name: {s.name: _gain(s, i, poles, impulse) for s in quantizers} for i, name in names.items()},
                 optional=section.optional_quantizers,
+                products=tuple(name for name in _products(section) if name in {s.name for s in quantizers}),
             )
         )
     return _added_up(result)
+
+
+def _products(section: Section) -> tuple[str, ...]:
+    """Names of the products whose quantizers are optional."""
+    return tuple(n.name for n in section.graph.nodes if n.op is Op.SCALE and n.name in section.optional_quantizers)
 
 
 def _added_up(estimates: Sequence[_Estimate]) -> list[_Estimate]:
@@ -535,6 +599,7 @@ def _exact(
     formats = SectionFormat(coefficient_bits=_EXACT_BITS, coefficients=coefficients or {}, x=unknown_range(1))
     section = build(row, formats, "section")
     fracs = dict.fromkeys(quantizers(section.graph), 1) | dict.fromkeys(section.optional_quantizers, 0)
+    fracs |= dict.fromkeys(_products(section), 2)  # more than v keeps, which would drop nothing otherwise
     return build(row, replace(formats, fracs=fracs), "section")
 
 

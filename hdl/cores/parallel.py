@@ -39,7 +39,7 @@ judges wear restarts with new ones, as it would with a fault::
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from operator import or_
@@ -49,7 +49,7 @@ from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value
 from amaranth.lib import data
 
 from sosmith.hdl.axi_stream import StreamBuffer
-from sosmith.hdl.constant_banks import NO_CONSTANTS, ConstantBanks
+from sosmith.hdl.constant_banks import NO_CONSTANTS, ConstantBanks, Pair
 from sosmith.hdl.pipelined_logic import banks_in_use
 from sosmith.hdl.plan.parallel_clocks import depths
 from sosmith.hdl.plan.streams import channel_bits
@@ -59,9 +59,11 @@ from sosmith.hdl.shell.pipeline import Sample, delayed, through
 from sosmith.hdl.shell.shell import Shell
 from sosmith.hdl.stages.interleaved import InterleavedStage
 from sosmith.hdl.stages.pipelined import PipelinedStage
+from sosmith.hdl.stages.starting import StartingStage
 from sosmith.hdl.status import NEVER, status_of_result, with_fault
-from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.dataflow.datapath import Datapath, Stage
 from sosmith.model.reload.constants import constants
+from sosmith.model.sections.start import PassingStage, StartStage
 
 
 class _Swap(NamedTuple):
@@ -264,7 +266,7 @@ class Core(Shell):
             component = (
                 InterleavedStage(stage, self.channels, pairs, protect=self.protect, adders=adders)
                 if self.channels > 1
-                else PipelinedStage(stage, pairs, parity=self.is_guarded, clears=self.restarts, adders=adders)
+                else self._stage_of_one(stage, pairs, adders)
             )
             m.submodules[stage.name] = component
             m.d.comb += component.advance.eq(advance)
@@ -279,6 +281,15 @@ class Core(Shell):
             swap=_Swap(Signal(name="pending"), Signal(name="may_swap")) if self.restarts else None,
             empty=Signal(name="empty"),
         )
+
+    def _stage_of_one(self, stage: Stage, pairs: Mapping[int, Pair], adders: Collection[int]) -> PipelinedStage:
+        """Make a stage for one channel; the first sample is kept once, but where each sample has to check it."""
+        if not self.is_guarded:
+            if isinstance(stage, StartStage):
+                return StartingStage(stage, clears=self.restarts)
+            if isinstance(stage, PassingStage):
+                stage = stage.section
+        return PipelinedStage(stage, pairs, parity=self.is_guarded, clears=self.restarts, adders=adders)
 
     @property
     def _depth_of_stages(self) -> int:

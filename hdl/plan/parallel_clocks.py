@@ -7,6 +7,7 @@ from sosmith.hdl.plan.look_ahead import period, plans
 from sosmith.hdl.plan.pipeline import longest_time, pipeline_depth
 from sosmith.hdl.plan.unfolding import unfolded_stages
 from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.sections.start import StartStage
 
 _UNIT, _CHAINED, _BESIDE = 0.5e-9, 0.4e-9, 3.6e-9
 """Time of a unit of `sosmith.hdl.plan.pipeline.operation_time` in seconds, where one or two operations fill a pipeline
@@ -34,7 +35,10 @@ def scrub_cycles(datapath: Datapath, channels: int) -> int:
 def depths(datapath: Datapath, channels: int, protect: str) -> list[int]:
     """Return the number of pipeline stages of each datapath stage."""
     if channels == 1:
-        return [pipeline_depth(stage.graph) for stage in datapath.stages]
+        return [
+            1 if protect == "none" and isinstance(stage, StartStage) else pipeline_depth(stage.graph)
+            for stage in datapath.stages
+        ]
     rewrites = protect != "none"
     return [schedule(stage.graph, channels, rewrites=rewrites).depth for stage in datapath.stages]
 

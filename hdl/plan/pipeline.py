@@ -40,7 +40,45 @@ def pipeline_stages(graph: Graph) -> list[int]:
         if part and any(graph.nodes[i].op not in NO_LOGIC for i in whole - part):
             for i in part:
                 stages[i] += 1
+    return _with_products_later(graph, stages)
+
+
+def _with_products_later(graph: Graph, stages: list[int]) -> list[int]:
+    """Move products from the slowest pipeline stage into the next one, where that makes no other as slow.
+
+    A product behind sums is then registered before it is multiplied, which takes fewer bits than behind.
+    """
+    for index, node in enumerate(graph.nodes):
+        if node.op not in {Op.SCALE, Op.MULTIPLY} or graph.is_gate(node):
+            continue
+        own, moved = stages[index], {index}
+        users = {user: other for user, other in enumerate(graph.nodes) if moved & set(other.operands)}
+        while any(stages[user] == own and other.op in NO_LOGIC - {Op.DELAY} for user, other in users.items()):
+            moved |= {user for user, other in users.items() if other.op in NO_LOGIC - {Op.DELAY}}
+            users = {
+                user: other
+                for user, other in enumerate(graph.nodes)
+                if user not in moved and moved & set(other.operands)
+            }
+        before = _times(graph, stages)
+        if moved & set(graph.outputs) or before[own] < max(before) or any(stages[user] == own for user in users):
+            continue
+        later = [stage + (i in moved and stage == own) for i, stage in enumerate(stages)]
+        after = _times(graph, later) if max(later) == max(stages) else [max(before) + 1]
+        if max(after) <= max(before) and after[own] < before[own]:
+            stages = later
     return stages
+
+
+def _times(graph: Graph, stages: Sequence[int]) -> list[int]:
+    """Return the time of each pipeline stage, in units of `operation_time`."""
+    times = [0] * (max(stages) + 1)
+    there: list[int] = []
+    for index, node in enumerate(graph.nodes):
+        before = [there[i] for i in node.operands if node.op is not Op.DELAY and stages[i] == stages[index]]
+        there.append(max(before, default=0) + operation_time(graph, node))
+        times[stages[index]] = max(times[stages[index]], there[-1])
+    return times
 
 
 def _one_after_another(graph: Graph) -> list[int]:
@@ -72,23 +110,28 @@ def _needed(graph: Graph, nodes: set[int]) -> set[int]:
     return needed
 
 
-def known_early(graph: Graph, stages: Sequence[int]) -> set[int]:
-    """Return the sums without a product of their pipeline stage that are added to one with a product.
+def inner_sums(graph: Graph, stages: Sequence[int]) -> set[int]:
+    """Return the sums that another sum of their pipeline stage takes up.
 
-    Synthesis has to keep them apart: it would otherwise merge all additions into one and delay the product by that.
+    Synthesis has to keep them apart. It would otherwise merge all of them into one, which delays a product by what is
+    known before it, and takes two LUT for each bit of a third operand where a carry chain of its own takes one.
     """
-    products: set[int] = set()
+    inner = set[int]()
     for index, node in enumerate(graph.nodes):
-        own = [i for i in node.operands if stages[i] == stages[index] and node.op is not Op.DELAY]
-        if (node.op in {Op.SCALE, Op.MULTIPLY} and not graph.is_gate(node)) or products & set(own):
-            products.add(index)
-    return {
-        i
-        for index, node in enumerate(graph.nodes)
-        if index in products and node.op in {Op.ADD, Op.SUBTRACT}
-        for i in node.operands
-        if i not in products and stages[i] == stages[index] and graph.nodes[i].op in {Op.ADD, Op.SUBTRACT}
-    }
+        left = [*node.operands] if _is_sum(graph, index) else []
+        while left:
+            source = left.pop()
+            if graph.nodes[source].op in {Op.SHIFT, Op.BOUND} or graph.concatenated(graph.nodes[source]) is not None:
+                left += graph.nodes[source].operands
+            elif _is_sum(graph, source) and stages[source] == stages[index]:
+                inner.add(source)
+    return inner
+
+
+def _is_sum(graph: Graph, index: int) -> bool:
+    """Whether a node takes an adder."""
+    node = graph.nodes[index]
+    return node.op in {Op.ADD, Op.SUBTRACT} and graph.concatenated(node) is None
 
 
 def loop_delays(graph: Graph) -> frozenset[int]:
@@ -143,19 +186,14 @@ def _is_older(graph: Graph, index: int) -> bool:
 
 def longest_time(graph: Graph) -> int:
     """Return the time of the slowest of `pipeline_stages`, in units of `operation_time`."""
-    stages = pipeline_stages(graph)
-    there: list[int] = []
-    for index, node in enumerate(graph.nodes):
-        before = [there[i] for i in node.operands if node.op is not Op.DELAY and stages[i] == stages[index]]
-        there.append(max(before, default=0) + operation_time(graph, node))
-    return max(there, default=0)
+    return max(_times(graph, pipeline_stages(graph)))
 
 
 def operation_time(graph: Graph, node: Node, *, powers: bool = False) -> int:
     """Delay of a node in the unit of `ADDITION`; `powers` says that a product by a power of two takes none."""
     if powers and node.op is Op.SCALE and node.parameter > 0 and not node.parameter & (node.parameter - 1):
         return 0
-    if node.op in NO_LOGIC:
+    if node.op in NO_LOGIC or graph.concatenated(node) is not None:
         return 0
     if node.op in {Op.SCALE, Op.MULTIPLY} and not graph.is_gate(node):
         operands = [(graph.nodes[i].width, graph.nodes[i].signed) for i in node.operands]

@@ -69,7 +69,7 @@ def through(
         Where the stages are.
     stages : sequence of Component
         Those of `sosmith.hdl.stages`. What a sample has beside its codes goes through a stage that takes it, and past
-        one that does not.
+        one that does not. So do the last codes, if a stage has fewer inputs: what is the same for all samples to come.
     sample, codes : Sample, sequence of Value
         What comes in.
 
@@ -84,10 +84,12 @@ def through(
         beside = {
             name: value for name, value in sample._asdict().items() if value is not None and f"i_{name}" in members
         }
-        m.d.comb += [getattr(stage, f"i{k}").eq(code) for k, code in enumerate(codes)]
+        taken = [(f"i{k}", code) for k, code in enumerate(codes) if f"i{k}" in members]
+        m.d.comb += [getattr(stage, name).eq(code) for name, code in taken]
         m.d.comb += [getattr(stage, f"i_{name}").eq(value) for name, value in beside.items()]
         sample = sample._replace(**{name: _named(m, stage, getattr(stage, f"o_{name}"), name) for name in beside})
-        codes = [_named(m, stage, getattr(stage, f"o{k}"), name) for k, name in enumerate(stage.outputs)]
+        given = [_named(m, stage, getattr(stage, f"o{k}"), name) for k, name in enumerate(stage.outputs)]
+        codes = [*given, *codes[len(taken) :]]
     return sample, codes
 
 

@@ -59,6 +59,7 @@ from sosmith.hdl.constant_banks import NO_CONSTANTS, Pair
 from sosmith.hdl.memory_ports import read_port, write_port
 from sosmith.hdl.pipelined_logic import PipelinedLogic, banks_in_use, limits, name_ports, shape_of
 from sosmith.hdl.plan.interleaving import schedule
+from sosmith.hdl.plan.pipeline import inner_sums
 from sosmith.hdl.plan.streams import channel_bits
 from sosmith.model.dataflow.datapath import Stage
 from sosmith.model.dataflow.graph import Op
@@ -159,7 +160,9 @@ class InterleavedStage(wiring.Component):
             valid=valid,
             adders=self.adders,
         )
-        logic.connect([getattr(self, f"i{k}") for k in range(len(graph.inputs))])
+        logic.connect(
+            [getattr(self, f"i{k}") for k in range(len(graph.inputs))], inner_sums(graph, plan.pipeline_stages)
+        )
         scrub = self._scrub(m)
         reads = self._connect_memories(m, logic, valid, channel, scrub)
         if self.protect != "none":

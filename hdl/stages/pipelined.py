@@ -62,7 +62,7 @@ from amaranth.lib.wiring import In, Out
 
 from sosmith.hdl.constant_banks import NO_CONSTANTS, Pair
 from sosmith.hdl.pipelined_logic import PipelinedLogic, banks_in_use, limits, name_ports, shape_of
-from sosmith.hdl.plan.pipeline import known_early, pipeline_stages
+from sosmith.hdl.plan.pipeline import inner_sums, pipeline_stages
 from sosmith.model.dataflow.datapath import Stage
 from sosmith.model.dataflow.graph import Graph, Node, Op
 
@@ -144,7 +144,7 @@ class PipelinedStage(wiring.Component):
         graph = self.stage.graph
         stages = pipeline_stages(graph)
         valid, takes, banks = self._control(m, max(stages) + 1)
-        apart = known_early(graph, stages)
+        apart = inner_sums(graph, stages)
         logic = PipelinedLogic(
             m,
             graph,

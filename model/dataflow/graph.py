@@ -153,6 +153,19 @@ class Graph:
         factors = [self.nodes[i] for i in node.operands]
         return any(of.width == 1 and not of.signed and of.op is not Op.CONSTANT for of in factors)
 
+    def concatenated(self, node: Node) -> tuple[int, int] | None:
+        """Return the operands of a sum that takes no adder, the upper one first; None for any other node.
+
+        The lower one is never negative, and all its bits lie below those of the upper one.
+        """
+        if node.op is not Op.ADD:
+            return None
+        for upper, lower in (node.operands, node.operands[::-1]):
+            above, below = self.nodes[upper], self.nodes[lower]
+            if not below.signed and below.width - below.frac <= -above.frac:
+                return upper, lower
+        return None
+
     def undelayed(self, index: int) -> tuple[int, int]:
         """Return the node that `index` is a delayed copy of, itself if it is none, and the delay in samples."""
         delay = 0

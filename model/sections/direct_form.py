@@ -21,6 +21,10 @@ A low-pass section with unity gain at zero frequency needs two products only::
 The tap sum of a product may be quantized too, with first-order error feedback, to fit the operand of a hardware
 multiplier. As c_i is small and the error is differenced, next to nothing of it reaches the output.
 
+A product may drop bits as well, below those that the total keeps. What that costs grows with the peak gain of
+1 / A(z), and the words of v, and all that is added to it, get as much shorter. Where there is room below the bits of
+``-m1 y(n-1)``, a constant centres it.
+
 A1 and A2 keep their relative precision in few bits however low the cutoff, and the gain at zero
 frequency is exactly one whatever they are rounded to.
 
@@ -61,6 +65,8 @@ class Product:
         Fraction bits that are kept of the tap sum; what is dropped is added at the next sample. None keeps all.
     range : tuple of int or None
         Smallest and largest code of the tap sum before bits are dropped, from peak gains.
+    floored : int or None
+        Fraction bits that are kept of the product. None keeps all.
     """
 
     name: str
@@ -71,6 +77,7 @@ class Product:
     shift: int = 0
     kept: int | None = None
     range: tuple[int, int] | None = None
+    floored: int | None = None
 
     def __post_init__(self) -> None:
         if self.coefficient == 0:
@@ -87,6 +94,11 @@ class Product:
     def operand(self) -> str:
         """Name of the tap sum."""
         return f"taps_{self.name}"
+
+    @property
+    def label(self) -> str:
+        """Name of the product."""
+        return f"product_{self.name}"
 
     @property
     def is_sum(self) -> bool:
@@ -153,26 +165,55 @@ class DirectForm1:
         v1 = g.delay("v1", frac, *self.v_range)
         past = [v1, g.previous(v1, "v2")] if self._order > 1 else [v1]
         taps_y = [g.floor(v, self.y_frac, f"y{i}") for i, v in enumerate(past, start=1)]
-        # Products that need y(n-1) are ready last and are added last.
+        # States are there first, and products that need y(n-1) last: so they are added.
         products: list[tuple[bool, tuple[int, Wire]]] = []
         for product in self.products:
-            taps = [*zip(product.x, taps_x, strict=False), *zip(product.y, taps_y, strict=False)]
-            operand = _operand(g, product, g.shift(g.combine(taps), -product.shift))
-            scaled = g.scale(operand, product.coefficient, product.frac, f"product_{product.name}")
+            taps = [*zip(product.x, taps_x, strict=False)], [*zip(product.y, taps_y, strict=False)]
+            operand = _operand(g, product, *taps)
+            scaled = g.scale(operand, product.coefficient, product.frac, product.label)
+            if product.floored is not None:
+                scaled = g.floor(scaled, min(g[scaled].frac, product.floored))
             products.append((product.y[0] != 0, (1, scaled)))
-        terms = [term for is_newest, term in products if not is_newest]
+        terms: list[tuple[int, Wire]] = []
         centre = 1 + sum(self.feedback)
         if self.drops and centre:
             terms.append((1, g.constant(centre, self.y_frac + 1, "centre")))
-        for v, y, m, k in zip(past, taps_y, self.integer_part, self.feedback, strict=False):
-            if m == k:
-                terms.append((-m, v))
-            else:
-                terms += [(-m, y), (-k, g.fraction(v, self.y_frac))]
-        terms += [term for is_newest, term in products if is_newest]
+        for number, (v, y, m, k) in enumerate(zip(past, taps_y, self.integer_part, self.feedback, strict=False)):
+            term = (-m, v if m == k else y)
+            terms.append(term if number else self._centred(g, term))
+            if m != k:
+                terms.append((-k, g.fraction(v, self.y_frac)))
+        terms += [term for _, term in sorted(products, key=lambda each: each[0])]
         v = g.bound(g.floor(g.combine(terms), frac), *self.v_range, "v")
         g.connect(v1, v)
         return g.build([g.floor(v, self.y_frac, "y")])
+
+    def _centred(self, g: GraphBuilder, term: tuple[int, Wire]) -> tuple[int, Wire]:
+        """Return a term with what centres the errors of the products, if there is room below its bits."""
+        factor, wire = term
+        frac = self.total_frac
+        halves = sum(Fraction(2) ** (frac - 1 - kept) for kept in self._floored_fracs)
+        if factor <= 0 or halves < 1:
+            return term
+        shifted, constant = g.shift(wire, factor.bit_length() - 1), g.constant(int(halves), frac, "centre_of_products")
+        fits = g[constant].width - frac <= -g[shifted].frac
+        return (1, g.add(shifted, constant)) if fits else term
+
+    @property
+    def _floored_fracs(self) -> list[int]:
+        """Fraction bits of the products that drop some."""
+        exact = [(p, self._product_frac(p)) for p in self.products]
+        return [p.floored for p, frac in exact if p.floored is not None and p.floored < frac]
+
+    def _product_frac(self, p: Product) -> int:
+        """Fraction bits of a product before it drops any."""
+        exact = self._operand_frac(p)
+        return (exact if p.kept is None else min(exact, p.kept)) + p.frac
+
+    def _operand_frac(self, p: Product) -> int:
+        """Fraction bits of a tap sum before it drops any."""
+        taps = [(self.x.frac, tap) for tap in p.x if tap] + [(self.y_frac, tap) for tap in p.y if tap]
+        return p.shift + max(frac - abs(tap).bit_length() + 1 for frac, tap in taps)
 
     @property
     def drops(self) -> bool:
@@ -192,7 +233,7 @@ class DirectForm1:
     @property
     def optional_quantizers(self) -> tuple[str, ...]:
         """Names of the nodes that may be quantized but need not be."""
-        return tuple(p.operand for p in self.products if p.is_sum)
+        return (*(p.operand for p in self.products if p.is_sum), *(p.label for p in self.products))
 
     @property
     def stated_fracs(self) -> dict[str, int]:
@@ -200,8 +241,7 @@ class DirectForm1:
         fracs = {"v": self.total_frac}
         for p in self.products:
             if p.range is not None:
-                taps = [(self.x.frac, tap) for tap in p.x if tap] + [(self.y_frac, tap) for tap in p.y if tap]
-                fracs[p.operand] = p.shift + max(frac - abs(tap).bit_length() + 1 for frac, tap in taps)
+                fracs[p.operand] = self._operand_frac(p)
         return fracs
 
     @property
@@ -214,9 +254,8 @@ class DirectForm1:
         """Fraction bits that hold the exact total of all products."""
         fracs = [self.y_frac]
         for p in self.products:
-            inputs = ([self.x.frac] if any(p.x) else []) + ([self.y_frac] if any(p.y) else [])
-            exact = max(inputs) + p.shift
-            fracs.append((exact if p.kept is None else min(exact, p.kept)) + p.frac)
+            exact = self._product_frac(p)
+            fracs.append(exact if p.floored is None else min(exact, p.floored))
         return max(fracs)
 
 
@@ -247,13 +286,23 @@ def _denominator(products: Sequence[Product], integer_part: tuple[int, int]) -> 
     return a1, a2, frac
 
 
-def _operand(g: GraphBuilder, product: Product, taps: Wire) -> Wire:
-    """State the range of a tap sum, and drop the bits that are not kept."""
-    frac = g[taps].frac
+def _operand(g: GraphBuilder, product: Product, x: Sequence[tuple[int, Wire]], y: Sequence[tuple[int, Wire]]) -> Wire:
+    """Add up taps, state the range of the sum, and drop the bits that are not kept.
+
+    What was dropped at the sample before is added to the taps on x, or else to the older one on y: it may fit below
+    their bits, and what comes later, as y does, is added after it.
+    """
+    first, later = ([(tap, g.shift(wire, -product.shift)) for tap, wire in taps if tap] for taps in (x, y[::-1]))
+    if not first:
+        first, later = later[:1], later[1:]
+    shifts = [abs(tap).bit_length() - 1 for tap, _ in (*first, *later)]
+    frac = max(g[wire].frac - shift for (_, wire), shift in zip((*first, *later), shifts, strict=True))
     kept = frac if product.kept is None else min(frac, product.kept)
+    terms = [(1, g.combine(first)), *later] if any(tap > 0 for tap, _ in first) else [*first, *later]
     if kept < frac:
         error = g.delay(f"error_{product.name}", frac, 0, (1 << (frac - kept)) - 1)
-        taps = g.add(taps, error)
+        terms = [(1, g.add(terms[0][1], error)), *terms[1:]] if terms[0][0] == 1 else [*terms, (1, error)]
+    taps = g.combine(terms)
     if product.range is not None:
         taps = g.bound(taps, *product.range)
     taps = g.named(taps, product.operand)

@@ -73,13 +73,17 @@ class OutputStage:
         g = GraphBuilder()
         flags = [settling(g, self.settling)] if self.settling else []  # first: what is limited has to come last
         x = g.input("x", *self.x)
+        half = False
         if self.held is not None:
             held = g.input("held", *self.held.range)
+            half = self.held.is_plain and self.held.range.frac <= 0 < self.x.frac
+            if half:  # what rounds the total has room below the bits of an integer
+                held = g.add(held, g.constant(1, 1))
             plain = self.held.is_plain
             x = g.add(x, held if plain else g.scale(held, self.held.gain, self.held.gain_frac, "steady"), "total")
         if self.offset:
             x = g.add(x, g.constant(self.offset, self.offset_frac, "offset"))
-        rounded = g.round(x, 0, "rounded")
+        rounded = g.floor(x, 0, "rounded") if half else g.round(x, 0, "rounded")
         if self.low <= g[rounded].low and g[rounded].high <= self.high:
             return g.build([rounded, *flags])
         return g.build([g.clamp(rounded, self.low, self.high, "code"), *flags])

@@ -138,6 +138,10 @@ class Evaluation:
         if not select.keys() - {ONE}:
             return self.loaded(statement.yes if select else statement.no)
         yes, no = self.loaded(statement.yes), self.loaded(statement.no)
+        if yes is None and no is not None and isinstance(no[0], Bits):
+            yes = no[0], self.word(no[0])  # it keeps what it holds
+        if no is None and yes is not None and isinstance(yes[0], Bits):
+            no = yes[0], self.word(yes[0])
         if yes is None or no is None or yes[0] != no[0]:
             raise RejectedError("it must not depend on data whether something is loaded")
         return yes[0], self._chosen(select, yes[1], no[1])

@@ -5,6 +5,10 @@ that `node`, which is not a DELAY, had k samples ago. So a delay of a delay is t
 
     v1 = delay of v, v2 = delay of v1        v1 at the sample before = v2 = (v, 2)
 
+Where a stage remembers whether there was a sample before, as the delay of a constant, all that it remembers of that one
+is ``begun`` times the variable: without one, it is 0. What then keeps its code from one sample to the next `lasts`:
+later samples change nothing.
+
 With several samples a clock, a beat takes the place of a sample, and a node is in one of its lanes
 (`sosmith.verify.parallel.lanes`). With look-ahead, what a loop remembers of T samples ago or more is ``warm``
 times the variable, 0 for the first T samples (`sosmith.verify.parallel.turn_memories`). What a stage hands to the
@@ -24,6 +28,9 @@ from sosmith.verify.graph import require
 from sosmith.verify.parallel.forms import Forms, shifted
 from sosmith.verify.parallel.lanes import LaneNode, in_lanes
 from sosmith.verify.program.normal_form import ONE, Form, Monomial, constant, plus
+
+_BEGUN = "begun"
+"""Key of the variable that says whether there was a sample, or a beat, before."""
 
 _Key = frozenset[tuple[Monomial, int | Fraction]]
 Origin = tuple[int, int]
@@ -128,6 +135,7 @@ class GraphCodes:
             for index in self.delays
             if self.memory_name(index) in memories
         }
+        self._begun = self._begins()
         self._ranges: dict[Origin, tuple[int, int]] = {}
         for index in self.delays:
             entry, origin = self.nodes[index].entry, self.origin(index)
@@ -198,7 +206,19 @@ class GraphCodes:
             return self.seen(node, self.nodes[node].stage)
         low, high = self._ranges.get(origin) or self._widest(node)
         code = self.forms.variable(origin, low, high)
+        if origin in self._begun:
+            entry = self.nodes[node].entry
+            known = constant(entry.parameter) if entry.op is Operation.CONSTANT else code
+            return self.forms.times(self.forms.variable(_BEGUN, 0, 1), known)
         return self.forms.times(self.warm(self.turned[origin]), code) if origin in self.turned else code
+
+    def lasts(self, index: int) -> bool:
+        """Whether a node keeps its code from its first sample on."""
+        if (index, 1) not in self._begun:
+            return False
+        one: dict[Hashable, Form] = {_BEGUN: constant(1)}
+        past = self.past((index, 1))
+        return past is not None and self.forms.settled(self.codes[index], one) == self.forms.settled(past, one)
 
     def shortened(self, word: Form, width: int, at_inlet: bool = False) -> Form:
         """Return the variable whose code a word of `width` bits is; any other word as it is.
@@ -239,6 +259,20 @@ class GraphCodes:
         key = next(key for key in reversed(self._definitions) if key in candidates)
         meant = {key: self._definitions[key]}
         return self.forms.settled(a, meant), self.forms.settled(b, meant)
+
+    def _begins(self) -> set[Origin]:
+        """Return what stages with the delay of a constant remember of the sample before."""
+        origins = {index: self.origin(index) for index in self.delays}
+        stages = {
+            self.nodes[index].stage
+            for index, (node, ago) in origins.items()
+            if ago == 1 and self.nodes[node].entry.op is Operation.CONSTANT
+        }
+        return {
+            origin
+            for index, origin in origins.items()
+            if self.nodes[index].stage in stages and origin[1] == 1 and origin not in self.turned
+        }
 
     def _widest(self, node: int) -> tuple[int, int]:
         entry = self.nodes[node].entry

@@ -15,7 +15,8 @@ it belongs to a sample before or behind, by as many as there are in between::
                                  [v] ------>              seen from 1:   delay(n) = the one before delay(n+1)
                                                           seen from 3:   delay(n) = the operand at n-1
 
-A register that belongs to another position without a known number of samples in between holds nothing that is known.
+A register that belongs to another position without a known number of samples in between holds nothing that is known,
+unless its node lasts: then samples in between do not count.
 """
 
 from __future__ import annotations
@@ -475,6 +476,8 @@ class Pipeline:
         if position <= state.behind:
             between = range(position + 1, state.behind + 1)
             return self._graph.past((node, ago + self._samples_in(between, case)))
+        if ago == 1 and self._graph.lasts(node):
+            return self._graph.past((node, 0))
         between = range(state.behind + 1, position)
         require(position < len(valid), "a position must be inside the pipeline")
         return self._graph.past((node, ago - 1 - self._samples_in(between, case)))

@@ -21,6 +21,7 @@ from sosmith.verify.certificate_file import (
 )
 from sosmith.verify.graph import inputs_of
 from sosmith.verify.verdict.figures import Figure
+from sosmith.verify.verdict.operators import bits, operators
 from sosmith.verify.verdict.recursions import Recursion
 
 _HALF = Fraction(1, 2)
@@ -80,19 +81,8 @@ def settling_of(certificate: Certificate, rate: Fraction) -> dict[str, Any] | No
 
 def format_of(node: NodeEntry) -> str:
     """Return the Q format of a node: ``Qi.f`` for two's complement, i without the sign bit, or ``UQi.f``."""
-    bits = _bits(node) - (node.low < 0)
-    return f"{'Q' if node.low < 0 else 'UQ'}{bits - node.frac}.{node.frac}"
-
-
-def _bits(node: NodeEntry) -> int:
-    """Count the bits of a node, with its sign if it has one."""
-    if node.low < 0:
-        return max((-node.low - 1).bit_length(), node.high.bit_length()) + 1
-    return max(node.high.bit_length(), 1)
-
-
-def _is_bit(node: NodeEntry) -> bool:
-    return _bits(node) == 1 and node.low == 0 and node.op is not Operation.CONSTANT
+    whole = bits(node) - (node.low < 0) - node.frac
+    return f"{'Q' if node.low < 0 else 'UQ'}{whole}.{node.frac}"
 
 
 def formats_of(certificate: Certificate) -> list[dict[str, Any]]:
@@ -164,25 +154,7 @@ def operators_of(certificate: Certificate, item: ItemEntry) -> dict[str, Any] | 
         and (item.architecture in program or item.ahead not in program)
     ):
         stages = [*entry.calibration.stages, *stages]
-    products: list[list[int]] = []
-    adders = registers = 0
-    for stage in stages:
-        for node in stage.nodes:
-            operands = [stage.nodes[index] for index in node.operands]
-            if node.op in {Operation.ADD, Operation.SUBTRACT}:
-                adders += _bits(node)
-            elif node.op is Operation.TRUNCATE:
-                adders += _bits(operands[0])
-            elif node.op is Operation.DELAY:
-                registers += _bits(node)
-            elif node.op is Operation.SCALE:
-                products.append([_bits(operands[0]), abs(node.parameter).bit_length() + (node.parameter < 0)])
-            elif node.op is Operation.MULTIPLY and any(map(_is_bit, operands)):
-                adders += _bits(node)
-            elif node.op is Operation.MULTIPLY:
-                products.append([_bits(each) for each in operands])
-        registers += sum(_bits(stage.nodes[index]) for index in stage.outputs)
-    return {"multipliers": products, "adder_bits": adders, "register_bits": registers}
+    return operators(stages)
 
 
 def decimation_of(certificate: Certificate, item: ItemEntry, entry: DecimationEntry, rate: Fraction) -> dict[str, Any]:
