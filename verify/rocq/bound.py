@@ -238,7 +238,9 @@ Qed.
 def _settled(task: _Task, entry: Entry, counter: Counter) -> str:
     """Write the theorem on what is left of anything before: of m samples that the exact filter did not see."""
     bound, samples = task.certificate.claims.bound, counter.samples
-    codes, within = (text.replace("x", "z", 1) if text == "x" else text.replace(" x", " z") for text in (entry.codes, entry.within))
+    codes, within = (
+        text.replace("x", "z", 1) if text == "x" else text.replace(" x", " z") for text in (entry.codes, entry.within)
+    )
     return f"""\
 Theorem settled : forall z, inputs_within {entry.ports} z ->
   forall m y, exact_filter exact_sections (from_zero {entry.late}) y -> forall n, {samples} <= Z.of_nat n ->

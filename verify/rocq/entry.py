@@ -265,7 +265,13 @@ Qed.
 
 
 def _joined(
-    bounds: _Bounds, half: Fraction, total: Fraction, behind: Certificate, following: Calibration, graph: FlatGraph, taken: int
+    bounds: _Bounds,
+    half: Fraction,
+    total: Fraction,
+    behind: Certificate,
+    following: Calibration,
+    graph: FlatGraph,
+    taken: int,
 ) -> str:
     """Write that the node with the samples is near the exact input of the filter."""
     step, zero, error, most = bounds

@@ -211,9 +211,7 @@ Qed.
 """
 
 
-def _section(
-    name: str, before: str, windows: Windows, index: int, through: int, counter: Counter | None
-) -> str:
+def _section(name: str, before: str, windows: Windows, index: int, through: int, counter: Counter | None) -> str:
     cascade = windows.cascade
     section = cascade.sections[index]
     plans = "; ".join(f"({target}%nat, {_decided(windows, index, target).plan})" for target in section.targets)
