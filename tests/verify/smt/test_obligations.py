@@ -56,7 +56,7 @@ BROKEN = [
     pytest.param(r"(take0\)) x1 <= x;", r"\1 x1 <= ~x;", "section0.x1", id="delay"),
     pytest.param(r"\(take0\) x1 <= x;", "(i_valid) x1 <= x;", "section0.x1", id="a state that does not stay"),
     pytest.param(r"\$signed\(5'h0b\)", "$signed(5'h0d)", "section0.v1", id="coefficient"),
-    pytest.param(r"\(rst\) v1 <= 13'h0000;", "(rst) v1 <= 13'h0001;", "section0.v1", id="reset"),
+    pytest.param(r"\(rst\) v1 <= 12'h000;", "(rst) v1 <= 12'h001;", "section0.v1", id="reset"),
     pytest.param(r"\? 5'h07 : rounded", "? 5'h06 : rounded", "m_axis_tdata", id="limit of the output"),
     pytest.param(r"\$signed\(3'h2\)", "$signed(3'h1)", "m_axis_tdata", id="rounding of the output"),
 ]
