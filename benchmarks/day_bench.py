@@ -24,6 +24,8 @@ from sosmith.gen.reload.reload import check_swap, other_set
 from sosmith.gen.stimuli.core import bench_of
 from sosmith.instrument.calibration.acceptance import DEFAULT_RANGES
 from sosmith.instrument.calibration.bayesian_fit import BayesianFit, bayesian_fit
+from sosmith.instrument.calibration.mixed_effects.day_polynomial import polynomial_of
+from sosmith.instrument.calibration.mixed_effects.following_day import Following
 from sosmith.instrument.calibration.uncertainty import reading_half_width
 from sosmith.instrument.scenarios.file import ScenarioFile, emulate_file
 from sosmith.instrument.sensors.inductive_sensor import InductiveState
@@ -68,7 +70,7 @@ UNCERTAINTY = {"noise": 0.048, "temperature": 0.3, "voltage": 0.0, "clearance_ra
 MAX_ERROR, SET_ERROR = 0.0005, Fraction(1, 1000)
 """Allowed error in mm of the hardware as it is made, and with a set that is loaded."""
 
-HELD_DAYS = {"none": 12, "three": 3, "five": 3}
+HELD_DAYS = {"none": 12, "three": 4, "five": 4}
 """Days whose readings are held against their intervals: that of the run and those after it, each with the targets of
 its own morning. All readings of a day share its error, so that one day says little about how often intervals hold.
 The sensors of the bench do not age; what the calibration allows for their ageing counts all the same."""
@@ -180,17 +182,48 @@ def held(core: CoreDesign, day: Day, codes: Values | None) -> Held:
 def days_of(scenario: ScenarioFile, core: CoreDesign, seed: int, name: str) -> Iterator[Day]:
     """Yield the day of the run and those after it, each calibrated; a set that stays is proven once."""
     (excerpt,) = scenario.document.excerpt
-    day: Day | None = None
-    for k in range(HELD_DAYS[name]):
+    known, made = calibrated(scenario, seed, TARGETS[name])
+    day = Day(emulate_file(scenario, bench_of(core), seed=seed), made, *loaded(core, made))
+    yield day
+    before = before_targets(made)
+    for k in range(1, HELD_DAYS[name]):
         here = on_day(scenario, excerpt.day + k)
+        date = here.document.start.toordinal() + int(excerpt.day) + k
         trace = emulate_file(here, bench_of(core), seed=seed)
-        if day is None or TARGETS[name]:
-            _, made = calibrated(here, seed, TARGETS[name])
+        if TARGETS[name]:
+            made = followed(here, made, known, before, date, TARGETS[name], seed)
             day = Day(trace, made, *loaded(core, made))
         else:
-            date = here.document.start.toordinal() + int(excerpt.day) + k
-            day = replace(day, trace=trace, made=for_day(day.made, date))
+            day = replace(day, trace=trace, made=for_day(made, date))
         yield day
+
+
+def before_targets(made: BayesianFit) -> Following:
+    """Return where the sensor's deviations stood on the last day of measurements, whose own curve is left out."""
+    last, days = made.model.course(made.posterior.scatters), made.model.rows.days
+    posterior = replace(
+        made.posterior, mean=last.mean[-1], factor=last.factor[-1], offset=None, slope=None, curve_factor=None
+    )
+    return Following(posterior, days[-1])
+
+
+def followed(
+    scenario: ScenarioFile,
+    made: BayesianFit,
+    known: Measurements,
+    before: Following,
+    date: int,
+    clearances: tuple[float, ...],
+    seed: int,
+) -> BayesianFit:
+    """Return the calibration for a later day with the targets of its morning, by those of the first day and before."""
+    (excerpt,) = scenario.document.excerpt
+    state = scenario.sensors.inductive.state(excerpt.day, streams(seed, "life of the sensor"))
+    empty = Measurements(*(np.zeros(0) for _ in range(3)), "targets", ())
+    morning = with_targets(empty, scenario, state, date, clearances, seed)
+    posterior = before.on(morning, np.ones(len(morning)), date).posterior
+    polynomial, plain = polynomial_of(posterior, known, made.region, DEFAULT_RANGES)
+    return replace(made, posterior=posterior, plain=plain, step=None, fit=replace(made.fit, polynomial=polynomial))
 
 
 def one_run(scenario: ScenarioFile, core: CoreDesign, seed: int) -> Iterator[dict[str, Any]]:

@@ -8,13 +8,13 @@ double precision and by the integers of the hardware with the curve of the day.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from benchmarks.day_bench import SET_ERROR, TYPE, with_targets
+from benchmarks.day_bench import SET_ERROR, TYPE, before_targets, with_targets
 from examples.wear_campaign.methods import measured
 from scipy.signal import sosfilt
 
@@ -24,7 +24,6 @@ from sosmith.gen.reload.reload import check_swap, other_set
 from sosmith.instrument.calibration.acceptance import DEFAULT_RANGES
 from sosmith.instrument.calibration.bayesian_fit import BayesianFit, bayesian_fit
 from sosmith.instrument.calibration.mixed_effects.day_polynomial import polynomial_of
-from sosmith.instrument.calibration.mixed_effects.following_day import Following
 from sosmith.instrument.calibration.mixed_effects.model import Posterior, mixture_half_width
 from sosmith.instrument.scenarios.file import ScenarioFile
 from sosmith.instrument.uncertainty.instrument_budget import slopes
@@ -97,11 +96,7 @@ def in_service(
     sensor = 2 * seed + wheel
     first = scenario.document.start.toordinal()
     known, made = _before(scenario, sensor)
-    last = made.model.course(made.posterior.scatters)
-    before = replace(
-        made.posterior, mean=last.mean[-1], factor=last.factor[-1], offset=None, slope=None, curve_factor=None
-    )
-    so_far = Following(before, max(known.days))
+    so_far = before_targets(made)
     chance = streams(sensor, "service of a wheel")
     double, uncertainty, shared, taken, sets = list[float](), list[float](), list[float](), [], list[Datapath]()
     polynomial: Polynomial | None = None
