@@ -19,6 +19,12 @@ NEIGHBOURS = 24
 OVER_LEAKAGE = 2.0
 """Multiple of the leakage of all stronger lines that a line has to exceed."""
 
+RESOLVED = 2.5
+"""Cycles in a segment from which on a line is told by frequency and amplitude, to 2 %.
+
+Below, its image at the negative frequency and the trend are too near.
+"""
+
 DYNAMIC_RANGE = 1e-9
 """Smallest line as a part of the largest: below it are the rounding errors of the transform."""
 
@@ -26,24 +32,41 @@ DYNAMIC_RANGE = 1e-9
 def peaks(found: Spectrum, count: int = PEAKS) -> list[tuple[float, float]]:
     """Frequency (Hz) and amplitude of the largest lines, the largest first, at most `count`.
 
-    Amplitudes are those of the sine waves, also between the frequencies of the spectrum. What has less than one cycle
-    in a segment is no line.
+    Amplitudes are those of the sine waves, also between the frequencies of the spectrum. What has less than `RESOLVED`
+    cycles in a segment is `unresolved`.
+    """
+    step = found.step / FINER
+    lines = [k for k in _lines(found, count) if k >= RESOLVED * FINER]
+    return [(k * step, float(found.fine_amplitude[k])) for k in lines[:count]]
+
+
+def unresolved(found: Spectrum) -> float:
+    """About the amplitude of a line with less than `RESOLVED` cycles in a segment; 0 if there is none."""
+    slow = [found.fine_amplitude[k] for k in _lines(found, PEAKS) if 0 < k < RESOLVED * FINER]
+    return float(max(slow, default=0.0))
+
+
+def _lines(found: Spectrum, count: int) -> list[int]:
+    """Numbers of the frequencies of the largest lines, the largest first, with those that are unresolved.
+
+    What is left at zero frequency leaks as well, and so counts as one of these.
     """
     height = found.fine_amplitude / _one_sided(found)
-    local = np.flatnonzero((height[1:] > height[:-1]) & (height[1:] >= np.append(height[2:], -np.inf))) + 1
+    before, behind = np.append(-np.inf, height[:-1]), np.append(height[1:], -np.inf)
+    local = np.flatnonzero((height > before) & (height >= behind))
     floor = _noise_amplitude(found)
     lines: list[int] = []
     last = len(height) - 1 if found.sides[-1] == 1 else len(height) + FINER  # a line this near is one at half the rate
-    for k in sorted(local[local >= FINER], key=lambda k: (-height[k], k)):
+    for k in sorted(local, key=lambda k: (-height[k], k)):
         amplitude = found.fine_amplitude[k]
         if lines and amplitude < DYNAMIC_RANGE * found.fine_amplitude[lines[0]]:
             break
-        if amplitude > max(floor[min(round(k / FINER), len(floor) - 1)], OVER_LEAKAGE * _leaked(found, lines, k)):
+        hidden = OVER_LEAKAGE * (_leaked(found, lines, k) + found.detrended[k] * (k >= RESOLVED * FINER))
+        if amplitude > max(floor[min(max(round(k / FINER), 1), len(floor) - 1)], hidden):
             lines.append(int(k) if k < last - FINER // 2 else last)
-            if len(lines) == count:
+            if sum(one >= RESOLVED * FINER for one in lines) == count:
                 break
-    step = found.step / FINER
-    return [(k * step, float(found.fine_amplitude[k])) for k in lines]
+    return lines
 
 
 def _one_sided(found: Spectrum) -> Array:

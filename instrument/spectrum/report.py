@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from sosmith.instrument.spectrum.peaks import peaks
+from sosmith.instrument.spectrum.peaks import peaks, unresolved
 from sosmith.instrument.spectrum.prediction import Prediction
 from sosmith.instrument.spectrum.proposal import Proposal
 from sosmith.instrument.spectrum.settings import SpectrumSettings, Wish
@@ -59,6 +59,7 @@ def spectrum_json(found: Spectrum) -> dict[str, Any]:
         "confidence_factors": [found.lower, found.upper],
         "rms": found.rms,
         "peaks": [{"frequency_hz": frequency, "amplitude": amplitude} for frequency, amplitude in peaks(found)],
+        "unresolved_amplitude": unresolved(found),
     }
 
 

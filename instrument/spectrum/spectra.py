@@ -47,6 +47,8 @@ class Spectrum:
         The same at the frequencies ``k step / FINER``.
     leakage : ndarray
         Amplitude that a sine wave of amplitude 1 shows, at most, ``k step / FINER`` or more away from its frequency.
+    detrended : ndarray
+        Amplitude, at most, at those frequencies of what detrending leaves of waves of about a cycle in a segment.
     averages : int
         Number of segments.
     degrees_of_freedom : float
@@ -61,6 +63,7 @@ class Spectrum:
     amplitude: Array
     fine_amplitude: Array
     leakage: Array
+    detrended: Array
     averages: int
     degrees_of_freedom: float
     lower: float
@@ -132,6 +135,7 @@ def spectrum(values: Array, sample_rate: float, settings: SpectrumSettings) -> S
         amplitude=np.sqrt(_sides(len(frequency), length) * fine[::FINER]),
         fine_amplitude=fine_amplitude,
         leakage=_leakage(window),
+        detrended=_detrended(values, window, length - overlap, detrend),
         averages=averages,
         degrees_of_freedom=freedom,
         lower=float(freedom / stats.chi2.ppf(1 - tail, freedom)),
@@ -149,6 +153,24 @@ def _leakage(window: Array) -> Array:
     """Magnitude of the window's transform relative to its peak, at most, from each frequency on."""
     transform = np.abs(np.fft.rfft(window, FINER * len(window))) / np.sum(window)
     return np.maximum.accumulate(transform[::-1])[::-1]
+
+
+def _detrended(values: Array, window: Array, step: int, degree: int | None) -> Array:
+    """Amplitude, at most, from each frequency on, of what lines leave that were taken off segments and are not alike.
+
+    A steady trend has one slope in all segments, and leaves nothing. Means and slopes that differ are those of waves of
+    about a cycle in a segment, and what was taken off in vain is in the spectrum.
+    """
+    count = len(window)
+    segments = np.lib.stride_tricks.sliding_window_view(values, count)[::step]
+    lines = trend(segments, degree)
+    slope, middle = (lines[:, -1] - lines[:, 0]) / (count - 1), (lines[:, -1] + lines[:, 0]) / 2
+    middle = signal.detrend(middle)  # a steady trend moves it steadily
+    time = np.arange(count) - (count - 1) / 2
+    left = np.zeros(FINER * count // 2 + 1)
+    for spread, shape in ((np.std(middle), np.ones(count)), (np.std(slope), time)):
+        left += 2 * spread * np.abs(np.fft.rfft(window * shape, FINER * count)) / np.sum(window)
+    return np.maximum.accumulate(left[::-1])[::-1]
 
 
 def trend(segments: Array, degree: int | None, *, power: int = 2) -> Array:

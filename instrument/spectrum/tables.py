@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from sosmith.gen.facts.table import Table
 from sosmith.gen.quantity import count
-from sosmith.instrument.spectrum.peaks import peaks
+from sosmith.instrument.spectrum.peaks import RESOLVED, peaks, unresolved
 from sosmith.instrument.spectrum.proposal import Proposal
 from sosmith.instrument.spectrum.report import ripple
 from sosmith.instrument.spectrum.spectra import Spectrum
@@ -26,6 +26,9 @@ def signals_table(names: Sequence[str], units: Sequence[str], spectra: Sequence[
     for name, unit, parts in zip(names, units, spectra, strict=True):
         for key, part in parts.items():
             shown = [f"{amplitude:.3g} {unit} at {f:.4g} Hz" for f, amplitude in peaks(part) if amplitude > _NOTHING]
+            slow = unresolved(part)
+            if slow > _NOTHING:
+                shown.append(f"about {slow:.2g} {unit} below {RESOLVED * part.step:.3g} Hz: --segment is too short")
             rms = f"{part.rms:.4g}" if part.rms > _NOTHING else "0"
             rows.append((name if key == "measured" else "", key, f"{rms} {unit}", ", ".join(shown)))
     return Table(
