@@ -12,7 +12,9 @@ room for its zero; a filter without one gets a section of its own.
 **Aliasing.** What lies within the cutoff F of a multiple k of the lower rate folds into the pass band. There the gain
 of the CIC filter is largest at ``k fs / R - F``: with ``d = F R / fs`` below 1/2, no numerator ``sin(pi t)`` for t in
 [-d, d] exceeds ``sin(pi d)``, and no denominator ``R sin(pi (k + t) / R)`` up to half the sample rate is smaller than
-that at ``t = -d``. What folds elsewhere, the filter is there to stop: see `sosmith.gen.filter.largest_gain`.
+that at ``t = -d``. Behind it comes the gain of the filter, with the correction, which is more than 1 towards F, and
+with the ripple of the pass band: `sosmith.gen.filter.largest_gain` bounds the product of both, in the pass band and
+elsewhere, where the filter is there to stop what folds.
 """
 
 from __future__ import annotations
@@ -28,7 +30,7 @@ from flint import arb, fmpq
 
 from sosmith.gen.filter.design import Array, Filter, design
 from sosmith.gen.filter.exact_form import Exact
-from sosmith.gen.filter.largest_gain import Peak, band_gains
+from sosmith.gen.filter.largest_gain import Peak, band_gains, passband_gains
 from sosmith.gen.filter.response import Complex, complex_response
 from sosmith.gen.filter.sections import Row
 from sosmith.gen.specification.choices import AUTO, MAX_DECIMATION, MAX_RATIO
@@ -37,8 +39,11 @@ from sosmith.model.arithmetic.correct_rounding import evaluate, nearest_double, 
 from sosmith.model.dataflow.decimator import MAX_WIDTH, impulse_response
 from sosmith.model.errors import ShortfallError
 
-MAX_STAGES = 8
+MAX_STAGES = 12
 """Most stages of a decimator."""
+
+_CHOSEN_STAGES = 8
+"""Most stages that `choose` takes where the factor is left to it."""
 
 MAX_DELAY = Fraction(11, 10)
 """Longest delay that `choose` accepts, as a multiple of that of the filter without a decimator."""
@@ -51,6 +56,9 @@ _CORRECTION_BITS = 10
 
 _ALIASING_BITS = 192
 """Fraction bits of the bounds on aliasing."""
+
+PLACES = 1 << 16
+"""Places of the lower rate, at one of which the pass band is taken to end where chains are bounded."""
 
 SAMPLED = 256
 """Frequencies in the pass band at which gains are compared."""
@@ -117,6 +125,16 @@ class Decimation:
         lower rate; what comes out there came from so much below the multiple.
         """
         return band_gains(filter_.exact, self.factor, self.stages)
+
+    def passing(self, filter_: Filter, bands: int | None = None) -> tuple[Peak, ...]:
+        """Largest gains to the output of a corrected filter of what folds into the pass band, one for each band.
+
+        They are those of `aliasing` times the filter's own gain, which the correction raises, where the product is the
+        largest; rounded up, the pass band ends at the next multiple of `PLACES` of the lower rate. The first band has
+        more than any other. With `bands`, of so many alone.
+        """
+        edge = Fraction(math.ceil(self.edge / self.rate * PLACES), PLACES)
+        return passband_gains(filter_.exact, self.factor, self.stages, edge, bands or self.factor // 2)
 
     def corrected(self, ideal: Filter) -> Filter:
         """Return a filter designed at the lower rate with the correction of the droop in it."""
@@ -202,8 +220,12 @@ def _centre(taps: Sequence[Fraction]) -> Fraction:
     return sum((k * tap for k, tap in enumerate(taps)), Fraction(0)) / sum(taps, Fraction(0))
 
 
-def stages_for(factor: int, spec: FilterSpec, sample_rate: Fraction, allowed: Fraction) -> Decimation | None:
+def stages_for(
+    factor: int, spec: FilterSpec, sample_rate: Fraction, allowed: Fraction, most: int = MAX_STAGES
+) -> Decimation | None:
     """Return a decimation by `factor` with the fewest stages whose aliasing is small enough; None if none is.
+
+    That of the decimator alone, and that of the whole with the filter behind it.
 
     Parameters
     ----------
@@ -215,11 +237,16 @@ def stages_for(factor: int, spec: FilterSpec, sample_rate: Fraction, allowed: Fr
         Of the input, in Hz.
     allowed : Fraction
         Largest gain of what folds into the pass band.
+    most : int
+        Most stages.
     """
     assert spec.cutoff is not None
-    for stages in range(1, MAX_STAGES + 1):
+    for stages in range(1, most + 1):
         decimation = Decimation(factor=factor, stages=stages, sample_rate=sample_rate, edge=spec.cutoff[0])
-        if decimation.worst_aliasing <= allowed:
+        if decimation.worst_aliasing > allowed:
+            continue
+        (worst,) = decimation.passing(decimated(spec, decimation), bands=1)
+        if worst.gain <= allowed:
             return decimation
     return None
 
@@ -273,7 +300,7 @@ def choose(spec: FilterSpec, sample_rate: Fraction, allowed: Fraction, bits: int
     longest = MAX_DELAY * group_delay(direct.exact) / sample_rate
     best, factor = None, 2
     while factor <= MAX_DECIMATION and factor * spec.cutoff[0] <= MAX_RATIO * sample_rate:
-        decimation = stages_for(factor, spec, sample_rate, allowed)
+        decimation = stages_for(factor, spec, sample_rate, allowed, _CHOSEN_STAGES)
         if decimation is not None and fits(decimation):
             filter_ = decimated(spec, decimation)
             if decimation.delay(filter_) <= longest and decimation.deviation(filter_, direct) <= MAX_DEVIATION:

@@ -89,11 +89,15 @@ class LargestGain:
 
         The multiple is at least 1, and at most half of R, where the band ends.
         """
-        return self._largest(Fraction(0), band)
+        return self._largest(Fraction(0), _HALF, band)
+
+    def into_passband(self, band: int, edge: Fraction) -> Peak:
+        """Bound the gain of what folds from there to frequencies up to `edge`, in units of the filter's rate."""
+        return self._largest(Fraction(0), edge, band)
 
     def from_frequency(self, low: Fraction) -> Peak:
         """Bound the gain of the filter alone from a frequency in units of its rate on."""
-        return self._largest(low, None)
+        return self._largest(low, _HALF, None)
 
     def on_interval(self, low: Fraction, high: Fraction, band: int | None) -> tuple[arb, arb]:
         """Enclose the gain in the middle of an interval of output frequencies, and bound it on all of it.
@@ -103,10 +107,10 @@ class LargestGain:
         factor = self._on(low, high, band)
         return factor.middle, _bound(factor, high - low)
 
-    def _largest(self, low: Fraction, band: int | None) -> Peak:
+    def _largest(self, low: Fraction, high: Fraction, band: int | None) -> Peak:
         with ctx.workprec(_PRECISION):
             at, best = low, arb(0)
-            open_: list[tuple[float, Fraction, Fraction, arb]] = [(-math.inf, low, _HALF, arb("inf"))]
+            open_: list[tuple[float, Fraction, Fraction, arb]] = [(-math.inf, low, high, arb("inf"))]
             while True:
                 _, start, end, most = heappop(open_)
                 if most <= best * ball(1 + TOLERANCE):
@@ -135,6 +139,15 @@ def band_gains(sections: tuple[Exact, ...], factor: int, stages: int) -> tuple[P
     """Return the largest gain from the band around each multiple of the lower rate, the lowest first."""
     gains = LargestGain(sections, factor, stages)
     return tuple(gains.of_band(band) for band in range(1, factor // 2 + 1))
+
+
+@lru_cache(maxsize=64)
+def passband_gains(
+    sections: tuple[Exact, ...], factor: int, stages: int, edge: Fraction, bands: int
+) -> tuple[Peak, ...]:
+    """Return the largest gain into frequencies up to `edge` from each of the first `bands` multiples."""
+    gains = LargestGain(sections, factor, stages)
+    return tuple(gains.into_passband(band, edge) for band in range(1, bands + 1))
 
 
 def _bound(factor: _Factor, length: Fraction) -> arb:

@@ -129,6 +129,7 @@ def _decimation(quantized: Quantized) -> DecimationEntry | None:
         correction=decimation.correction,
         edge=decimation.edge / decimation.sample_rate,
         aliasing=tuple(map(on_grid, decimation.aliasing)),
+        passing=tuple(BandEntry(gain=on_grid(peak.gain), at=peak.at) for peak in decimation.passing(filter_)),
         bands=tuple(BandEntry(gain=on_grid(peak.gain), at=peak.at) for peak in decimation.bands(filter_)),
         calibration=None if quantized.calibration is None else _calibration(quantized.calibration),
     )

@@ -27,6 +27,8 @@ class AliasingFacts:
         Ends of the band that folds into the pass band, in Hz.
     gain_db : float
         Bound on the gain of the decimator in it, proven.
+    passing_db : float
+        Bound on the gain of decimator and filter in it, proven.
     whole_low, whole_high : float
         Ends of the whole band, half the lower rate to both sides of the multiple, in Hz.
     largest_db : float
@@ -38,6 +40,7 @@ class AliasingFacts:
     low: float
     high: float
     gain_db: float
+    passing_db: float
     whole_low: float
     whole_high: float
     largest_db: float
@@ -201,6 +204,7 @@ def decimation_facts(core: CoreDesign) -> DecimationFacts | None:
         return None
     direct = design(core.spec.filter, core.spec.sample_rate)
     gains, peaks, rate = decimation.aliasing, decimation.bands(filter_), decimation.rate
+    passing = decimation.passing(filter_)
     largest = max(peak.gain for peak in peaks)
     low, high = core.datapath.decimated_range
     amplitude = decimator.input.lsb * (high - low) / 2
@@ -220,14 +224,15 @@ def decimation_facts(core: CoreDesign) -> DecimationFacts | None:
                 low=float(band * rate - decimation.edge),
                 high=float(min(band * rate + decimation.edge, decimation.sample_rate / 2)),
                 gain_db=nearest_db(gain),
+                passing_db=nearest_db(into.gain),
                 whole_low=float((band - _HALF) * rate),
                 whole_high=float(min((band + _HALF) * rate, decimation.sample_rate / 2)),
                 largest_db=nearest_db(peak.gain),
                 largest_at=float(peak.at * rate),
             )
-            for band, (gain, peak) in enumerate(zip(gains, peaks, strict=True), start=1)
+            for band, (gain, into, peak) in enumerate(zip(gains, passing, peaks, strict=True), start=1)
         ),
-        worst_aliasing=float(max(gains) * amplitude),
+        worst_aliasing=float(max(into.gain for into in passing) * amplitude),
         largest_db=nearest_db(largest),
         largest=float(largest * amplitude),
         direct_largest_db=nearest_db(LargestGain(direct.exact).from_frequency(_HALF / decimation.factor).gain),

@@ -287,15 +287,15 @@ def _decimation_table(decimation: DecimationFacts) -> Table:
             decibels(band.largest_db),
             _amount(band.largest_at, "Hz"),
             f"{_hertz((band.low,))} to {_hertz((band.high,))}",
-            decibels(band.gain_db),
+            decibels(band.passing_db),
         )
         for band in shown
     ]
     if others:
-        whole, part = (max(levels) for levels in zip(*((b.largest_db, b.gain_db) for b in others), strict=True))
+        whole, part = (max(levels) for levels in zip(*((b.largest_db, b.passing_db) for b in others), strict=True))
         end = _hertz((others[-1].high,))
         rows.append((f"{len(others)} more, up to {end}", decibels(whole), "", f"up to {end}", decibels(part)))
-    head = ("from", "gain at most", "comes out at", "into the pass band from", "gain of the decimator at most")
+    head = ("from", "gain at most", "comes out at", "into the pass band from", "gain into it at most")
     return Table("", rows, head, numbers=(1, 2, 4))
 
 
@@ -308,7 +308,7 @@ def _decimation_caption(decimation: DecimationFacts, unit: str) -> str:
     return (
         f"{calibrated}{decimation.factor} samples make one result{repeated}, by {count(decimation.stages, 'stage')} of "
         f"integrators and combs of {decimation.width} bits, and the filter works at {rate}. A sine over the whole "
-        f"range of {what} in one of the bands on the right leaves the decimator in the pass band with an amplitude of "
+        f"range of {what} in one of the bands on the right leaves the filter in the pass band with an amplitude of "
         f"at most {worst}; one at any frequency from half that rate on leaves the filter, wherever it folds, with at "
         f"most {_amount(decimation.largest, unit)} ({decibels(decimation.largest_db)}), where a filter without a "
         f"decimator has {decibels(decimation.direct_largest_db)}. At {SAMPLED} frequencies in the pass band the gain "

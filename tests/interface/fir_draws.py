@@ -29,7 +29,7 @@ def draw(seed: int) -> FirDraw:
     """Draw an FIR filter of 2 to 64 taps; every 3 seeds in a row have all architectures, every 5 all shapes."""
     rng = random.Random(f"fir {seed}")
     shape = SHAPES[seed % len(SHAPES)]
-    words = _taps(rng, shape, rng.randint(2, 64))
+    words = taps_of(rng, shape, rng.randint(2, 64))
     bits, output_bits = rng.randint(8, 24), rng.randint(8, 24)
     channels = rng.choice([1, 1, 1, 2, 5])
     architecture = ARCHITECTURES[seed % len(ARCHITECTURES)]
@@ -56,7 +56,8 @@ def draw(seed: int) -> FirDraw:
     return FirDraw(sosmith.Specification.load(tree), tuple(map(Fraction, words)), shape)
 
 
-def _taps(rng: random.Random, shape: str, length: int) -> list[Decimal]:
+def taps_of(rng: random.Random, shape: str, length: int) -> list[Decimal]:
+    """Draw taps of a shape, of which some may be 0."""
     half = [_tap(rng) for _ in range((length + 1) // 2)]
     mirrored = half[::-1][length % 2 :]
     if shape == "symmetric":

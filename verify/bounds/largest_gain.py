@@ -6,7 +6,7 @@ a quotient of polynomials in x, and ``sin(pi p)**2`` is ``(1 - x) / 2``. So the 
 
     ((1 - x) / 2)**N P(x) / Q(x)  <=  G**2 (R sin(pi (k - p) / R))**(2 N)
 
-and what comes from ``k + p`` is less. On an interval of x, the left side is at most the largest quotient of the two
+and what comes from ``k + p`` is less. Of what folds into the pass band, p goes up to its upper edge alone. On an interval of x, the left side is at most the largest quotient of the two
 polynomials' Bernstein coefficients, which are exact, if all of those of the denominator are positive. The right side
 falls with p, and is the smallest at the interval's lower end. Intervals are halved until this proves G. Another
 quotient, in the interval's middle, disproves it where it is too small.
@@ -14,6 +14,7 @@ quotient, in the interval's middle, disproves it where it is too small.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -24,7 +25,7 @@ from flint import arb, arb_poly, ctx, fmpq, fmpq_poly, fmpz_poly
 
 from sosmith.verify.bounds.grid import rounded_up
 from sosmith.verify.bounds.l1_response import UndecidedError, fraction
-from sosmith.verify.certificate_file import DecimationEntry, SectionEntry
+from sosmith.verify.certificate_file import BandEntry, DecimationEntry, SectionEntry
 from sosmith.verify.graph import require
 
 _PRECISION = 256
@@ -35,6 +36,9 @@ _SMALLEST = Fraction(1, 1 << 80)
 
 _PLACES = Fraction(1, 1 << 32)
 """Distance of the places where a gain may be said to be reached, in units of the lower rate."""
+
+_ENDS = 1 << 16
+"""Places of the lower rate, at the next one of which the pass band is taken to end."""
 
 _EXCESS = Fraction(1, 1 << 10)
 """Share by which a claimed gain exceeds the one that is reached, which is then rounded up to the grid."""
@@ -107,13 +111,23 @@ def check_bands(entry: DecimationEntry, sections: Sequence[SectionEntry]) -> Non
     UndecidedError
         If that cannot be decided.
     """
-    count = entry.factor // 2
-    require(len(entry.bands) == count, f"largest gains must be given of {count} bands, not {len(entry.bands)}")
     left = _LeftSide(sections, entry.stages)
-    for band, claim in enumerate(entry.bands, start=1):
+    ends = Fraction(math.ceil(entry.edge * entry.factor * _ENDS), _ENDS)
+    _check_claims(left, entry, entry.bands, "from band", Fraction(1, 2))
+    _check_claims(left, entry, entry.passing, "into the pass band from band", ends)
+
+
+def _check_claims(
+    left: _LeftSide, entry: DecimationEntry, claims: Sequence[BandEntry], what: str, end: Fraction
+) -> None:
+    """Check the gains that are claimed of what folds to frequencies up to `end`, in units of the lower rate."""
+    count = entry.factor // 2
+    where = what.removesuffix("from band")
+    require(len(claims) == count, f"largest gains {where}must be given of {count} bands, not {len(claims)}")
+    for band, claim in enumerate(claims, start=1):
         require(
-            0 <= claim.at <= Fraction(1, 2),
-            f"band {band} must have its largest gain at 0 to 1/2 of the lower rate, not at {claim.at}",
+            0 <= claim.at <= end,
+            f"band {band} must have its largest gain at 0 to {end} of the lower rate, not at {claim.at}",
         )
         require(
             claim.at % _PLACES == 0,
@@ -122,24 +136,24 @@ def check_bands(entry: DecimationEntry, sections: Sequence[SectionEntry]) -> Non
         with ctx.workprec(_PRECISION):
             right = _right_side(entry, band, arb(_fmpq(claim.at)))
             reached = (left.at(claim.at) / right).sqrt()
-            wanted = rounded_up(reached * arb(_fmpq(1 + _EXCESS)), f"the largest gain from band {band}")
+            wanted = rounded_up(reached * arb(_fmpq(1 + _EXCESS)), f"the largest gain {what} {band}")
             require(
                 claim.gain <= wanted,
-                f"the largest gain from band {band} must be that at {claim.at} of the lower rate, "
+                f"the largest gain {what} {band} must be that at {claim.at} of the lower rate, "
                 f"{float(reached):.6g}, or little more, not {float(claim.gain):.6g}",
             )
-            _check_bound(left, entry, band, claim.gain)
+            _check_bound(left, entry, band, claim.gain, f"the largest gain {what} {band}", end)
             require(
                 claim.gain == wanted,
-                f"the largest gain from band {band} must be {wanted}, which follows from that at {claim.at} of the "
+                f"the largest gain {what} {band} must be {wanted}, which follows from that at {claim.at} of the "
                 f"lower rate, not {claim.gain}",
             )
 
 
-def _check_bound(left: _LeftSide, entry: DecimationEntry, band: int, gain: Fraction) -> None:
+def _check_bound(left: _LeftSide, entry: DecimationEntry, band: int, gain: Fraction, what: str, end: Fraction) -> None:
     """Prove that no frequency has a larger gain."""
     square = arb(_fmpq(gain**2))
-    left_to_do = [(Fraction(-1), Fraction(1))]
+    left_to_do = [(_cosine_below(end), Fraction(1))]
     while left_to_do:
         low, high = left_to_do.pop()
         interval = left.on(low, high)
@@ -150,11 +164,11 @@ def _check_bound(left: _LeftSide, entry: DecimationEntry, band: int, gain: Fract
         reached = (arb(_fmpq(interval.middle)) / there).sqrt()
         require(
             not reached > arb(_fmpq(gain)),
-            f"the largest gain from band {band} must be at least {float(reached):.6g}, which "
+            f"{what} must be at least {float(reached):.6g}, which "
             f"is reached at {float(interval.central):.6g} of the lower rate, not {float(gain):.6g}",
         )
         if high - low <= _SMALLEST:
-            raise UndecidedError(f"the largest gain from band {band}")
+            raise UndecidedError(what)
         middle = (low + high) / 2
         left_to_do += [(low, middle), (middle, high)]
 
@@ -162,6 +176,14 @@ def _check_bound(left: _LeftSide, entry: DecimationEntry, band: int, gain: Fract
 def _right_side(entry: DecimationEntry, band: int, frequency: arb) -> arb:
     """Right side for the gain 1: the denominator of the CIC filter's squared gain."""
     return (entry.factor * ((band - frequency) / entry.factor).sin_pi()) ** (2 * entry.stages)
+
+
+def _cosine_below(frequency: Fraction) -> Fraction:
+    """Return a multiple of 2**-64 that is no greater than the cosine of a frequency of 0 to 1/2."""
+    if frequency == Fraction(1, 2):
+        return Fraction(-1)
+    scaled = arb.cos_pi_fmpq(_fmpq(2 * frequency)) * arb(2) ** 64
+    return Fraction(int(scaled.lower().floor().unique_fmpz()), 1 << 64)
 
 
 def _square(taps: Sequence[Fraction]) -> fmpq_poly:

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
+from fractions import Fraction
 
 from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.parallel.control import about
@@ -217,9 +218,13 @@ def _short(word: Form, width: int) -> Form:
     size = 1 << width
     if not word.keys() - {ONE}:
         return constant(int(word.get(ONE, 0)) % size)
-    half = size >> 1
-    return {
-        monomial: rest
-        for monomial, value in word.items()
-        if (rest := (value + half) % size - half if isinstance(value, int) else value)
-    }
+    reduced = {monomial: _nearest(value, size) for monomial, value in word.items()}
+    return {monomial: value for monomial, value in reduced.items() if value}
+
+
+def _nearest(value: int | Fraction, size: int) -> int | Fraction:
+    """Return what is nearest to 0 of a number and all that differ from it by multiples of `size`."""
+    if not isinstance(value, int):
+        return value
+    rest = value % size
+    return rest - size if rest > size >> 1 else rest

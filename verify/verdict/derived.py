@@ -185,14 +185,17 @@ def decimation_of(certificate: Certificate, item: ItemEntry, entry: DecimationEn
                     "low": Figure(k * lower - edge, above=_GRID, below=_GRID),
                     "high": Figure(min(k * lower + edge, rate / 2), above=_GRID, below=_GRID),
                     "gain_db": Decibels(gain),
+                    "passing_db": Decibels(into.gain),
                     "whole_low": Figure((k - _HALF) * lower),
                     "whole_high": Figure(min((k + _HALF) * lower, rate / 2)),
                     "largest_db": Decibels(band.gain),
                     "largest_at": Figure(band.at * lower),
                 }
-                for k, (gain, band) in enumerate(zip(entry.aliasing, entry.bands, strict=True), start=1)
+                for k, (gain, into, band) in enumerate(
+                    zip(entry.aliasing, entry.passing, entry.bands, strict=True), start=1
+                )
             ],
-            "worst_aliasing": Figure(max(entry.aliasing) * amplitude, _GRID * amplitude),
+            "worst_aliasing": Figure(max(band.gain for band in entry.passing) * amplitude, _GRID * amplitude),
             "largest_db": Decibels(largest),
             "largest": Figure(largest * amplitude, _GRID * amplitude),
         }

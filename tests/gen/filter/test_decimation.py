@@ -119,7 +119,7 @@ def test_a_factor_that_is_asked_for() -> None:
     assert reason.startswith("by 4: asked for in the specification; 3 stages keep")
     sentence = (
         "filter.decimate must be so small that a full-scale sine which folds into the pass band is at most "
-        "output.max_error with 8 stages of at most 63 bits, not 64"
+        "output.max_error with 12 stages of at most 63 bits, not 64"
     )
     with pytest.raises(ShortfallError, match=f"^{re.escape(sentence)}$"):
         choose(lowpass(decimate=64), RATE, Fraction(1, 10**9), 16)

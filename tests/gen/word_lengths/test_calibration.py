@@ -146,7 +146,7 @@ def test_what_folds_is_counted_over_the_calibrations_range() -> None:
     assert ahead is not None
     low, high = ahead.result_range
     span = float((high - low) * ahead.output.lsb)
-    worst = 10 ** (max(band["gain_db"] for band in found["aliasing"]) / 20) * span / 2
+    worst = 10 ** (max(band["passing_db"] for band in found["aliasing"]) / 20) * span / 2
     assert found["worst_aliasing"] == pytest.approx(worst, rel=1e-6)
     assert worst <= float(made.spec.max_error)
 

@@ -170,7 +170,7 @@ def test_a_factor_that_lets_too_much_fold_is_refused() -> None:
     text = text.replace("[output]\nbits = 16", "[output]\nbits = 30")
     sentence = (
         "filter.decimate must be so small that a full-scale sine which folds into the pass band is at "
-        "most output.max_error with 8 stages of at most 63 bits, not 64"
+        "most output.max_error with 12 stages of at most 63 bits, not 64"
     )
     with refused(sentence, ShortfallError):
         design_core(from_text(text, Path("locomotive.toml")), core="filter")

@@ -1,5 +1,6 @@
 """The verifier's own proof of the largest gain in each band: of the generator's claims, and against others."""
 
+import math
 import re
 from fractions import Fraction
 from types import ModuleType
@@ -9,6 +10,7 @@ from tests.formal.prover import broken
 from tests.gen.filter.gains import CASES, made
 
 from sosmith.gen.filter import largest_gain
+from sosmith.gen.filter.decimation import PLACES
 from sosmith.verify.bounds.largest_gain import check_bands
 from sosmith.verify.certificate_file import BandEntry, DecimationEntry, SectionEntry, on_grid
 from sosmith.verify.graph import RejectedError
@@ -20,6 +22,8 @@ def claimed(case: Case, module: ModuleType = largest_gain) -> tuple[DecimationEn
     """Return what a certificate says of a filter's bands."""
     found, filter_ = made(*case)
     peaks = module.band_gains(filter_.exact, found.factor, found.stages)
+    edge = Fraction(math.ceil(found.edge / found.rate * PLACES), PLACES)
+    into = module.passband_gains(filter_.exact, found.factor, found.stages, edge, found.factor // 2)
     entry = DecimationEntry(
         factor=found.factor,
         stages=found.stages,
@@ -28,6 +32,7 @@ def claimed(case: Case, module: ModuleType = largest_gain) -> tuple[DecimationEn
         correction=found.correction,
         edge=found.edge / found.sample_rate,
         aliasing=(),
+        passing=tuple(BandEntry(gain=on_grid(peak.gain), at=peak.at) for peak in into),
         bands=tuple(BandEntry(gain=on_grid(peak.gain), at=peak.at) for peak in peaks),
     )
     return entry, [SectionEntry(numerator=b, denominator=a) for b, a in filter_.exact]
@@ -52,6 +57,24 @@ def test_claims_are_proven_and_others_rejected(case: Case) -> None:
         more = with_band(entry, band, gain=gain * Fraction(1002, 1000) + Fraction(1, 2**62))
         with pytest.raises(RejectedError, match=rf"^the largest gain from band {band} must be that at \d"):
             check_bands(more, sections)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_claims_of_the_pass_band(case: Case) -> None:
+    """They are of decimator and filter together; two thousandths off are too much, both ways."""
+    entry, sections = claimed(case)
+    for band in {1, entry.factor // 2}:
+        for factor, sentence in ((998, r"must be at least \d"), (1002, r"must be that at \d")):
+            passing = list(entry.passing)
+            gain = passing[band - 1].gain * Fraction(factor, 1000) + Fraction(factor > 1000, 2**62)
+            passing[band - 1] = passing[band - 1].model_copy(update={"gain": gain})
+            wrong = entry.model_copy(update={"passing": tuple(passing)})
+            with pytest.raises(
+                RejectedError, match=rf"^the largest gain into the pass band from band {band} {sentence}"
+            ):
+                check_bands(wrong, sections)
+    with pytest.raises(RejectedError, match=r"^largest gains into the pass band must be given of \d+ bands, not 0$"):
+        check_bands(entry.model_copy(update={"passing": ()}), sections)
 
 
 def test_sentences() -> None:

@@ -110,11 +110,12 @@ def _decimation(decimation: DecimationFacts, unit: str) -> Iterator[tuple[str, s
     )
     if decimation.held:
         yield "results", f"each {decimation.factor} times, at the rate of the samples"
-    most = max(band.gain_db for band in decimation.aliasing)
+    alone = max(band.gain_db for band in decimation.aliasing)
+    most = max(band.passing_db for band in decimation.aliasing)
     yield (
         "aliasing into the pass band",
-        f"at most {most:.1f} dB behind the decimator, {quantity(decimation.worst_aliasing, unit)} of a sine over the "
-        f"whole range of {'the input' if before is None else 'that result'}",
+        f"at most {most:.1f} dB at the output, {quantity(decimation.worst_aliasing, unit)} of a sine over the "
+        f"whole range of {'the input' if before is None else 'that result'}; {alone:.1f} dB behind the decimator",
     )
     yield (
         f"anything from {decimation.sample_rate / 2:,.6g} Hz on",
