@@ -90,9 +90,18 @@ class StagePlan:
             return []
         if signal in self.sums.sums:
             return list(self.sums.sums[signal].terms)
-        if signal in self._of_kept:
+        return self._operands(signal)
+
+    def operation(self, signal: Signal) -> Node:
+        """Return the node that computes a signal of this stage which is no sum and no floor."""
+        assert isinstance(signal.root, tuple)
+        assert not isinstance(signal.root, Floor)
+        return self.graph.nodes[signal.root[1]]
+
+    def _operands(self, signal: Signal) -> list[Signal]:
+        if isinstance(signal.root, Floor):
             return [self.floored(signal)]
-        return [self.signals[i] for i in self.node(signal).operands]
+        return [self.signals[i] for i in self.operation(signal).operands]
 
     @staticmethod
     def floored(signal: Signal) -> Signal:
@@ -126,7 +135,7 @@ class StagePlan:
         if signal.delay:
             self.states.append(signal)
             return [self.stored(signal)]
-        return [self.signals[i] for i in self.node(signal).operands]
+        return self._operands(signal)
 
     def _open_floors(self) -> list[Signal]:
         """Return the floors of earlier sums of which it is not known where they come from, the inner ones first."""

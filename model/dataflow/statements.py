@@ -125,7 +125,7 @@ class _Writer:
         return f"const {kind} {plan.name(signal)} = {self._value(signal)};{comment}"
 
     def _value(self, signal: Signal) -> str:
-        plan, node = self._plan, self._plan.node(signal)
+        plan = self._plan
         if signal in plan.taken:
             assert plan.before is not None
             return f"w->{plan.before.name(signal)}"
@@ -133,11 +133,12 @@ class _Writer:
             return f"state->s{self._words[signal]}"
         if signal in plan.sums.sums:
             return self._sum(signal, plan.sums.sums[signal])
-        if node.op is Op.INPUT:
-            return f"w->{self._inputs[plan.graph.inputs.index(plan.sums.nodes[signal])]}"
         if isinstance(signal.root, Floor):
             of = plan.floored(signal)
             return self._floor(signal, of, signal.root.bits + plan.scale(of))
+        node = plan.operation(signal)
+        if node.op is Op.INPUT:
+            return f"w->{self._inputs[plan.graph.inputs.index(signal.root[1])]}"
         return self._operation(signal, node)
 
     def _floor(self, signal: Signal, of: Signal, places: int) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from sosmith.verify.c_model.forms import Form, Forms, number, scaled, total
 from sosmith.verify.certificate_file import Operation, PortEntry, StageEntry
@@ -11,6 +12,9 @@ from sosmith.verify.graph import inputs_of, label, require
 
 Place = tuple[int, int]
 """A node by its stage and its index; inputs have the stage -1."""
+
+_KEPT = {Operation.SHIFT, Operation.BOUND}
+"""Operations that keep the code."""
 
 _MOST_TERMS = 64
 """Terms of a form from which on its node is a variable, if a text declares it."""
@@ -49,11 +53,25 @@ class Worths:
 
     def worth(self, place: Place) -> Form:
         """Return the form of a node."""
+        place = self._base(place)
         stage, index = place
         if index in self._feedback(stage):
             return self._variable(place)
         form = self.computed(place)
-        return self._variable(place) if len(form) > _MOST_TERMS and place in self.declared else form
+        return self._variable(place) if len(form) > _MOST_TERMS and place in self._declared_bases else form
+
+    @cached_property
+    def _declared_bases(self) -> set[Place]:
+        known = [(s, i) for s, i in self.declared if s < len(self.stages) and i < len(self.stages[s].nodes)]
+        return {self._base(place) for place in known}
+
+    def _base(self, place: Place) -> Place:
+        """Return the node whose code a node keeps."""
+        stage, index = place
+        nodes = self.stages[stage].nodes
+        while nodes[index].op in _KEPT:
+            index = nodes[index].operands[0]
+        return stage, index
 
     def _variable(self, place: Place) -> Form:
         node = self.stages[place[0]].nodes[place[1]]
@@ -67,6 +85,7 @@ class Worths:
         RejectedError
             If nothing but delays feed each other.
         """
+        place = self._base(place)
         waiting = [place]
         while waiting:
             if waiting[-1] in self._computed:
@@ -90,24 +109,16 @@ class Worths:
         yield from self._expanded(stage, node.operands)
 
     def _expanded(self, stage: int, indices: Sequence[int]) -> Iterator[Place]:
-        yield from ((stage, index) for index in indices if index not in self._feedback(stage))
+        bases = (self._base((stage, index)) for index in indices)
+        yield from (place for place in bases if place[1] not in self._feedback(stage))
 
     def _feedback(self, stage: int) -> set[int]:
         """Return the nodes of a stage that delays take and that depend on their own past."""
         if stage not in self._fed_back:
             entry = self.stages[stage]
-            sources = {self._undelayed(entry, i) for i, node in enumerate(entry.nodes) if node.op is Operation.DELAY}
+            sources = {_undelayed(entry, i) for i, node in enumerate(entry.nodes) if node.op is Operation.DELAY}
             self._fed_back[stage] = {index for index in sources if _depends_on_itself(entry, index)}
         return self._fed_back[stage]
-
-    @staticmethod
-    def _undelayed(stage: StageEntry, index: int) -> int:
-        passed = set()
-        while stage.nodes[index].op is Operation.DELAY:
-            require(index not in passed, f"{label(stage, index)} must not be fed by delays alone")
-            passed.add(index)
-            index = stage.nodes[index].operands[0]
-        return index
 
     def _form(self, place: Place) -> Form:
         stage, index = place
@@ -137,7 +148,17 @@ class Worths:
         if node.op is Operation.CLAMP:
             low, high = number(node.low), number(node.high)
             return forms.choice("<", given[0], low, low, forms.choice(">", given[0], high, high, given[0]))
-        return forms.past(given[0]) if node.op is Operation.DELAY else given[0]  # SHIFT and BOUND keep the code
+        return forms.past(given[0])
+
+
+def _undelayed(stage: StageEntry, index: int) -> int:
+    """Return the node that a node is a delayed copy of."""
+    passed = set()
+    while stage.nodes[index].op in {Operation.DELAY, *_KEPT}:
+        require(index not in passed, f"{label(stage, index)} must not be fed by delays alone")
+        passed.add(index)
+        index = stage.nodes[index].operands[0]
+    return index
 
 
 def _depends_on_itself(stage: StageEntry, index: int) -> bool:

@@ -54,4 +54,41 @@ def test_a_block_of_one_input_may_be_filtered_in_place(with_status: bool, tmp_pa
 
 def test_the_page_shows_the_figures_recorded() -> None:
     assert PAGE.read_text(encoding="utf-8") == document(recorded())
-    assert {each.calls for each in recorded() if each.core == "Cortex-M4"} == {0}
+    assert {each.calls for each in recorded().models} == {0}
+    goal = next(each for each in recorded().models if (each.example, each.core) == ("audio_lowpass", "Cortex-M4"))
+    assert goal.instructions <= 70
+    ours, *others = recorded().peers
+    assert ours.error < 1
+    assert len(others) == 3
+
+
+CHECKED = ["-fsanitize=undefined", "-fno-sanitize-recover=all", "-Wno-unused-function"]
+
+
+@pytest.mark.parametrize("small", [False, True], ids=["", "16 bits by 16 bits"])
+@pytest.mark.parametrize("name", ["audio_lowpass", "flange_wear_bench", "flange_wear_locomotive"])
+def test_nothing_is_left_undefined_and_the_codes_are_those_of_the_graph(name: str, small: bool, tmp_path: Path) -> None:
+    """Random codes, the ends of the range, and steps between them; also with products as small cores compute them."""
+    datapath = example_design(f"{name}.toml").datapath.behind_decimator
+    written(datapath, tmp_path)
+    rng = np.random.default_rng(6)
+    ends = np.array([[port.lowest, port.highest] for port in datapath.inputs]).T
+    codes = rng.integers(ends[0], ends[1] + 1, (600, len(datapath.inputs)))
+    codes[200:400] = ends[rng.integers(0, 2, 200)]
+    codes[400:500], codes[500:] = ends[1], ends[0]
+    rows = ", ".join("{" + ", ".join(map(str, row)) + "}" for row in codes.tolist())
+    arguments = ", ".join(f"codes[n][{k}]" for k in range(len(datapath.inputs)))
+    (tmp_path / "main.c").write_text(
+        f'#include "{name}.c"\n#include <stdio.h>\n'
+        f"static const int64_t codes[600][{len(datapath.inputs)}] = {{{rows}}};\n"
+        f"int main(void)\n{{\n    {name}_state state;\n    {name}_reset(&state);\n"
+        f"    for (int n = 0; n < 600; n++) {{\n        uint8_t status;\n"
+        f'        printf("%lld\\n", (long long){name}_step(&state, {arguments}, &status));\n'
+        "    }\n    return 0;\n}\n",
+        encoding="utf-8",
+    )
+    options = ["-D__thumb__"] if small else []
+    subprocess.run(["cc", "-O1", *CHECKED, *options, "main.c", "-o", "main"], cwd=tmp_path, check=True)
+    found = subprocess.run(["./main"], cwd=tmp_path, check=True, capture_output=True, text=True)
+    assert found.stderr == ""
+    assert [int(line) for line in found.stdout.split()] == datapath.compute_exact(codes)
