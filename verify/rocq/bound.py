@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
@@ -168,16 +169,17 @@ Definition claimed : budget := Budget {parts}.
 Definition details : parts_ := {places} {"false" if start is None else "true"}
   {exact.parts}
   {entry.most} (2 ^ 64) {more} {error.numerator} {error.denominator} {settling}.
-Lemma parts_are_claimed : parts_hold (parts_of core sources forms {cascade.last} window details exact_sections {_limits(task)}) claimed
-  = true.
+Lemma parts_are_claimed :
+  parts_hold (parts_of core sources forms {cascade.last} window details exact_sections {_limits(task)}) claimed = true.
 Proof. vm_cast_no_check (eq_refl true). Qed.
 Theorem error_in_parts : {head} exists e, in_parts claimed e
     /\\ IZR (code core {entry.codes} {task.out} n)
       = limited (IZR {number(out.lowest)}) (IZR {number(out.highest)}) ({exactly} + e).
 Proof.
   intros x X y Y n.
-  destruct (error_parts core {entry.codes} sources forms {cascade.last} window details exact_sections {_limits(task)} claimed 0
-    {entry.exact} {_zero(task, entry.codes)} {value} core_is_ordered sections_are_closed forms_fit parts_are_claimed
+  destruct (error_parts core {entry.codes} sources forms {cascade.last} window details exact_sections
+    {_limits(task)} claimed 0 {entry.exact} {_zero(task, entry.codes)} {value}
+    core_is_ordered sections_are_closed forms_fit parts_are_claimed
     (every_code_in_range {entry.codes} {entry.within}) (window_is {entry.codes} {entry.within})
     ltac:({_first_input(task, entry.codes)}) (or_introl eq_refl) ltac:({_EASY}) ltac:({_EASY}) ltac:({first})
     (calibrated_input x X) y Y n I) as [e [t [P [_ [T E]]]]].
@@ -210,7 +212,8 @@ def _first_input(task: _Task, codes: str) -> str:
         return "intros j; rewrite Rminus_0_r; reflexivity"
     return (
         f"intros j; apply (start_entry core {codes} begin {task.wire} j core_is_ordered start_is); "
-        f"apply (wire_code core {codes} {task.wire} {task.start.change} j core_is_ordered); vm_cast_no_check (eq_refl true)"
+        f"apply (wire_code core {codes} {task.wire} {task.start.change} j core_is_ordered); "
+        f"vm_cast_no_check (eq_refl true)"
     )
 
 
@@ -238,9 +241,7 @@ Qed.
 def _settled(task: _Task, entry: Entry, counter: Counter) -> str:
     """Write the theorem on what is left of anything before: of m samples that the exact filter did not see."""
     bound, samples = task.certificate.claims.bound, counter.samples
-    codes, within = (
-        text.replace("x", "z", 1) if text == "x" else text.replace(" x", " z") for text in (entry.codes, entry.within)
-    )
+    codes, within = (re.sub(r"\bx\b", "z", text) for text in (entry.codes, entry.within))
     return f"""\
 Theorem settled : forall z, inputs_within {entry.ports} z ->
   forall m y, exact_filter exact_sections (from_zero {entry.late}) y -> forall n, {samples} <= Z.of_nat n ->
@@ -248,8 +249,9 @@ Theorem settled : forall z, inputs_within {entry.ports} z ->
     <= IZR {number(bound.numerator)} / IZR {bound.denominator} + 1 / 2)%R.
 Proof.
   intros z X m y Y n N.
-  destruct (error_parts core {codes} sources forms {task.cascade.last} window details exact_sections {_limits(task)} claimed m
-    {entry.late} {_zero(task, codes)} 0%R core_is_ordered sections_are_closed forms_fit parts_are_claimed
+  destruct (error_parts core {codes} sources forms {task.cascade.last} window details exact_sections
+    {_limits(task)} claimed m {entry.late} {_zero(task, codes)} 0%R
+    core_is_ordered sections_are_closed forms_fit parts_are_claimed
     (every_code_in_range {codes} {within}) (window_is {codes} {within})
     ltac:({_first_input(task, codes)}) (or_intror eq_refl) ltac:({_EASY}) ltac:({_EASY}) I
     (fun j => calibrated_input z X (m + j)%nat) y Y n

@@ -1,4 +1,4 @@
-"""Theorems on what enters a filter: how near the codes are to the exact input, with a decimator before it or without."""
+"""Theorems on what enters a filter: how near its codes are to the exact input, with and without a decimator."""
 
 from __future__ import annotations
 
@@ -248,7 +248,10 @@ def _averaged(certificate: Certificate, bounds: _Bounds, alone: Certificate | No
         place = graph.offsets[-2] + alone.stages[-1].outputs[0]
         unit = f"""\
 Lemma ahead_unit : forall c, (c * {_units("ahead", place)} = c)%R.
-Proof. intros c. change (frac_of ahead {place}) with {number(graph.node(place).frac)}. unfold units_of, steps_of. simpl. field. Qed.
+Proof.
+  intros c. change (frac_of ahead {place}) with {number(graph.node(place).frac)}.
+  unfold units_of, steps_of. simpl. field.
+Qed.
 """
     return f"""\
 {_calibrated("calibrated", formula(certificate))}\
@@ -285,16 +288,25 @@ Lemma decimator_step : ({real(step)} * IZR (2 ^ dropped decimator_) / IZR (gain_
 Proof. vm_compute (2 ^ dropped decimator_). vm_compute (gain_of decimator_). field. Qed.
 Lemma decimator_half : ({real(step)} * IZR (2 ^ dropped decimator_ / 2) / IZR (gain_of decimator_) = {real(half)})%R.
 Proof. vm_compute (2 ^ dropped decimator_ / 2). vm_compute (gain_of decimator_). field. Qed.
+Lemma averaged_is : forall x m, averaged_input x m = averaged decimator_ (fun i => calibrated (x i)) m.
+Proof. reflexivity. Qed.
+Lemma decimated_is : forall x m, decimated x m 0%nat = decimate decimator_ (taken_codes x) m.
+Proof. reflexivity. Qed.
+Lemma scaled_from : forall c, scaled_behind c = ({real(lsb)} * IZR (c 0%nat) + {real(zero)})%R.
+Proof. intros c. unfold scaled_behind. cbv zeta. generalize (IZR (c 0%nat)). intros z. field. Qed.
+Lemma scaled_is : forall x m,
+  scaled_behind (decimated x m) = ({real(lsb)} * IZR (decimate decimator_ (taken_codes x) m) + {real(zero)})%R.
+Proof. intros x m. rewrite scaled_from, decimated_is. reflexivity. Qed.
 Theorem calibrated_input : forall x, inputs_within given x -> forall m,
   (Rabs (averaged_input x m - IZR (code core (decimated x) {taken} m) * {_units("core", taken)})
     <= IZR {total.numerator} / IZR {total.denominator})%R /\\ (Rabs (averaged_input x m) <= IZR {most})%R.
 Proof.
-  intros x X m. destruct (behind_is_scaled (decimated x) (decimated_within x X) m) as [A _].
+  intros x X m. rewrite averaged_is.
+  destruct (behind_is_scaled (decimated x) (decimated_within x X) m) as [A _]. rewrite scaled_is in A.
   destruct (decimate_near decimator_ _ _ {ends} (taken_codes x) decimator_is_fit (taken_within x X)
-    (fun i => calibrated (x i)) {real(step)} {real(zero)} {real(error)} (IZR {most}) ltac:(lra) (calibrated_near x X) m) as [B C].
-  rewrite decimator_step, decimator_half in B. fold (averaged_input x m) in B, C. split; [|exact C].
-  set (at_core := (IZR (code core (decimated x) {taken} m) * {_units("core", taken)})%R) in *.
-  unfold scaled_behind, decimated in A. cbv zeta in A. set (z := IZR (decimate decimator_ (taken_codes x) m)) in *.
-  apply abs_between in A. apply abs_between in B. apply Rabs_le. split; lra.
+    (fun i => calibrated (x i)) {real(step)} {real(zero)} {real(error)} (IZR {most})
+    ltac:(lra) (calibrated_near x X) m) as [B C].
+  rewrite decimator_step, decimator_half in B. split; [|exact C].
+  apply (near_near _ _ _ _ _ _ B A). lra.
 Qed.
 """

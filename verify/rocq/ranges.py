@@ -218,8 +218,8 @@ def _section(name: str, before: str, windows: Windows, index: int, through: int,
     given, counts = f"map fst plans_{index}", ""
     if counter is not None:
         given = f"{counter.next}%nat :: {given}"
-        counts = f"""intros t n [<-|T]; [exact (proj2 (flagged_from core x flags {counter.samples} core_is_ordered flags_count n))|].
-    revert t n T. """
+        held = f"flagged_from core x flags {counter.samples} core_is_ordered flags_count n"
+        counts = f"intros t n [<-|T]; [exact (proj2 ({held}))|]. revert t n T.\n    "
     return f"""\
 Definition plans_{index} : list (nat * plan) := [{plans}].
 Theorem {name} : forall x, inputs_within ports x -> forall n i, (i < {through})%nat -> in_range core x i n.
@@ -229,8 +229,8 @@ Proof.
   - vm_cast_no_check (eq_refl true).
   - exact X.
   - exact ({before} x X).
-  - {counts}apply (targets_in_range core x sources forms {cascade.last} {section.known} window plans_{index} core_is_ordered
-      sections_are_closed forms_fit); [|exact (window_is x X)|exact ({before} x X)].
+  - {counts}apply (targets_in_range core x sources forms {cascade.last} {section.known} window plans_{index}
+      core_is_ordered sections_are_closed forms_fit); [|exact (window_is x X)|exact ({before} x X)].
     vm_cast_no_check (eq_refl true).
 Qed.
 """

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from sosmith.verify.graph import RejectedError
 
-_SAMPLES = 1 << 18
+_SAMPLES = 1 << 20
 """Most samples of a response."""
 
 _GROWTH = 256

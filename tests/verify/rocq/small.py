@@ -9,8 +9,10 @@ from pathlib import Path
 import pytest
 from tests.gen.word_lengths.filters import butterworth, fir_spec, plain
 
+from sosmith.gen.core import design_core
 from sosmith.gen.filter.design import design
 from sosmith.gen.output.certificate import certificate
+from sosmith.gen.specification.specification import from_text
 from sosmith.gen.word_lengths.quantize import quantize
 from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
@@ -26,6 +28,44 @@ GRID = Fraction(1, 1 << 64)
 
 TAPS = ("0.05", "0.2", "0.37", "0.2", "0.05")
 """Of a low-pass filter."""
+
+
+SETTLING = """
+name = "from_zero"
+sample_rate = 1.0
+input.x = { bits = 8, signed = true, range = [-1.0, 1.0] }
+filter = { family = "butterworth", kind = "lowpass", order = 2, cutoff = 0.2 }
+output = { bits = 8, signed = true, range = [-1.0, 1.0], unit = "", max_error = "faithful" }
+hardware = { start = "zero", realization = "df1" }
+"""
+"""A filter that flags its first samples."""
+
+DECIMATED = """
+name = "decimated"
+sample_rate = 1.0
+input.x = { bits = 8, signed = true, range = [-1.0, 1.0] }
+filter = { family = "butterworth", kind = "lowpass", order = 2, cutoff = 0.04, decimate = 4 }
+output = { bits = 8, signed = true, range = [-1.0, 1.0], unit = "", max_error = "faithful" }
+hardware = { realization = "df1" }
+"""
+"""A filter behind a decimator."""
+
+BOTH = """
+name = "calibrated"
+sample_rate = 100.0
+input.voltage = { bits = 8, range = [0.0, 10.0] }
+input.temperature = { bits = 8, range = [0.0, 128.0] }
+calibration.coefficients = [[1.16, -0.0036], [0.3672, 0.0006618], [0.05812]]
+filter = { family = "butterworth", kind = "lowpass", order = 1, cutoff = 4.0, decimate = 4 }
+output = { bits = 8, range = [0.0, 16.0], unit = "mm", max_error = "faithful" }
+"""
+"""A calibration before a decimator before a filter."""
+
+
+def designed(text: str) -> Certificate:
+    """Return the certificate of a specification."""
+    made = design_core(from_text(text, Path("small.toml")))
+    return certificate(made.quantized, made.spec.max_error)
 
 
 def _compile(folder: Path) -> None:

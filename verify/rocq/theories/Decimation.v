@@ -243,3 +243,5 @@ Proof.
   - apply Rabs_le. apply (means_between _ F). intros k. unfold from_first, after. destruct (k <? 0); apply abs_between, H.
 Qed.
 End Decimated.
+Lemma near_near a b c d e f : (Rabs (a - b) <= d -> Rabs (b - c) <= e -> d + e <= f -> Rabs (a - c) <= f)%R.
+Proof. intros A B F. replace (a - c)%R with ((a - b) + (b - c))%R by ring. eapply Rle_trans; [apply Rabs_triang|]. lra. Qed.
