@@ -189,6 +189,7 @@ def _budget(spec: Specification, pre_stage: PreStage | None, board: Board | None
         decimate=1 if pre_stage is None else pre_stage.decimator.factor,
         samples_per_clock=hardware.samples_per_clock,
         hold=pre_stage is not None and spec.filter.hold,
+        reload_lock=hardware.reload_lock,
     )
 
 
