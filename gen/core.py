@@ -193,6 +193,7 @@ def _budget(spec: Specification, response: Response, board: Board | None) -> Bud
         decimate=response.factor if pre_stage is None else pre_stage.decimator.factor,
         samples_per_clock=hardware.samples_per_clock,
         hold=spec.filter.hold and (pre_stage is not None or response.factor > 1),
+        reload_lock=hardware.reload_lock,
     )
 
 

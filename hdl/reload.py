@@ -52,8 +52,11 @@ class ReloadPort(wiring.Component):
     each word of the bank, and one of ``CRC``. A refused write ends it. Only a load with all its words and the right CRC
     asks for a swap: `pending` is then high until a clock in which `may_swap` is high.
 
-    A reset ends a load and drops a pending swap. It changes neither the active bank nor its version, because it could
-    not restore the memories: the core goes on with the set that it has.
+    With a lock, once ``STATUS`` is written, each write of ``VERSION``, ``DATA`` and ``CRC`` is refused until a reset.
+    That write is refused itself during a load and while a swap is pending: neither bank nor version changes afterwards.
+
+    A reset ends a load, drops a pending swap, and opens the lock. It changes neither the active bank nor its version,
+    because it could not restore the memories: the core goes on with the set that it has.
 
     Latency and throughput: those of `sosmith.hdl.bus.axi_lite.SerialSlave`.
 
@@ -67,6 +70,8 @@ class ReloadPort(wiring.Component):
         Fingerprint of the core, which ``DESIGN`` reads.
     protected : bool
         Whether there is a register ``FAULTS``, and the memory of the words that are read has each bit three times.
+    lock : bool
+        Whether it can be locked.
 
     Members
     -------
@@ -90,9 +95,13 @@ class ReloadPort(wiring.Component):
         Whether a wrong bit was found at this clock that was corrected, and one that could not be; only if protected.
     acknowledge : Out(1)
         High for one clock when ``FAULTS`` is written; only if protected.
+    locked : Out(1)
+        Whether nothing can be loaded until a reset; only with a lock.
     """
 
-    def __init__(self, depth: int, *, bits: int = BITS, design: int = 0, protected: bool = False) -> None:
+    def __init__(
+        self, depth: int, *, bits: int = BITS, design: int = 0, protected: bool = False, lock: bool = False
+    ) -> None:
         if not 1 <= depth <= MAX_WORDS:
             raise ValueError(f"depth must be 1 to {MAX_WORDS}, not {depth!r}")
         if not 1 <= bits <= BITS:
@@ -101,6 +110,7 @@ class ReloadPort(wiring.Component):
         self.bits = bits
         self.design = design
         self.protected = protected
+        self.lock = lock
         members = {
             **slave_members(ADDRESS_BITS),
             "write_enable": Out(1),
@@ -113,6 +123,8 @@ class ReloadPort(wiring.Component):
         }
         if protected:
             members |= {"corrected": In(1), "failed": In(1), "acknowledge": Out(1)}
+        if lock:
+            members |= {"locked": Out(1)}
         super().__init__(members)
 
     def elaborate(self, platform: object) -> Module:
@@ -149,6 +161,8 @@ class ReloadPort(wiring.Component):
             | (_is_at(slave, CRC) & loading & complete)
         )
         readable = (slave.o_index < len(PROTECTED_REGISTERS if self.protected else REGISTERS)) & ~_is_at(slave, DATA)
+        if self.lock:
+            writable = self._lockable(m, slave, writable, loading)
         if self.protected:
             writable = writable | _is_at(slave, FAULTS)
         m.d.comb += slave.i_refuse.eq(~Mux(slave.o_writes, writable, readable))
@@ -174,6 +188,13 @@ class ReloadPort(wiring.Component):
             m.d.sync += outcome.eq(Mux(right, Outcome.ACCEPTED, Outcome.WRONG_CRC))
         return loading, outcome
 
+    def _lockable(self, m: Module, slave: SerialSlave, writable: Value, loading: Signal) -> Value:
+        """Add the lock; return which writes are taken besides those that count nothing."""
+        with m.If(slave.o_start & _writes(slave, STATUS)):
+            m.d.sync += self.locked.eq(1)
+        locks = _is_at(slave, STATUS) & ~loading & ~self.pending
+        return (writable & ~self.locked) | locks
+
     def _read(self, m: Module, slave: SerialSlave, crc: SerialCrc, bank: Signal, load: Value) -> None:
         """Answer reads bit by bit: constants and versions from a memory, the rest a clock late as these are."""
         seen_bank = Signal()
@@ -191,7 +212,8 @@ class ReloadPort(wiring.Component):
             store.en.eq(slave.o_shift & _writes(slave, VERSION)),
             fetch.addr.eq(Cat(slave.o_count, slave.o_index ^ (_is_at(slave, VERSION) & seen_bank))),
         ]
-        status = Cat(load[0], seen_pending, seen_bank, Const(0, 1), load[1:], Const(0, 2))
+        locked: Value = self.locked if self.lock else Const(0, 1)
+        status = Cat(load[0], seen_pending, seen_bank, locked, load[1:], Const(0, 2))
         other = Signal()
         m.d.sync += other.eq(_bit_of(status, slave.o_count[:3]) & ~slave.o_count[3:].any())
         with m.If(_is_at(slave, CRC)):

@@ -11,8 +11,9 @@ import sys
 from pathlib import Path
 
 import benchmarks.qualification
-from benchmarks.qualification import independence
+from benchmarks.qualification import answers, independence
 from benchmarks.qualification.dossier import page
+from benchmarks.qualification.made_here import bill, example
 from benchmarks.qualification.outcomes import FILE
 from benchmarks.qualification.requirements import ROOT, requirements, tables
 from benchmarks.qualification.surroundings import digests, surroundings
@@ -47,8 +48,8 @@ def main() -> None:
         DOCUMENT.write_text(documented(DOCUMENT.read_text(encoding="utf-8")), encoding="utf-8")
         return
     chosen = [one for one in requirements() if not asked.only or one.id in asked.only]
-    if missing := {*asked.only} - {one.id for one in chosen}:
-        parser.error(f"requirements must be among {', '.join(one.id for one in requirements())}, not {missing.pop()}")
+    if unknown := {*asked.only} - {one.id for one in chosen}:
+        parser.error(f"requirements must be among {', '.join(one.id for one in requirements())}, not {unknown.pop()}")
     asked.output.mkdir(parents=True, exist_ok=True)
     outcomes = asked.output.absolute() / "outcomes.jsonl"
     outcomes.write_bytes(b"")
@@ -62,8 +63,12 @@ def main() -> None:
         slow=asked.slow,
     )
     (asked.output / "qualification.html").write_text(text, encoding="utf-8")
+    missing = answers.write(asked.output, outcomes.read_bytes(), about=surroundings(), example=example, bill=bill)
     print(asked.output / "qualification.html")
-    sys.exit(130 if status == _INTERRUPTED else 0 if shown and not status else 1)
+    print(asked.output / "answers.csv")
+    for line in missing:
+        print(f"not answered: section {line.section}, {line.text}")
+    sys.exit(130 if status == _INTERRUPTED else 0 if shown and not status and not missing else 1)
 
 
 _INTERRUPTED = 2

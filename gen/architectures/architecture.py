@@ -60,6 +60,8 @@ class Architecture(ABC):
         Whether each result behind a decimator is handed out once for each of its samples.
     calibration : Architecture or None
         Hardware of the calibration before a decimator; None without one.
+    reload_lock : bool
+        Whether loading can be locked until a reset.
     """
 
     terms: ClassVar[Terms]
@@ -75,6 +77,7 @@ class Architecture(ABC):
     look_ahead: bool = False
     hold: bool = False
     calibration: Architecture | None = None
+    reload_lock: bool = False
 
     @classmethod
     @abstractmethod

@@ -33,6 +33,8 @@ class Budget:
         Samples in a beat of the streams.
     hold : bool
         Whether each result behind a decimator is handed out once for each of its samples.
+    reload_lock : bool
+        Whether loading can be locked until a reset.
     """
 
     clock: Fraction
@@ -44,6 +46,7 @@ class Budget:
     decimate: int = 1
     samples_per_clock: int = 1
     hold: bool = False
+    reload_lock: bool = False
 
     @property
     def adders(self) -> bool:

@@ -89,6 +89,7 @@ class Parallel(Architecture):
             self.channels,
             fingerprint=self.fingerprint,
             protect=self.protect,
+            lock=self.reload_lock,
             adders=self.adders,
             flags_given=self._flags_given,
             before_decimator=before,

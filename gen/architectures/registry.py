@@ -64,6 +64,7 @@ def fitting(
         look_ahead,
         budget.hold,
         calibration,
+        budget.reload_lock,
     )
     budget.check(architecture)
     return architecture

@@ -111,6 +111,7 @@ class SharedUnit(Architecture):
             channels=self.channels,
             fingerprint=self.fingerprint,
             protect=self.protect,
+            lock=self.reload_lock,
             flags_given=self._flags_given,
             before_decimator=before,
         )

@@ -186,6 +186,7 @@ def _item(design: CoreDesign) -> ItemEntry:
         protect=architecture.protect,
         reload=architecture.reload,
         keep=design.spec.hardware.keep,
+        reload_lock=architecture.reload_lock,
         flags=dict(interface.outputs.flags),
         calibrated=() if datapath.calibrated == everything else datapath.calibrated,
         wear=datapath.wear,

@@ -84,8 +84,8 @@ def _register_files(design: CoreDesign) -> dict[str, str]:
     if fingerprint is None:
         return {}
     name, (words, _) = design.spec.name, bank_size(design.architecture)
-    protected = design.architecture.protect != "none"
+    protected, lock = design.architecture.protect != "none", design.architecture.reload_lock
     return {
-        f"{name}_registers.h": c_registers(name, words=words, design=fingerprint, protected=protected),
-        f"{name}.rdl": systemrdl(name, words=words, design=fingerprint, protected=protected),
+        f"{name}_registers.h": c_registers(name, words=words, design=fingerprint, protected=protected, lock=lock),
+        f"{name}.rdl": systemrdl(name, words=words, design=fingerprint, protected=protected, lock=lock),
     }

@@ -76,6 +76,14 @@ def _check_clock(document: Document) -> None:
         )
 
 
+def _check_lock(document: Document) -> None:
+    """Check that what is locked can be loaded."""
+    if document.hardware.reload_lock and not document.hardware.reload:
+        raise UnfitError(
+            "false where nothing is loaded (hardware.reload = false)", "true", where="hardware.reload_lock"
+        )
+
+
 def _check_pipeline(document: Document) -> None:
     """Check what look-ahead and several samples a clock exclude beside other options of the hardware."""
     hardware, most = document.hardware, max(LOOK_AHEAD) // 2
@@ -494,6 +502,6 @@ _SUBJECTS: tuple[tuple[Callable[[Document], None], ...], ...] = (
     (_check_filter, _check_decimation),
     (_check_output, _check_wear),
     (_check_clock,),
-    (check_combinations, _check_pipeline),
+    (check_combinations, _check_pipeline, _check_lock),
 )
 """The rules by subject; those after the first one take it to be kept."""

@@ -239,6 +239,7 @@ class HardwareTable(Table):
     architecture: Annotated[str, PlainValidator(choice(ARCHITECTURES))] = "auto"
     clock: Annotated[Fraction, PlainValidator(positive("Hz"))] = Fraction(12_000_000)
     reload: Annotated[bool, PlainValidator(flag)] = False
+    reload_lock: Annotated[bool, PlainValidator(flag)] = False
     protect: Annotated[str, PlainValidator(choice(PROTECTIONS))] = "none"
     start: Annotated[str, PlainValidator(choice(STARTS))] = "steady"
     multipliers: Annotated[int | None, PlainValidator(read_multipliers)] = None

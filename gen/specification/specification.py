@@ -134,6 +134,8 @@ class HardwareSpec:
         Samples in a beat of the streams, one of `sosmith.gen.specification.choices.SAMPLES_PER_CLOCK`.
     keep : bool
         Whether nets with names stay through synthesis, for a logic analyser.
+    reload_lock : bool
+        Whether loading can be locked until a reset.
     """
 
     realization: str
@@ -146,6 +148,7 @@ class HardwareSpec:
     pipeline: str = "auto"
     samples_per_clock: int = 1
     keep: bool = False
+    reload_lock: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -295,6 +298,7 @@ def _specification(path: Path, tree: dict[str, Any], document: Document) -> Spec
             pipeline=hardware.pipeline,
             samples_per_clock=hardware.samples_per_clock,
             keep=hardware.keep,
+            reload_lock=hardware.reload_lock,
         ),
         converters=converters(inputs, document.converter),
         dac=dac(inputs, output_port, document.converter),

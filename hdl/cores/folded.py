@@ -189,6 +189,8 @@ class FoldedCore(Shell):
         Fingerprint of the structure, 32 bits; None for a core whose program cannot be loaded.
     protect : str
         One of `sosmith.model.dataflow.protection.PROTECTIONS`, for all memories.
+    lock : bool
+        Whether loading can be locked until a reset.
     flags_given : int
         How many flags of the inputs come with a sample, from a decimator, and are not read off its codes.
     before_decimator : bool
@@ -209,6 +211,7 @@ class FoldedCore(Shell):
         channels: int = 1,
         fingerprint: int | None = None,
         protect: str = "none",
+        lock: bool = False,
         flags_given: int = 0,
         before_decimator: bool = False,
     ) -> None:
@@ -219,6 +222,7 @@ class FoldedCore(Shell):
             channels,
             fingerprint,
             protect=protect,
+            lock=lock,
             flags_given=flags_given,
             before_decimator=before_decimator,
         )
@@ -367,7 +371,7 @@ class FoldedCore(Shell):
         if self.fingerprint is None:
             return None
         depth, bits = len(self.program.instructions), instruction_bits(self.program)
-        port = ReloadPort(depth, bits=bits, design=self.fingerprint, protected=self.is_guarded)
+        port = ReloadPort(depth, bits=bits, design=self.fingerprint, protected=self.is_guarded, lock=self.lock)
         self.join_port(m, port)
         kept = Signal(reset_less=True)
         bank = Signal()

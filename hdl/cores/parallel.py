@@ -179,6 +179,8 @@ class Core(Shell):
         does; meanwhile no sample is accepted.
     protect : str
         One of `sosmith.model.dataflow.protection.PROTECTIONS`.
+    lock : bool
+        Whether loading can be locked until a reset.
     adders : sequence of collection of int
         Products by constants that are made of adders, by stage and node; only without a fingerprint.
     flags_given : int
@@ -200,6 +202,7 @@ class Core(Shell):
         fingerprint: int | None = None,
         *,
         protect: str = "none",
+        lock: bool = False,
         adders: Sequence[Collection[int]] = (),
         flags_given: int = 0,
         before_decimator: bool = False,
@@ -210,6 +213,7 @@ class Core(Shell):
             channels,
             fingerprint,
             protect=protect,
+            lock=lock,
             flags_given=flags_given,
             before_decimator=before_decimator,
         )
@@ -338,7 +342,7 @@ class Core(Shell):
             return None
         uses = Cat(parts.waiting, *(stage.uses for stage in parts.stages))  # pairs: of bank 0, of bank 1
         m.submodules.constant_banks = banks
-        port = ReloadPort(banks.words, design=self.fingerprint, protected=self.is_guarded)
+        port = ReloadPort(banks.words, design=self.fingerprint, protected=self.is_guarded, lock=self.lock)
         self.join_port(m, port)
         m.d.comb += [
             parts.bank.eq(port.bank),

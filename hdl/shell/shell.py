@@ -53,6 +53,8 @@ class Shell(wiring.Component):
         Samples of a beat of the streams.
     protect : str
         One of `sosmith.model.dataflow.protection.PROTECTIONS`.
+    lock : bool
+        Whether loading can be locked until a reset; only with a fingerprint.
     flags_given : int
         How many flags of the inputs come with a sample, from a decimator, and are not read off its codes: the first of
         `sosmith.model.dataflow.status.Flag`.
@@ -87,6 +89,7 @@ class Shell(wiring.Component):
         *,
         lanes: int = 1,
         protect: str = "none",
+        lock: bool = False,
         flags_given: int = 0,
         before_decimator: bool = False,
     ) -> None:
@@ -95,6 +98,7 @@ class Shell(wiring.Component):
         self.fingerprint = fingerprint
         self.lanes = lanes
         self.protect = protect
+        self.lock = lock
         self.flags_given = flags_given
         members = core_members(datapath.inputs, datapath.output, channels, lanes=lanes)
         members |= members_beside_decimator(datapath, flags_given, before=before_decimator)

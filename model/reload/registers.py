@@ -5,7 +5,7 @@ The address of a register is four times its index in `REGISTERS`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 
 MAGIC = int.from_bytes(b"SOSM", "little")
@@ -74,7 +74,7 @@ class Register:
     @property
     def index(self) -> int:
         """Index in `PROTECTED_REGISTERS`."""
-        return PROTECTED_REGISTERS.index(self)
+        return [register.name for register in PROTECTED_REGISTERS].index(self.name)
 
     @property
     def address(self) -> int:
@@ -149,6 +149,34 @@ REGISTERS = (ID, LAYOUT, DESIGN, STATUS, VERSION, DATA, CRC)
 
 PROTECTED_REGISTERS = (*REGISTERS, FAULTS)
 """Those of a protected one."""
+
+LOCKING_STATUS = replace(
+    STATUS,
+    writes=True,
+    text="What is going on. In a core with a lock a write of any word closes it: no set can be loaded until a reset. "
+    "Refused during a load and while a swap is pending.",
+    fields=(
+        *STATUS.fields[:3],
+        Field("LOCKED", 3, 1, "No set can be loaded until a reset; 0 without a lock."),
+        *STATUS.fields[3:],
+    ),
+)
+"""``STATUS`` of a core with a lock."""
+
+
+def registers_of(*, protected: bool, lock: bool = False) -> tuple[Register, ...]:
+    """Return the registers of a core, by ascending address.
+
+    Parameters
+    ----------
+    protected : bool
+        Whether it counts faults.
+    lock : bool
+        Whether it can be locked.
+    """
+    registers = PROTECTED_REGISTERS if protected else REGISTERS
+    return tuple(LOCKING_STATUS if lock and register is STATUS else register for register in registers)
+
 
 ADDRESS_BITS = (4 * len(PROTECTED_REGISTERS) - 1).bit_length()
 """Number of address lines of the slave."""

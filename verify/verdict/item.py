@@ -133,6 +133,7 @@ def check_stated(certificate: Certificate, item: ItemEntry, tree: Mapping[str, A
         "protect": hardware.get("protect", "none"),
         "reload": hardware.get("reload", False),
         "keep": hardware.get("keep", False),
+        "reload_lock": hardware.get("reload_lock", False),
         "samples": hardware.get("samples_per_clock", 1),
         "calibrated": () if covered == everything else covered,
         "wear": _wear_codes(table_of(tree, "wear"), certificate.output),
@@ -181,7 +182,7 @@ def wear_limits(table: Mapping[str, Any]) -> list[tuple[Fraction, Fraction]]:
 _COMPARED = {
     "": {"name", "sample_rate", "channels", "input", "output", "calibration", "filter", "wear", "hardware"},
     "calibration": {"coefficients", "data"},
-    "hardware": {"architecture", "keep", "protect", "reload", "samples_per_clock", "start"},
+    "hardware": {"architecture", "keep", "protect", "reload", "reload_lock", "samples_per_clock", "start"},
 }
 """Keys of a specification's tables that are held against something; those of other tables are all compared."""
 

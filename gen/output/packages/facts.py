@@ -10,7 +10,7 @@ from sosmith.gen.output.core_facts import CoreFacts, InterfaceFacts, StreamFacts
 from sosmith.gen.output.packages.vlnv import Vlnv
 from sosmith.gen.output.pins import Pin, pins
 from sosmith.hdl.plan.streams import Field
-from sosmith.model.reload.registers import PROTECTED_REGISTERS, REGISTERS, Register
+from sosmith.model.reload.registers import Register, registers_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,7 +83,7 @@ def package_facts(design: CoreDesign, vlnv: Vlnv | None = None) -> PackageFacts:
     facts = core_facts(design)
     registers: tuple[Register, ...] = ()
     if facts.reload is not None:
-        registers = REGISTERS if facts.protect == "none" else PROTECTED_REGISTERS
+        registers = registers_of(protected=facts.protect != "none", lock=design.architecture.reload_lock)
     return PackageFacts(
         core=facts,
         pins=pins(design, facts.interface),

@@ -36,6 +36,11 @@ from sosmith.terminal import JSON_OPTION, note, print_json, show_progress
     show_default=True,
     help="Value of the register VERSION once the new set is active.",
 )
+@click.option(
+    "--lock",
+    is_flag=True,
+    help="With --port, refuse all further loads until the board is reset; needs hardware.reload_lock = true.",
+)
 @PORT
 @BAUD
 @JSON_OPTION
@@ -50,6 +55,7 @@ def reload_command(
     active: Path | None,
     reset: bool,
     version: int,
+    lock: bool,
     port: str | None,
     baud: int,
     as_json: bool,
@@ -78,6 +84,8 @@ def reload_command(
     """
     from sosmith.interface.specification import Specification
 
+    if lock and port is None:
+        raise click.UsageError("--lock must have --port, the board to lock")
     asked, wanted = Specification.load(spec), Specification.load(other)
     running = None if active is None else Specification.load(active)
     with show_progress() as step:
@@ -97,4 +105,8 @@ def reload_command(
 
         with Board(port, baud=baud) as client:
             loaded = client.load(proven.writes)
+            if lock:
+                client.lock()
         note(f"active on {port}: version {loaded.version}, CRC {loaded.crc:#010x}, {loaded.words} words")
+        if lock:
+            note(f"locked on {port}: no set can be loaded until a reset")

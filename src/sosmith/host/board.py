@@ -410,6 +410,20 @@ class Board:
 
         return load(self, read_set(proven))
 
+    def lock(self) -> None:
+        """Refuse all further loads until the board is reset.
+
+        Raises
+        ------
+        ShortfallError
+            If the board is not locked afterwards.
+        RefusedError
+            If the core has no lock, or a load is going on or still pending.
+        """
+        from sosmith.host.loading import lock
+
+        lock(self)
+
     def _memory(self) -> bytes:
         """Read the text of the identity."""
         memory = b""

@@ -12,7 +12,9 @@ from typing import Any, Protocol
 
 from sosmith.model.errors import LinkError, RefusedError, ShortfallError, SpecificationError
 from sosmith.model.foreign_files import read_json
-from sosmith.model.reload.registers import CRC, DESIGN, ID, LAYOUT, MAGIC, STATUS, VERSION, Outcome
+from sosmith.model.reload.registers import CRC, DESIGN, ID, LAYOUT, LOCKING_STATUS, MAGIC, STATUS, VERSION, Outcome
+
+LOCKED = LOCKING_STATUS.field("LOCKED")
 
 PATIENCE = 2.0
 """Seconds to wait for the gap between two samples in which a set becomes active."""
@@ -71,6 +73,7 @@ def load(board: Registers, proven: Mapping[str, Any]) -> Loaded:
     """Load a set that `sosmith reload` has proven; parameters and errors as for `Board.load`."""
     _match("ID", MAGIC, board.read_register(ID.address))
     _match("DESIGN", proven["design"], board.read_register(DESIGN.address))
+    _require_open(board)
     layout = board.read_register(LAYOUT.address)
     _match("LAYOUT.WORDS", proven["words"], LAYOUT.field("WORDS").of(layout))
     writes: list[tuple[int, int]] = [(address, word) for address, word in proven["writes"]]
@@ -115,6 +118,18 @@ def check_active(board: Registers, proven: Mapping[str, Any] | None) -> None:
     _match("DESIGN", proven["design"], board.read_register(DESIGN.address))
     _match("VERSION", proven["version"], board.read_register(VERSION.address))
     _match("CRC", proven["writes"][-1][1], board.read_register(CRC.address))
+
+
+def lock(board: Registers) -> None:
+    """Lock a board; parameters and errors as for `Board.lock`."""
+    _match("ID", MAGIC, board.read_register(ID.address))
+    board.write_register(STATUS.address, 1)
+    _match("STATUS.LOCKED", 1, LOCKED.of(board.read_register(STATUS.address)))
+
+
+def _require_open(board: Registers) -> None:
+    if LOCKED.of(board.read_register(STATUS.address)):
+        raise RefusedError("the board must be reset before a set can be loaded, for it is locked")
 
 
 def _match(register: str, expected: int, actual: int) -> None:
