@@ -52,10 +52,17 @@ PROCESSES = 2
 
 _MODEL = ("model/*.py", "model/*/*.py")
 _CALIBRATION = ("instrument/calibration/**/*.py", "gen/calibration/*.py", "instrument/sensors/*.py")
-_HARDWARE = ("gen/**/*.py", "instrument/**/*.py", "examples/wear_campaign/*.py", "examples/scenarios/bench_*.toml")
+_HARDWARE = (
+    "benchmarks/day_bench.py",
+    "gen/**/*.py",
+    *(f"instrument/{room}/**/*.py" for room in ("calibration", "scenarios", "sensors", "uncertainty")),
+    "examples/wear_campaign/*.py",
+    "examples/scenarios/bench_*.toml",
+    *_MODEL,
+)
 CODE = {
-    "bench": ("benchmarks/day_bench.py", *_HARDWARE, *_MODEL),
-    "service": ("benchmarks/day_bench.py", "benchmarks/day_service.py", *_HARDWARE, *_MODEL),
+    "bench": _HARDWARE,
+    "service": ("benchmarks/day_service.py", "instrument/wear/state_space.py", *_HARDWARE),
     "alarms": ("benchmarks/day_alarms.py", "instrument/wear/state_space.py"),
     "advice": ("benchmarks/day_advice.py", "benchmarks/calibration_coverage.py", *_CALIBRATION, *_MODEL),
     "coverage": ("benchmarks/calibration_coverage.py", *_CALIBRATION, *_MODEL),
