@@ -293,13 +293,14 @@ def _plans(rows: list[dict[str, Any]]) -> list[str]:
 
 
 def _coverage(rows: list[dict[str, Any]]) -> list[str]:
-    low = [row for row in rows if min(row["inside"]) < ENOUGH and row["warned"] != row["count"]]
+    low = [row for row in rows if min(row["inside"]) < ENOUGH and row["silent"]]
     told = (
-        f"Below {100 * ENOUGH:g} % on one of the days, and not every sensor warned of: "
-        + "; ".join(f"{row['case']} ({row['warned']} of {row['count']})" for row in low)
+        f"Below {100 * ENOUGH:g} % on one of the days, with sensors that hold too little and are not warned of: "
+        + "; ".join(f"{row['case']} ({row['silent']} of {row['count']})" for row in low)
         + "."
         if low
-        else f"In every row, intervals hold at least {100 * ENOUGH:g} % on both days, or every sensor is warned of."
+        else f"In every row, intervals hold at least {100 * ENOUGH:g} % on both days, or every sensor of which they do "
+        "not is warned of."
     )
     plain = next(row for row in rows if row["case"] == "as its type")
     return [
