@@ -71,9 +71,10 @@ MAX_ERROR, SET_ERROR = 0.0005, Fraction(1, 1000)
 """Allowed error in mm of the hardware as it is made, and with a set that is loaded."""
 
 HELD_DAYS = {"none": 12, "three": 4, "five": 4}
-"""Days whose readings are held against their intervals: that of the run and those after it, each with the targets of
-its own morning. All readings of a day share its error, so that one day says little about how often intervals hold.
-The sensors of the bench do not age; what the calibration allows for their ageing counts all the same."""
+"""Days that a figure is the mean of: that of the run and those after it, each with the targets of its own morning. All
+readings of a day share its error, so that one day says little about how often intervals hold, and as little about how
+far readings are off. The sensors of the bench do not age; what the calibration allows for their ageing counts all the
+same."""
 
 AT_RAIL = 0.01
 """Share of a reading from which on samples at the rail spoil it: the hardware flags those (`input_at_rail`), and no
@@ -237,8 +238,13 @@ def one_run(scenario: ScenarioFile, core: CoreDesign, seed: int) -> Iterator[dic
         days = [day for own, day in every if own == name]
         found = [held(core, day, codes.get(id(day))) for day in days]
         row: dict[str, Any] = {"run": scenario.path.stem, "targets": name, "seed": seed}
-        row |= figures(days[0], found[0])
+        row |= {"order": days[0].made.fit.polynomial.orders[0], "days": len(days)}
+        row |= {"refused": sum(day.datapath is None for day in days)}
+        row |= {"bound": max((day.bound for day in days if day.bound is not None), default=None)}
+        each = [figures(day, one) for day, one in zip(days, found, strict=True)]
+        row |= {"off": round(max((one["off"] for one in each if one["off"] is not None), default=0.0), 4)}
         for key, shares in (
+            *((name, [one[name] for one in each if one[name] is not None]) for name in ("accuracy", "hardware", "rms")),
             ("inside", [one.inside(one.off) for one in found]),
             ("inside_hardware", [one.inside(one.by_hardware) for one in found if one.by_hardware is not None]),
             ("half_width", [float(one.half[one.claimed].mean()) for one in found if one.claimed.any()]),
@@ -254,15 +260,16 @@ def for_day(made: BayesianFit, date: int) -> BayesianFit:
     return replace(made, posterior=made.model.posterior(posterior.scatters, posterior.curves, date))
 
 
-def figures(day: Day, first: Held) -> dict[str, Any]:
-    """Return order, bound, accuracy in % and rms in mm of the run."""
+def figures(day: Day, held_day: Held) -> dict[str, Any]:
+    """Return accuracy in %, in double precision and by the hardware, how far both are apart, and rms in mm of a day."""
     trace, clearance = day.trace, day.trace.truth.copy()
-    row: dict[str, Any] = {"order": day.made.fit.polynomial.orders[0], "bound": day.bound, "hardware": None}
-    row |= {"rms": round(float(np.sqrt(np.mean(first.off**2))), 4)}
-    for name, off in (("accuracy", first.off), ("hardware", first.by_hardware)):
+    row: dict[str, Any] = {"rms": float(np.sqrt(np.mean(held_day.off**2))), "hardware": None, "off": None}
+    for name, off in (("accuracy", held_day.off), ("hardware", held_day.by_hardware)):
         if off is not None:
             clearance[trace.reading] = trace.truth[trace.reading] + off
-            row[name] = round(accuracy_percent(clearance, trace.truth, trace.reading), 4)
+            row[name] = accuracy_percent(clearance, trace.truth, trace.reading)
+    if row["hardware"] is not None:
+        row["off"] = abs(row["hardware"] - row["accuracy"])
     return row
 
 

@@ -227,9 +227,9 @@ def _alarms(found: dict[str, Any]) -> list[str]:
         "what it is, a jump of the wheel, a change of the rate, or of the sensor; one wheel alone cannot tell a sensor",
         "from a jump. *By a ratio*: what a likelihood ratio of a step or a change of slope on any of the last days",
         f"would tell of one wheel, at {1000 * ALLOWED:g} false alarm in 1,000 days. *At most*: the same of the best",
-        "test of all, which knew beforehand what happens, how much and when, and had only level and rate to learn from the",
-        f"{FAULT_DAY} days before (Neyman and Pearson). To look for each day costs most where the signal is weakest:",
-        "with days of 0.13 mm one wheel alone is not enough to be sure within ten days; the sum, or targets, are.",
+        "test of all, which knew beforehand what happens, how much and when, and had only level and rate to learn",
+        f"from the {FAULT_DAY} days before (Neyman and Pearson). To look for each day costs most where the signal is",
+        "weakest: with days of 0.13 mm one wheel alone is not enough to be sure within ten days.",
         "",
         *_table(
             "what happens | followed | error of a day, mm | told | by a ratio | at most | days: half, nine tenths | "
@@ -293,13 +293,14 @@ def _plans(rows: list[dict[str, Any]]) -> list[str]:
 
 
 def _coverage(rows: list[dict[str, Any]]) -> list[str]:
-    low = [row for row in rows if min(row["inside"]) < ENOUGH and row["warned"] != row["count"]]
+    low = [row for row in rows if min(row["inside"]) < ENOUGH and row["silent"]]
     told = (
-        f"Below {100 * ENOUGH:g} % on one of the days, and not every sensor warned of: "
-        + "; ".join(f"{row['case']} ({row['warned']} of {row['count']})" for row in low)
+        f"Below {100 * ENOUGH:g} % on one of the days, with sensors that hold too little and are not warned of: "
+        + "; ".join(f"{row['case']} ({row['silent']} of {row['count']})" for row in low)
         + "."
         if low
-        else f"In every row, intervals hold at least {100 * ENOUGH:g} % on both days, or every sensor is warned of."
+        else f"In every row, intervals hold at least {100 * ENOUGH:g} % on both days, or every sensor of which they do "
+        "not is warned of."
     )
     plain = next(row for row in rows if row["case"] == "as its type")
     return [
