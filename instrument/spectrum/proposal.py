@@ -29,6 +29,14 @@ MIN_STOPBAND_LOSS = 3.02
 """Smallest loss from the stop edge on, dB, even if the disturbance needs less: keeps the cutoff below the stop edge."""
 
 
+PARTS_OF_DISTURBANCE = tuple(1 + k / 10 for k in range(20, -1, -1))
+"""Shares of the disturbance, below the stopband edge and above it, that are tried, as multiples of an equal one.
+
+The largest comes first: what the wanted signal does not need of the error goes to the disturbance. The loss is asked
+for at the edge, from which it rises, so that less may remain than the share; the predicted error decides.
+"""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Choice:
     """One number of the proposal and its origin.
@@ -132,37 +140,53 @@ def _harmless(contents: Sequence[Content], wish: Wish) -> bool:
 
 
 def _best(contents: Sequence[Content], wish: Wish, sample_rate: float, passband: Choice) -> Proposal | None:
-    """Make the proposal of lowest order; None if there is none up to `MAX_ORDER`."""
-    stopband = _stop_edge(contents, wish)
-    losses = _pass_loss(contents, wish), _stop_loss(contents, wish, stopband.value)
+    """Make the proposal of the lowest order for equal shares, with the most for the disturbance, which delays least.
+
+    None if there is none up to `MAX_ORDER`.
+    """
+    masks = [mask for part in PARTS_OF_DISTURBANCE if (mask := _mask(contents, wish, part * wish.share)) is not None]
+    least = [
+        minimum_order(passband.value, stop.value, *(loss.value for loss in losses), sample_rate)[0]
+        if passband.value < stop.value
+        else MAX_ORDER + 1
+        for stop, *losses in masks
+    ]
+    if wish.passband is not None:
+        for mask, order in zip(masks, least, strict=True):  # the most first, and with it the lowest order
+            if order <= MAX_ORDER:
+                made = _made(contents, wish, sample_rate, (passband, *mask), passband.value)
+                left = [math.hypot(one.disturbance, one.slow) for one in made.predictions]
+                if wish.coverage * max(left) <= wish.tolerance:
+                    return made
+        return None
+    for order in range(least[-1], MAX_ORDER + 1):  # of equal shares
+        for mask in masks:
+            stop, *losses = mask
+            edge = _highest_pass_edge(order, stop.value, *(loss.value for loss in losses), sample_rate)
+            reason = (
+                f"as high as order {order} allows, for the least delay; at least {passband.value:.5g} Hz: "
+                f"{passband.reason}"
+            )
+            choices = (replace(passband, value=edge, reason=reason), *mask)
+            made = _made(contents, wish, sample_rate, choices, passband.value)
+            if all(wish.coverage * one.rms <= wish.tolerance for one in made.predictions):
+                return made
+    return None
+
+
+def _mask(contents: Sequence[Content], wish: Wish, share: float) -> tuple[Choice, Choice, Choice] | None:
+    """Choose stopband edge, passband loss and stopband loss; None if all of the disturbance is within `share`."""
+    if all(band_rms(one.disturbance, 0) <= share for one in contents):
+        return None
+    stopband = _stop_edge(contents, share)
+    losses = _pass_loss(contents, wish), _stop_loss(contents, share, stopband.value)
     if losses[0].value >= losses[1].value:
+        if share > wish.share:
+            return None
         raise SpecificationError(
             f"passband-loss must be below the {losses[1].value:g} dB of the stop band, not {losses[0].value:g}"
         )
-    if not passband.value < stopband.value:
-        return None
-    least, _ = minimum_order(passband.value, stopband.value, losses[0].value, losses[1].value, sample_rate)
-    if wish.passband is not None:
-        if least > MAX_ORDER:
-            return None
-        made = _made(contents, wish, sample_rate, (passband, stopband, *losses), passband.value)
-        left = [math.hypot(one.disturbance, one.slow) for one in made.predictions]
-        return made if wish.coverage * max(left) <= wish.tolerance else None
-    for order in range(least, MAX_ORDER + 1):
-        edge = _highest_pass_edge(order, stopband.value, losses[0].value, losses[1].value, sample_rate)
-        reason = (
-            f"as high as order {order} allows, for the least delay; at least {passband.value:.5g} Hz: {passband.reason}"
-        )
-        made = _made(
-            contents,
-            wish,
-            sample_rate,
-            (replace(passband, value=edge, reason=reason), stopband, *losses),
-            passband.value,
-        )
-        if all(wish.coverage * one.rms <= wish.tolerance for one in made.predictions):
-            return made
-    return None
+    return stopband, *losses
 
 
 def _highest_pass_edge(order: int, stop_edge: float, pass_loss: float, stop_loss: float, sample_rate: float) -> float:
@@ -227,15 +251,15 @@ def _up_to(spectrum: Spectrum) -> Array:
     return np.sqrt(np.append(0.0, np.cumsum(spectrum.density[1:])) * spectrum.step)
 
 
-def _stop_edge(contents: Sequence[Content], wish: Wish) -> Choice:
+def _stop_edge(contents: Sequence[Content], share: float) -> Choice:
     """Choose the highest frequency up to which no disturbance exceeds its share of the error; 0 if there is none."""
     edge, kept, name = min(
         (one.disturbance.frequency[index], band_rms(one.disturbance, 0, index + 1), one.name)
         for one in contents
-        if band_rms(one.disturbance, 0) > wish.share
-        for index in [int(np.argmax(_up_to(one.disturbance) > wish.share)) - 1]
+        if band_rms(one.disturbance, 0) > share
+        for index in [int(np.argmax(_up_to(one.disturbance) > share)) - 1]
     )
-    reason = f"up to it the disturbance has {kept:.3g} rms, at most {wish.share:.3g}{_of(name, contents)}"
+    reason = f"up to it the disturbance has {kept:.3g} rms, at most {share:.3g}{_of(name, contents)}"
     return Choice(key="stopband_edge", value=_down(float(edge)), unit="Hz", reason=reason)
 
 
@@ -253,19 +277,19 @@ def _pass_loss(contents: Sequence[Content], wish: Wish) -> Choice:
     return Choice(key="passband_loss", value=_down(loss), unit="dB", reason=reason)
 
 
-def _stop_loss(contents: Sequence[Content], wish: Wish, edge: float) -> Choice:
+def _stop_loss(contents: Sequence[Content], share: float, edge: float) -> Choice:
     """Choose the loss that reduces the worst disturbance above the stop edge to its share of the error."""
     above, name = max(
         (band_rms(one.disturbance, int(np.searchsorted(one.disturbance.frequency, edge, "right"))), one.name)
         for one in contents
     )
-    loss = 20 * math.log10(above / wish.share) if above > 0 else -math.inf
+    loss = 20 * math.log10(above / share) if above > 0 else -math.inf
     if loss < MIN_STOPBAND_LOSS:
         reason = (
             f"the least that puts the cutoff below the stop edge; {above:.3g} rms disturb above it{_of(name, contents)}"
         )
         return Choice(key="stopband_loss", value=MIN_STOPBAND_LOSS, unit="dB", reason=reason)
-    reason = f"20 log10({above:.3g} rms of the disturbance above the edge / {wish.share:.3g}){_of(name, contents)}"
+    reason = f"20 log10({above:.3g} rms of the disturbance above the edge / {share:.3g}){_of(name, contents)}"
     return Choice(key="stopband_loss", value=_up(loss), unit="dB", reason=reason)
 
 

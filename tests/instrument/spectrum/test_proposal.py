@@ -13,7 +13,13 @@ import pytest
 from sosmith.gen.filter.design import minimum_order
 from sosmith.gen.filter.response import magnitude_db
 from sosmith.instrument.spectrum.prediction import Content, told_apart
-from sosmith.instrument.spectrum.proposal import Proposal, propose
+from sosmith.instrument.spectrum.proposal import (
+    PARTS_OF_DISTURBANCE,
+    Proposal,
+    _highest_pass_edge,
+    _mask,
+    propose,
+)
 from sosmith.instrument.spectrum.report import ripple
 from sosmith.instrument.spectrum.settings import SpectrumSettings, Wish
 from sosmith.instrument.spectrum.spectra import Array, spectrum
@@ -61,10 +67,31 @@ def test_the_papers_spectra_give_the_papers_choice() -> None:
     made = propose([one], Wish(tolerance=0.004, coverage=2), BENCH_RATE)
     width = 4 * one.disturbance.step  # a line of the window of Hann is four frequencies wide
     assert made.needed == pytest.approx(0.1, abs=width)
-    assert made["stopband_edge"] == pytest.approx(0.9, abs=width)
-    assert made["stopband_edge"] < 0.9
-    assert made["passband_loss"] == pytest.approx(0.1, rel=0.02)
-    assert made["stopband_loss"] == pytest.approx(40, abs=0.2)
+    equal = _mask([one], made.wish, made.wish.share)
+    assert equal is not None
+    for stop, passing, stopping in (equal, made.choices[1:]):
+        assert stop.value == pytest.approx(0.9, abs=width)
+        assert stop.value < 0.9
+        assert passing.value == pytest.approx(0.1, rel=0.02)
+        assert stopping.value <= 40.2
+    assert equal[2].value == pytest.approx(40, abs=0.2)
+    more = 10 ** ((equal[2].value - made["stopband_loss"]) / 20)
+    assert more in [pytest.approx(part, abs=1e-3) for part in PARTS_OF_DISTURBANCE]
+
+
+def test_what_the_wanted_signal_does_not_need_goes_to_the_disturbance() -> None:
+    """A slow ramp needs nothing: the filter of the same order delays by a third less than with equal shares."""
+    rate, time = 100.0, np.arange(30_000) / 100.0
+    wanted = 1e-5 * time
+    disturbance = 0.5 * np.sin(2 * np.pi * 1.2 * time) + 0.3 * np.sin(2 * np.pi * 2 * time)
+    one = content(wanted, disturbance, rate)
+    wish = Wish(tolerance=0.2)
+    made = propose([one], wish, rate)
+    equal = _mask([one], wish, wish.share)
+    assert equal is not None
+    edge = _highest_pass_edge(made.filter.order, *(choice.value for choice in equal), rate)
+    assert made["passband_edge"] > 1.4 * edge
+    assert 0.8 * wish.tolerance < wish.coverage * made.predictions[0].rms <= wish.tolerance
 
 
 def test_with_the_papers_pass_edge_the_order_is_that_of_its_equation() -> None:
@@ -89,9 +116,11 @@ def test_both_edges_are_the_outermost_that_leave_their_shares() -> None:
     one = content(0.006 * np.cumsum(noise[0]), 0.1 * noise[1], rate)  # both fall or stay over all frequencies
     made = propose([one], Wish(tolerance=0.12), rate)
     share = 0.12 / 4
+    equal = _mask([one], made.wish, share)
+    assert equal is not None
     assert one.wanted is not None
     step = one.wanted.step
-    needed, stop = round(made.needed / step), round(made["stopband_edge"] / step)
+    needed, stop = round(made.needed / step), round(equal[0].value / step)
 
     def rms(density: Array) -> float:
         return math.sqrt(float(np.sum(density)) * step)
@@ -148,7 +177,7 @@ def test_several_traces_are_satisfied_together() -> None:
     both = propose([first, second], wish, rate)
     alone = [propose([one], wish, rate) for one in (first, second)]
     assert both["stopband_edge"] == min(one["stopband_edge"] for one in alone) == alone[0]["stopband_edge"]
-    assert both["stopband_loss"] == max(one["stopband_loss"] for one in alone) == alone[1]["stopband_loss"]
+    assert all(one.rms <= 0.05 for one in both.predictions)
     assert "(first)" in both.choices[1].reason
     assert "(second)" in both.choices[3].reason
     assert all(2 * one.rms <= 0.1 for one in both.predictions)
@@ -161,10 +190,11 @@ def test_without_truth_the_pass_edge_tells_what_is_wanted() -> None:
     )
     wish = Wish(tolerance=0.1, passband=0.1)
     made = propose([told_apart("trace", measured, 0.1)], wish, rate)
-    assert made["stopband_loss"] == pytest.approx(20 * math.log10(0.2 / 0.025), abs=0.1)
+    assert wish.coverage * made.predictions[0].rms <= wish.tolerance
+    assert made["stopband_loss"] < 20 * math.log10(0.2 / 0.025)
     # as motion alone, the slow part disturbs too, and lies below any passband edge of 0.1 Hz
     motion = Content(name="trace", wanted=None, disturbance=measured, has_truth=False)
-    with pytest.raises(ShortfallError, match=r"^tolerance must be at least about 1\.2\d for a Butterworth"):
+    with pytest.raises(ShortfallError, match=r"^tolerance must be at least about 0\.6\d+ for a Butterworth"):
         propose([motion], wish, rate)
 
 
