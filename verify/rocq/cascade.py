@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from flint import fmpz_poly
 
-from sosmith.verify.certificate_file import Operation, StageEntry
+from sosmith.verify.certificate_file import Operation
 from sosmith.verify.graph import RejectedError, inputs_of
 from sosmith.verify.rocq.flat import FlatGraph, used_inputs
 from sosmith.verify.rocq.linear import LinearStage, Source
