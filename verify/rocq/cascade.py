@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 from flint import fmpz_poly
 
-from sosmith.verify.certificate_file import Operation, StageEntry
+from sosmith.verify.certificate_file import Operation
 from sosmith.verify.graph import RejectedError, inputs_of
-from sosmith.verify.rocq.flat import FlatGraph
+from sosmith.verify.rocq.flat import FlatGraph, used_inputs
 from sosmith.verify.rocq.linear import LinearStage, Source
 from sosmith.verify.rocq.polynomials import common_denominator, integers, number, numbers, rows
 from sosmith.verify.rocq.responses import divide, impulse, split
@@ -107,19 +107,23 @@ Definition forms := Eval vm_compute in fill core sources written [] (firstn {sel
         rest = first.rest * self._size(node)
         steps = []
         for index in range(section, 0, -1):
-            before = self.sections[index - 1]
-            exponent, tail = split(before.under)
             for place in self.sections[index].wires:
                 if not row.get(place):
                     continue
                 wire = self.sources[place][1]
+                before = self._computes(self.graph.fed_by(wire), index)
+                exponent, tail = split(self.sections[before].under)
                 moved = divide(exponent, tail, [int(value) for value in row.pop(place).coeffs()])
                 steps.append(f"({place}%nat, {moved.samples}%N)")
-                for key, value in _times(self._form(index - 1, self.graph.fed_by(wire)), moved.values).items():
+                for key, value in _times(self._form(before, self.graph.fed_by(wire)), moved.values).items():
                     row[key] = row.get(key, fmpz_poly()) + value
                 rest += moved.rest * self._size(wire)
         plan = f"Plan {first.samples} (2 ^ {bits}) [{'; '.join(steps)}]"
         return Rows(row, rest, 1 << bits + split(at.under)[0], plan)
+
+    def _computes(self, node: int, section: int) -> int:
+        """Return the section before another one that computes a node; the one just before it if none does."""
+        return next((at for at in range(section) if node in self.sections[at].forms), section - 1)
 
     def _form(self, section: int, node: int) -> Row:
         forms = self.sections[section].forms
@@ -162,12 +166,6 @@ def cascade_of(graph: FlatGraph) -> Cascade:
     sources: list[Source] = []
     sections = [_section(graph, place, sources) for place in places]
     return Cascade(graph, graph.offsets[places[-1] + 1], sources, sections)
-
-
-def used_inputs(stage: StageEntry) -> list[int]:
-    """Return the inputs that a section computes with, not those that only pass beside it."""
-    used = {operand for node in stage.nodes for operand in node.operands}
-    return [at for at in inputs_of(stage) if at in used]
 
 
 def _section(graph: FlatGraph, place: int, sources: list[Source]) -> Section:

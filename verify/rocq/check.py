@@ -8,6 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from sosmith.model.errors import ToolError
+from sosmith.verify.bounds.largest_gain import check_bands
 from sosmith.verify.certificate_file import Certificate
 from sosmith.verify.decimation import at_lower_rate
 from sosmith.verify.rocq.bound import bound_claims, why_no_bound
@@ -150,6 +151,8 @@ def theorems(certificate: Certificate) -> Theorems:
         If its claims cannot be written as theorems.
     """
     behind = at_lower_rate(certificate)
+    if certificate.decimation is not None:  # what no theorem is about, but has to be right
+        check_bands(certificate.decimation, certificate.ideal.sections)
     graph = flattened(behind)
     claims = list(gain_claims(certificate))
     unchecked = list(_beside(certificate))

@@ -219,6 +219,13 @@ def _ahead(alone: Certificate, graph: FlatGraph, place: int, made: Calibration) 
     text = _calibrated("calibrated_ahead", made.physical) + _followed(
         "ahead_is_calibrated", ("calibrated_ahead", "ahead", "given"), made, len(alone.inputs), graph, place
     )
+    claims = alone.claims
+    parts = " + ".join(map(real, claims.budget.values())) or "0"
+    bound = real(claims.bound)
+    text += f"""\
+Theorem ahead_is_bounded : ({real(made.error)} <= {bound} /\\ {bound} = {parts})%R.
+Proof. split; lra. Qed.
+"""
     return Claim("ahead_is_calibrated", words, text)
 
 

@@ -21,7 +21,8 @@ class FlatGraph:
     offsets : list of int
         Place of the first node of each stage, and behind them the number of all nodes.
     feeds : list of list of int
-        For each stage but the first one, the nodes that its inputs take, in order.
+        For each stage but the first one, the nodes that its inputs take, in order. What stages only pass on, without
+        using it, is taken from where it comes from.
     ports : list of pairs of int
         Ranges of the inputs of the first stage.
     """
@@ -80,12 +81,26 @@ def flattened(certificate: Certificate) -> FlatGraph:
         _check_places(stage)
         if index:
             before = certificate.stages[index - 1]
-            taken = [offsets[-2] + output for output in before.outputs]
+            taken = [_origin(before, output, offsets[-2], feeds[-1]) for output in before.outputs]
             count = len(inputs_of(stage))
             require(count == len(taken), f"{stage.name} must have {len(taken)} inputs, not {count}")
             feeds.append(taken)
         offsets.append(offsets[-1] + len(stage.nodes))
     return FlatGraph(certificate.stages, offsets, feeds, _ports(certificate))
+
+
+def _origin(stage: StageEntry, output: int, offset: int, feeds: Sequence[int]) -> int:
+    """Return the node that an output of a stage comes from: of an earlier stage, if this one only passes it on."""
+    inputs = inputs_of(stage)
+    if feeds and output in set(inputs) - set(used_inputs(stage)):
+        return feeds[inputs.index(output)]
+    return offset + output
+
+
+def used_inputs(stage: StageEntry) -> list[int]:
+    """Return the inputs that a stage computes with, not those that only pass beside it."""
+    used = {operand for node in stage.nodes for operand in node.operands}
+    return [at for at in inputs_of(stage) if at in used]
 
 
 def _check_places(stage: StageEntry) -> None:

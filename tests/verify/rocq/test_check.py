@@ -11,10 +11,24 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.gen.word_lengths.filters import butterworth, plain
-from tests.verify.rocq.small import GRID, calibrated, checked, coarse, library, needs_coqc, small
+from tests.verify.rocq.small import (
+    BOTH,
+    DECIMATED,
+    GRID,
+    SETTLING,
+    calibrated,
+    checked,
+    coarse,
+    designed,
+    library,
+    needs_coqc,
+    small,
+)
 
 from sosmith.gen.output.certificate import certificate
 from sosmith.gen.realizations.registry import REALIZATIONS
+from sosmith.model.dataflow.decimator import Decimator
+from sosmith.model.port import Port
 from sosmith.verify.certificate_file import Certificate, certificate_text
 from sosmith.verify.graph import RejectedError
 from sosmith.verify.rocq.check import GIVEN, check_in_rocq, head, rocq_texts, theorems
@@ -188,10 +202,116 @@ def test_the_graph_in_rocq_computes_what_the_model_computes(realization: str, tm
 
 
 def test_what_no_theorem_is_about_is_named() -> None:
+    assert theorems(designed(DECIMATED)).unchecked == ("what folds into the pass band at the decimator",)
+    assert theorems(designed(SETTLING)).unchecked == theorems(small()).unchecked == ()
+
+
+def test_a_counter_that_is_not_there_has_no_theorem() -> None:
     made = small()
     flagged = made.model_copy(update={"claims": made.claims.model_copy(update={"settling": 9})})
-    assert theorems(flagged).unchecked == ("how soon the filter has settled",)
-    assert theorems(made).unchecked == ()
+    with pytest.raises(RejectedError, match=r"^output_stage must have a code and a flag as outputs, not 1$"):
+        theorems(flagged)
+
+
+def test_another_gain_of_a_band_has_no_theorem() -> None:
+    tree = json.loads(certificate_text(designed(DECIMATED)))
+    band = tree["decimation"]["bands"][0]
+    band["gain"] = str(Fraction(band["gain"]) + GRID)
+    with pytest.raises(RejectedError, match=r"^the largest gain from band 1 must be that at "):
+        theorems(Certificate.model_validate(tree))
+
+
+@needs_coqc
+@pytest.mark.slow
+@pytest.mark.parametrize("text", [SETTLING, DECIMATED, BOTH], ids=["from zero", "decimated", "calibrated, decimated"])
+def test_a_start_from_zero_and_a_decimator(text: str, tmp_path: Path) -> None:
+    made = designed(text)
+    names = {claim.name for claim in theorems(made).claims}
+    assert names >= ({"flagged", "settled"} if text == SETTLING else {"decimated_within", "calibrated_input"})
+    assert checked(made, tmp_path) <= STANDARD
+
+
+def sooner(tree: Any) -> None:
+    """Claim one sample less."""
+    tree["claims"]["settling"] -= 1
+
+
+def counted_sooner(tree: Any) -> None:
+    """Count and claim that half as many samples are flagged."""
+    samples = tree["claims"]["settling"] // 2
+    nodes = tree["stages"][-1]["nodes"]
+    next(node for node in nodes if node.get("name") == "samples").update(parameter=samples, low=samples, high=samples)
+    tree["claims"]["settling"] = samples
+
+
+def narrower(tree: Any) -> None:
+    """Let the words of the decimator be too short."""
+    tree["decimation"]["width"] -= 1
+
+
+def less_decimation(tree: Any) -> None:
+    """Claim one unit less for the rounding behind the decimator."""
+    less_bound(tree)
+    tree["claims"]["budget"]["decimation"] = str(Fraction(tree["claims"]["budget"]["decimation"]) - GRID)
+
+
+def less_before(tree: Any) -> None:
+    """Claim less of the calibration before the decimator."""
+    claims = tree["decimation"]["calibration"]["claims"]
+    claims["bound"] = str(Fraction(claims["bound"]) - GRID)
+
+
+def other_polynomial(tree: Any) -> None:
+    """Compare with another calibration."""
+    tree["ideal"]["polynomial"][1][0] = "1/2"
+
+
+@needs_coqc
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("text", "edit", "name"),
+    [
+        (SETTLING, sooner, "flagged"),
+        (DECIMATED, less_decimation, "error_in_parts"),
+        (BOTH, less_before, "ahead_is_calibrated"),
+        (BOTH, other_polynomial, "ahead_is_calibrated"),
+    ],
+)
+def test_what_is_wrong_before_the_filter_is_refused(
+    text: str, edit: Callable[[Any], None], name: str, tmp_path: Path
+) -> None:
+    tree = json.loads(certificate_text(designed(text)))
+    edit(tree)
+    with pytest.raises(RejectedError, match=f"^Rocq must accept {name} \\("):
+        checked(Certificate.model_validate(tree), tmp_path)
+
+
+def test_a_word_that_is_too_short_has_no_theorem() -> None:
+    tree = json.loads(certificate_text(designed(DECIMATED)))
+    narrower(tree)
+    with pytest.raises(RejectedError, match=r"^the registers of the decimator must hold "):
+        theorems(Certificate.model_validate(tree))
+
+
+@needs_coqc
+@pytest.mark.parametrize("signed", [False, True])
+def test_the_decimator_in_rocq_computes_what_the_model_computes(signed: bool, tmp_path: Path) -> None:
+    port = Port(name="x", bits=6, signed=signed, lsb=Fraction(1), zero=Fraction(0))
+    model = Decimator(input=port, factor=4, stages=3, dropped=2)
+    codes = np.random.default_rng(2).integers(-32 if signed else 0, 32 if signed else 64, 45)
+    library(tmp_path)
+    inputs = "; ".join(f"({code})" for code in codes)
+    shape = f"Decimator {model.factor} {model.stages} {model.width} {model.dropped} {str(signed).lower()}"
+    (tmp_path / "Claims.v").write_text(
+        head()
+        + f"Definition x (n : nat) := nth n [{inputs}] 0.\n"
+        + f"Eval vm_compute in map (decimate ({shape}) x) (seq 0 {model.count(len(codes))}).\n"
+    )
+    said = subprocess.run(
+        ["coqc", "-Q", ".", "Sosmith", "Claims.v"], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    shown = [int(code) for code in re.findall(r"-?\d+", said.stdout.partition(":")[0])]
+    assert shown == model.compute(codes).tolist()
 
 
 @pytest.mark.sweep(2)

@@ -7,7 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from flint import fmpz_poly
-from tests.verify.rocq.small import calibrated, coarse, small
+from tests.verify.rocq.small import BOTH, SETTLING, calibrated, coarse, designed, small
 
 from sosmith.gen.realizations.registry import REALIZATIONS
 from sosmith.verify.certificate_file import Certificate, certificate_text
@@ -38,8 +38,9 @@ def test_a_response_leaves_no_more_than_it_says(seed: int) -> None:
         assert left(bits, tail, made.values, of) <= made.rest <= len(made.values) << bits + 2
 
 
-def test_a_response_that_does_not_die_away_is_refused() -> None:
-    with pytest.raises(RejectedError, match=r"^a response must die away within 262144 samples$"):
+def test_a_response_that_does_not_die_away_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sosmith.verify.rocq.responses._SAMPLES", 1000)
+    with pytest.raises(RejectedError, match=r"^a response must die away within 1000 samples$"):
         impulse(4, [-16], 1 << 20)
 
 
@@ -140,11 +141,29 @@ def test_the_error_of_a_calibration_holds_for_random_codes() -> None:
 def test_the_theorem_says_what_the_certificate_claims() -> None:
     made = calibrated()
     cascade, _ = last_rows(made)
-    claims = {claim.name: claim.text for claim in bound_claims(made, cascade, start_of(cascade.graph))}
+    claims = {claim.name: claim.text for claim in bound_claims(made, made, cascade, start_of(cascade.graph), None)}
     bound = made.claims.bound
     assert f"<= IZR {bound.numerator} / IZR {bound.denominator})%R." in claims["error_is_bounded"]
     assert "(from_first (fun n => calibrated (x n)))" in claims["error_is_bounded"]
     assert "(y (Z.of_nat n) - IZR (-1024) / IZR 1)" in claims["error_is_bounded"]
     assert "(from_zero (fun n => calibrated (x n)))" in "".join(
-        claim.text for claim in bound_claims(small(), last_rows(small())[0], None)
+        claim.text for claim in bound_claims(small(), small(), last_rows(small())[0], None, None)
     )
+
+
+def test_the_theorem_says_what_a_decimator_takes() -> None:
+    made = designed(BOTH)
+    entry = made.decimation
+    assert entry is not None
+    claims = {claim.name: claim.text for claim in theorems(made).claims}
+    assert "(from_first (averaged_input x))" in claims["error_is_bounded"]
+    assert "code core (decimated x)" in claims["error_is_bounded"]
+    assert f"Decimator {entry.factor} {entry.stages} {entry.width} {entry.dropped} false." in claims["decimated_within"]
+
+
+def test_the_theorem_says_from_which_sample_on_it_has_settled() -> None:
+    made = designed(SETTLING)
+    claims = {claim.name: claim.text for claim in theorems(made).claims}
+    assert f"forall n, {made.claims.settling} <= Z.of_nat n ->" in claims["settled"]
+    assert "(from_zero (fun n => calibrated (z (m + n)%nat)))" in claims["settled"]
+    assert f"(if Z.of_nat n <? {made.claims.settling} then -1 else 0)" in claims["flagged"]
