@@ -273,7 +273,7 @@ class Search:
     def _moved(self, choice: Choice) -> Iterator[Choice]:
         """Yield formats with one coefficient, or two if there are few, next to what they were."""
         places = [(k, name) for k, form in enumerate(choice.formats) for name in form.coefficients]
-        moves = [((place, by),) for place in places for by in (-1, 1)]
+        moves: list[tuple[tuple[tuple[int, str], int], ...]] = [((place, by),) for place in places for by in (-1, 1)]
         if len(places) <= _FEW:
             moves += [(*one, *other) for one, other in combinations(moves, 2) if one[0][0] != other[0][0]]
         for move in moves:

@@ -15,6 +15,7 @@ must be the output of the graph. The texts say ``unsat`` to a solver where that 
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterator, Sequence
+from functools import partial
 
 from sosmith.verify.certificate_file import Certificate, Operation
 from sosmith.verify.graph import RejectedError, require
@@ -123,14 +124,13 @@ class _Goals:
         terms = self._terms(script)
         pairs: list[tuple[Term, Term]] = []
         for fixed, position, wanted in goals:
-            for case, following in cases(fixed, lambda case, at=position: self._next(name, at, case, script, terms)):
-                del case
-                held, taken = following
+            following = partial(self._next, name, position, script, terms)
+            for _, (held, taken) in cases(fixed, following):
                 pairs.append((taken, held if wanted is None else terms.word(wanted, register.width)))
         self._assume_ranges(script, terms)
         return script.refuting(f"{name} takes over what it must, or keeps what it holds", pairs)
 
-    def _next(self, name: str, position: int, case: Case, script: Script, terms: FormTerms) -> tuple[Term, Term]:
+    def _next(self, name: str, position: int, script: Script, terms: FormTerms, case: Case) -> tuple[Term, Term]:
         """Return what a register holds, and what it holds at the next clock."""
         words = self._words(position, case, script, terms)
         held = words.net(name)
