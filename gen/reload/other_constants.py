@@ -10,12 +10,12 @@ from typing import cast
 from sosmith.gen.filter.design import Filter
 from sosmith.gen.proof.cascade_proof import quantized_response
 from sosmith.gen.proof.linear_model import linear_models
+from sosmith.gen.proof.polynomial_error import horner_error, rounded
 from sosmith.gen.realizations.registry import REALIZATIONS, Section, realization_of
 from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
 from sosmith.gen.reload.first_samples import Limits, first_samples
 from sosmith.gen.word_lengths.cascade import cascade, chosen_formats, parts_of, stages_of
 from sosmith.gen.word_lengths.input_stage import InputStage, normalised, starting_like
-from sosmith.gen.word_lengths.polynomial_error import horner_error, rounded
 from sosmith.gen.word_lengths.quantize import gain_at_zero, gain_of
 from sosmith.gen.word_lengths.quantized import Quantized, assembled
 from sosmith.gen.word_lengths.search import Choice, Search

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
+from sosmith.gen.proof.polynomial_error import horner_error, rounded
 from sosmith.gen.realizations.coefficients import lowest_terms
 from sosmith.gen.word_lengths.bit_limits import MAX_BITS
-from sosmith.gen.word_lengths.polynomial_error import horner_error, rounded
 from sosmith.model.dataflow.datapath import Stage
 from sosmith.model.dataflow.graph import Range
 from sosmith.model.errors import ShortfallError

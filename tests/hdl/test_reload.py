@@ -28,11 +28,13 @@ from sosmith.model.reload.registers import (
     FAULTS,
     ID,
     LAYOUT,
+    LOCKING_STATUS,
     MAGIC,
     REGISTERS,
     STATUS,
     VERSION,
     Outcome,
+    registers_of,
 )
 
 
@@ -490,3 +492,77 @@ def test_a_core_loads_the_idle_bank_and_flags_what_the_wrong_one_gives(
     simulator.add_clock(1e-6, domain="bench")
     simulator.add_testbench(testbench)
     simulator.run()
+
+
+# The lock.
+
+
+async def locked(bench: Bench) -> int:
+    word, response = await bench.bus.read(STATUS.address)
+    assert response == OKAY
+    return LOCKING_STATUS.field("LOCKED").of(word)
+
+
+async def nothing_is_loaded_until_a_reset(bench: Bench) -> None:
+    words = bench.words()
+    assert set(await bench.load(7, words)) == {OKAY}
+    await bench.bus.idle(2)
+    assert await locked(bench) == 0
+    assert await bench.bus.write(STATUS.address, 0) == OKAY  # whatever the word
+    for _ in range(3):
+        assert set(await bench.load(8, bench.words())) == {SLVERR}
+        assert await bench.bus.write(STATUS.address, 0xFFFFFFFF) == OKAY  # it stays
+    await bench.bus.idle(20)
+    assert (await locked(bench), bench.swaps, bench.active) == (1, 1, words)
+    assert await bench.version() == 7
+    await bench.reset()
+    assert await locked(bench) == 0
+    others = bench.words()
+    assert set(await bench.load(9, others)) == {OKAY}
+    await bench.bus.idle(2)
+    assert (bench.active, await bench.version()) == (others, 9)
+
+
+async def a_load_is_ended_and_not_locked(bench: Bench) -> None:
+    assert await bench.bus.write(VERSION.address, 3) == OKAY
+    assert await bench.bus.write(DATA.address, 5) == OKAY
+    assert await bench.bus.write(STATUS.address, 1) == SLVERR
+    assert await locked(bench) == 0
+    words = bench.words()
+    assert await bench.bus.write(CRC.address, crc_of(3, [5] * DEPTH)) == SLVERR
+    assert set(await bench.load(4, words)) == {OKAY}
+    await bench.bus.idle(2)
+    assert bench.active == words
+
+
+async def a_write_with_too_few_bytes_does_not_lock(bench: Bench) -> None:
+    assert await bench.bus.write(STATUS.address, 1, 7) == SLVERR
+    assert await locked(bench) == 0
+
+
+async def without_a_lock_status_is_not_written(bench: Bench) -> None:
+    assert await bench.bus.write(STATUS.address, 1) == SLVERR
+    assert await locked(bench) == 0
+    assert set(await bench.load(4, bench.words())) == {OKAY}
+
+
+@pytest.mark.parametrize("protected", [False, True])
+@pytest.mark.parametrize(
+    "scenario",
+    [nothing_is_loaded_until_a_reset, a_load_is_ended_and_not_locked, a_write_with_too_few_bytes_does_not_lock],
+)
+def test_with_a_lock(scenario: Scenario, protected: bool) -> None:
+    benched(scenario, lock=True, protected=protected)
+
+
+def test_without_a_lock() -> None:
+    benched(without_a_lock_status_is_not_written)
+    assert "locked" not in dict(ReloadPort(3).signature.members)
+
+
+def test_only_a_core_with_a_lock_has_it_in_its_registers() -> None:
+    plain, locking = (registers_of(protected=True, lock=lock) for lock in (False, True))
+    assert [r.address for r in plain] == [r.address for r in locking]
+    assert [r.name for r, other in zip(plain, locking, strict=True) if r != other] == ["STATUS"]
+    assert locking[3].writes
+    assert not plain[3].writes

@@ -16,6 +16,7 @@ class ReloadableCore:
     def __init__(self, datapath: Datapath, design: int, words: int, sets: Mapping[int, Datapath]) -> None:
         self.core, self.sets = IntegerCore(datapath), sets
         self.corrupt = 0
+        self.has_lock = self.locked = False
         self._words = words
         self._loaded: list[int] | None = None
         self._crc = 0
@@ -25,18 +26,24 @@ class ReloadableCore:
 
     def reset(self) -> None:
         self.core.reset()
+        self.locked = False
 
     def feed(self, channel: int, samples: bytes) -> bytes:
         return self.core.feed(channel, samples)
 
     def read(self, address: int) -> int | None:
         if address == STATUS.address:
-            return int(self._loaded is not None) | self._outcome << 4
+            return int(self._loaded is not None) | self.locked << 3 | self._outcome << 4
         if address == CRC.address:
             return self._crc
         return self._registers.get(address)
 
     def write(self, address: int, word: int) -> bool:
+        if address == STATUS.address and self.has_lock and self._loaded is None:
+            self.locked = True
+            return True
+        if self.locked:
+            return False
         if address == VERSION.address:
             self._loaded = [word]
         elif address == DATA.address and self._loaded is not None and len(self._loaded) <= self._words:

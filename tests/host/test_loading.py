@@ -83,6 +83,30 @@ def test_a_file_that_is_no_set(tmp_path) -> None:  # type: ignore[no-untyped-def
         client.load(tmp_path / "none.json")
 
 
+def test_a_locked_board_takes_no_set_until_a_reset() -> None:
+    made, other, proven = swap()
+    client, core = board()
+    core.has_lock = True
+    client.lock()
+    with pytest.raises(
+        sosmith.RefusedError, match=r"^the board must be reset before a set can be loaded, for it is locked$"
+    ):
+        client.load(proven)
+    codes = np.random.default_rng(1).integers(-512, 512, (100, 1))
+    assert np.array_equal(client.run_codes(codes).codes, made.datapath.compute(codes))
+    core.reset()
+    assert client.load(proven).version == 7
+    core.reset()
+    assert np.array_equal(client.run_codes(codes).codes, other.compute(codes))
+
+
+def test_a_core_without_a_lock_refuses_it() -> None:
+    client, core = board()
+    with pytest.raises(sosmith.RefusedError):
+        client.lock()
+    assert not core.locked
+
+
 def test_what_is_active_is_read_back(monkeypatch: pytest.MonkeyPatch) -> None:
     _, _, proven = swap()
     client, core = board()

@@ -14,9 +14,7 @@ from benchmarks.qualification.requirements import malfunctions, requirements
 
 DOCUMENT = (Path(__file__).parents[2] / "docs" / "assurance.md").read_text(encoding="utf-8")
 ABOUT = {"Python": "3"}
-TOLD = (
-    json.dumps({"test": "tests/hdl/test_reload_lock.py::test_it", "outcome": "passed", "reason": ""}).encode() + b"\n"
-)
+TOLD = json.dumps({"test": "tests/formal/test_lock.py::test_it", "outcome": "passed", "reason": ""}).encode() + b"\n"
 
 
 def example(name: str, folder: Path) -> Mapping[str, Any]:
@@ -53,7 +51,7 @@ def test_the_dossier_has_a_file_for_each_line(tmp_path: Path) -> None:
     table = rows(tmp_path / "answers.csv")
     assert {row[3] for row in table[1:]} == {"there"}
     assert len(table) == 1 + len(answers.lines(DOCUMENT))
-    assert rows(tmp_path / "requirements" / "R19.csv")[1:] == [["tests/hdl/test_reload_lock.py::test_it", "passed", ""]]
+    assert rows(tmp_path / "requirements" / "R19.csv")[1:] == [["tests/formal/test_lock.py::test_it", "passed", ""]]
     assert rows(tmp_path / "requirements" / "R01.csv")[1:] == []
     assert rows(tmp_path / "examples.csv")[1:] == [
         [name, "arithmetic", "proven", "the bound follows"] for name in answers.EXAMPLES

@@ -20,9 +20,9 @@ from sosmith.verify.certificate_file import Certificate as Entries
 from sosmith.verify.certificate_file import certificate_text, read_certificate
 from sosmith.verify.multirate.cic import DecimatorVerdict
 from sosmith.verify.parallel.check import HardwareVerdict
+from sosmith.verify.parallel.smt.obligations import obligations
 from sosmith.verify.program.check import ProgramVerdict
 from sosmith.verify.rocq.check import RocqVerdict, check_in_rocq, rocq_texts
-from sosmith.verify.smt.obligations import obligations
 from sosmith.verify.specified.stated_specification import Agreement
 from sosmith.verify.verdict.door import Stated, judge
 from sosmith.verify.verdict.generated_files import about_of, ascii_text, check_texts, content_of

@@ -7,13 +7,13 @@ from functools import cache
 
 import pytest
 from tests.verify.parallel.cores import Made, looking_ahead, made, specified
+from tests.verify.parallel.smt.solvers import NAMES, answer
 from tests.verify.small_specifications import NARROW, STEADY
-from tests.verify.smt.solvers import NAMES, answer
 
 from sosmith.gen.core import design_core
 from sosmith.verify.graph import RejectedError
 from sosmith.verify.parallel.check import check_hardware
-from sosmith.verify.smt.obligations import obligations
+from sosmith.verify.parallel.smt.obligations import obligations
 
 PARALLEL = 'hardware.architecture = "parallel"\n'
 

@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 
 from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.parallel.netlist import Netlist
+from sosmith.verify.parallel.smt.script import Script, Term, chosen, cut, joined, number, sized
 from sosmith.verify.reader.syntax import Bits, Choice, Expression, Joined, Load, Number, Operator, Statement
 from sosmith.verify.reader.widths import is_signed
-from sosmith.verify.smt.script import Script, Term, chosen, cut, joined, number, sized
 
 _CONTEXT = {"+": "bvadd", "-": "bvsub", "*": "bvmul", "&": "bvand", "|": "bvor", "^": "bvxor"}
 _COMPARED = {"<": "lt", ">": "gt", "<=": "le", ">=": "ge"}

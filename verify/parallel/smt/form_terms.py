@@ -8,8 +8,8 @@ from math import lcm
 
 from sosmith.verify.graph import require
 from sosmith.verify.parallel.forms import Forms
+from sosmith.verify.parallel.smt.script import Script, Term, bits_for, number, sized
 from sosmith.verify.program.normal_form import Form, Monomial
-from sosmith.verify.smt.script import Script, Term, bits_for, number, sized
 
 
 class FormTerms:

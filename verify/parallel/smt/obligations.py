@@ -25,13 +25,13 @@ from sosmith.verify.parallel.forms import Forms
 from sosmith.verify.parallel.graph_codes import GraphCodes
 from sosmith.verify.parallel.netlist import Netlist, flattened
 from sosmith.verify.parallel.pipeline import Pipeline
+from sosmith.verify.parallel.smt.form_terms import FormTerms
+from sosmith.verify.parallel.smt.script import Script, Term, cut, number
+from sosmith.verify.parallel.smt.words import Words
 from sosmith.verify.parallel.split import split
 from sosmith.verify.program.normal_form import Form
 from sosmith.verify.reader.recursion import deep_recursion
 from sosmith.verify.reader.source import read_modules
-from sosmith.verify.smt.form_terms import FormTerms
-from sosmith.verify.smt.script import Script, Term, cut, number
-from sosmith.verify.smt.words import Words
 
 Goal = tuple[Case, int, Form | None]
 """A case of the control signals, the position of the sample, and what is taken over; None if nothing is."""
