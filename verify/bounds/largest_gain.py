@@ -6,10 +6,11 @@ a quotient of polynomials in x, and ``sin(pi p)**2`` is ``(1 - x) / 2``. So the 
 
     ((1 - x) / 2)**N P(x) / Q(x)  <=  G**2 (R sin(pi (k - p) / R))**(2 N)
 
-and what comes from ``k + p`` is less. Of what folds into the pass band, p goes up to its upper edge alone. On an interval of x, the left side is at most the largest quotient of the two
-polynomials' Bernstein coefficients, which are exact, if all of those of the denominator are positive. The right side
-falls with p, and is the smallest at the interval's lower end. Intervals are halved until this proves G. Another
-quotient, in the interval's middle, disproves it where it is too small.
+and what comes from ``k + p`` is less. Of what folds into the pass band, p goes up to its upper edge alone. On an
+interval of x, the left side is at most the largest quotient of the two polynomials' Bernstein coefficients, which are
+exact, if all of those of the denominator are positive. The right side falls with p, and is the smallest at the
+interval's lower end. Intervals are halved until this proves G. Another quotient, in the interval's middle, disproves it
+where it is too small.
 """
 
 from __future__ import annotations
