@@ -184,7 +184,10 @@ def _cosine_below(frequency: Fraction) -> Fraction:
     if frequency == Fraction(1, 2):
         return Fraction(-1)
     scaled = arb.cos_pi_fmpq(_fmpq(2 * frequency)) * arb(2) ** 64
-    return Fraction(int(scaled.lower().floor().unique_fmpz()), 1 << 64)
+    whole = scaled.lower().floor().unique_fmpz()
+    if whole is None:
+        raise UndecidedError("the end of the pass band")
+    return Fraction(int(whole), 1 << 64)
 
 
 def _square(taps: Sequence[Fraction]) -> fmpq_poly:
