@@ -174,9 +174,9 @@ class DecimationEntry(_Part):
     `stages` integrators and combs of `width` bits; the rounding to nearest behind them drops `dropped` bits. The first
     result is that of the first sample, as if that had been there for ever. `correction` is the weight g of the ideal
     section ``1 + g - g / z``, the last one. `edge` is the upper edge of the pass band, in units of the rate of the
-    input, and `aliasing` bounds the gain of what folds into it from around each multiple of the lower rate. `passing` are
-    the largest gains to the output of what folds into it from there, the filter's own gain included, and `bands` those
-    from the whole band around each of them. It takes the only input, or what a `calibration` makes of the inputs.
+    input, and `aliasing` bounds the gain of what folds into it from around each multiple of the lower rate. `passing`
+    are the largest gains to the output of what folds into it from there, the filter's own gain included, and `bands`
+    those from the whole band around each of them. It takes the only input, or what a `calibration` makes of the inputs.
     """
 
     factor: Annotated[int, Field(strict=True, ge=2, le=1 << 10)]

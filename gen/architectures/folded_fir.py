@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 from sosmith.gen.architectures.architecture import Architecture
 from sosmith.gen.architectures.blocks import Blocks
+from sosmith.gen.architectures.fir_steps import FewSteps
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.specification.combinations import FOLDED
-from sosmith.gen.word_lengths.fir_steps import FewSteps
 from sosmith.gen.word_lengths.objective import Objective
 from sosmith.hdl.plan.tap_steps import TapSteps, tap_steps
 from sosmith.model.dataflow.downsampler import Downsampler
@@ -70,8 +70,7 @@ class FoldedFir(Architecture):
 
     @property
     def _cycles_per_sample(self) -> int:
-        clocks = self.plan.cycles_per_result(self._down.factor, self.channels)
-        return max(clocks, self.plan.last_step + 1 + self.copies_per_result)
+        return self.plan.cycles_per_result(self._down.factor, self.channels)
 
     @property
     def _cleared_cycles(self) -> int:

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 from sosmith.gen.architectures.architecture import Architecture
+from sosmith.gen.architectures.folded_fir import FoldedFir
 from sosmith.gen.estimate.graphs import of_pipelined
 from sosmith.gen.estimate.memories import of_memory
 from sosmith.gen.estimate.online import of_units
@@ -18,6 +19,7 @@ from sosmith.gen.estimate.quantities import (
     of_output_buffer,
     tree,
 )
+from sosmith.gen.estimate.rings import of_rings
 from sosmith.gen.fpga.boards import Device
 from sosmith.hdl.plan.look_ahead import plans
 from sosmith.hdl.plan.streams import channel_bits
@@ -31,6 +33,8 @@ def quantities_of(architecture: Architecture, device: Device) -> Quantities:
     """Count what a core is made of on a device, with its decimator and what stands before that."""
     if architecture.online is not None:
         made = of_units(architecture, device)
+    elif isinstance(architecture, FoldedFir):
+        made = of_rings(architecture, device)
     elif architecture.program is not None:
         made = of_program(architecture, device)
     else:

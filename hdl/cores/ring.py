@@ -259,7 +259,7 @@ class RingCore(Shell):
         alone = pairs and any(step.second is None for step in plan.steps)
         differs = any(step.sign < 0 for step in plan.steps)
         bits = (plan.words - 1).bit_length()
-        factor_bits = 1 + max(_bits(step.coefficient) for step in plan.steps)
+        factor_bits = plan.factor_bits
         layout = data.StructLayout(
             {
                 "first": bits,
@@ -281,7 +281,7 @@ class RingCore(Shell):
         m.d.comb += [reader.addr.eq(self._step), reader.en.eq(1)]
         row = data.View(layout, reader.data)
         taps = [self._ring(m, name, getattr(row, name), write) for name in ("first", "second")[: 1 + pairs]]
-        pair = Signal(signed(port.bits + 1 + (not port.signed)), name="pair", reset_less=True)
+        pair = Signal(signed(plan.pair_bits(port)), name="pair", reset_less=True)
         first, second = taps[0], taps[-1]
         other: Value = Mux(row.alone, 0, second) if alone else second
         both: Value = first if not pairs else Mux(row.minus, first - other, first + other) if differs else first + other

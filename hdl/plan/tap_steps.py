@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.port import Port
 from sosmith.model.sections.fir import FirSection, Form
 
 PIPELINE = 4
@@ -86,6 +87,17 @@ class TapSteps:
     def pairs(self) -> bool:
         """Whether any step adds two samples."""
         return any(step.second is not None for step in self.steps)
+
+    @property
+    def factor_bits(self) -> int:
+        """Bits of a coefficient, with its sign."""
+        sizes = ((-c - 1 if c < 0 else c).bit_length() for c in (step.coefficient for step in self.steps))
+        return 1 + max(sizes)
+
+    @staticmethod
+    def pair_bits(port: Port) -> int:
+        """Bits of a sum or a difference of two samples, with its sign."""
+        return port.bits + 1 + (not port.signed)
 
     @property
     def words(self) -> int:

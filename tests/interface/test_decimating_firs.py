@@ -1,4 +1,4 @@
-"""Random FIR filters that decimate: no error beyond the bound, hardware equal to its model, certificates and files proven.
+"""Random FIR filters that decimate: within the bound, hardware equal to its model, certificates and files proven.
 
 The exact results are those of the definition, a sum of taps times samples at every N-th sample, in rational arithmetic.
 """

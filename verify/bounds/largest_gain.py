@@ -6,10 +6,11 @@ a quotient of polynomials in x, and ``sin(pi p)**2`` is ``(1 - x) / 2``. So the 
 
     ((1 - x) / 2)**N P(x) / Q(x)  <=  G**2 (R sin(pi (k - p) / R))**(2 N)
 
-and what comes from ``k + p`` is less. Of what folds into the pass band, p goes up to its upper edge alone. On an interval of x, the left side is at most the largest quotient of the two
-polynomials' Bernstein coefficients, which are exact, if all of those of the denominator are positive. The right side
-falls with p, and is the smallest at the interval's lower end. Intervals are halved until this proves G. Another
-quotient, in the interval's middle, disproves it where it is too small.
+and what comes from ``k + p`` is less. Of what folds into the pass band, p goes up to its upper edge alone. On an
+interval of x, the left side is at most the largest quotient of the two polynomials' Bernstein coefficients, which are
+exact, if all of those of the denominator are positive. The right side falls with p, and is the smallest at the
+interval's lower end. Intervals are halved until this proves G. Another quotient, in the interval's middle, disproves it
+where it is too small.
 """
 
 from __future__ import annotations
@@ -183,7 +184,10 @@ def _cosine_below(frequency: Fraction) -> Fraction:
     if frequency == Fraction(1, 2):
         return Fraction(-1)
     scaled = arb.cos_pi_fmpq(_fmpq(2 * frequency)) * arb(2) ** 64
-    return Fraction(int(scaled.lower().floor().unique_fmpz()), 1 << 64)
+    whole = scaled.lower().floor().unique_fmpz()
+    if whole is None:
+        raise UndecidedError("the end of the pass band")
+    return Fraction(int(whole), 1 << 64)
 
 
 def _square(taps: Sequence[Fraction]) -> fmpq_poly:

@@ -16,12 +16,12 @@ from sosmith.verify.decimation import at_lower_rate, behind_decimator, calibrati
 from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.multirate.cic import DecimatorVerdict, check_decimator
 from sosmith.verify.multirate.parallel_core import check_ahead, check_behind
+from sosmith.verify.multirate.ring.check import check_rings
 from sosmith.verify.parallel.check import HardwareVerdict, check_hardware
 from sosmith.verify.program.check import ProgramVerdict, check_program
 from sosmith.verify.reader.rtlil.check import check_rtlil
 from sosmith.verify.reader.rtlil.kept import check_kept
 from sosmith.verify.reader.source import read_source
-from sosmith.verify.ring.check import check_rings
 from sosmith.verify.specified.calibration_fit import Refit, check_fit
 from sosmith.verify.specified.stated_specification import Agreement, check_specification
 from sosmith.verify.specified.words import words_of

@@ -14,9 +14,9 @@ from typing import Any
 
 from sosmith.verify.certificate_file import Certificate, DownsamplingEntry, ItemEntry, PortEntry, StreamEntry
 from sosmith.verify.graph import RejectedError, require
+from sosmith.verify.multirate.ring.verdict import RingVerdict
 from sosmith.verify.parallel.check import HardwareVerdict
 from sosmith.verify.program.check import ProgramVerdict
-from sosmith.verify.ring.verdict import RingVerdict
 from sosmith.verify.specified.words import table_of, words_of
 from sosmith.verify.unit.check import UnitVerdict
 from sosmith.verify.verdict.derived import (

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 
 from sosmith.gen.architectures.architecture import Architecture
+from sosmith.gen.architectures.folded_fir import FoldedFir
 from sosmith.gen.calibration.fit import Fit, read_measurements
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.estimate.estimate import Estimate
@@ -192,6 +193,13 @@ def _hardware_rows(architecture: Architecture) -> list[tuple[str, str]]:
     """Return the resources of the hardware, before synthesis."""
     program, cost = architecture.program, architecture.cost
     latency = ("latency", f"{architecture.latency_cycles:,} clocks")
+    if isinstance(architecture, FoldedFir):
+        port, plan = architecture.datapath.inputs[0], architecture.plan
+        return [
+            latency,
+            ("multipliers", f"1 of {plan.pair_bits(port)} x {plan.factor_bits}, {len(plan.steps)} steps for a result"),
+            ("memory", f"{plan.words:,} samples of {port.bits} bits a channel{', twice' * plan.pairs}"),
+        ]
     if program is None:
         sizes = f"{cost.adder_bits}, {cost.register_bits}"
         return [latency, ("multipliers", cost.multiplier_sizes), ("adder bits, state and register bits", sizes)]

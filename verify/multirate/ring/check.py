@@ -1,7 +1,7 @@
 """Proves that a core which keeps its samples in rings computes every N-th result of a certificate's graphs.
 
 The graphs are those of an FIR filter: all that they remember is samples, and how many there were since the start. The
-core is read from its SystemVerilog, and its clocks are followed one by one (`sosmith.verify.ring.machine`)::
+core is read from its SystemVerilog, and its clocks are followed one by one (`sosmith.verify.multirate.ring.machine`)::
 
     reset --> the ring is filled --> waits for a sample --> takes it --> sums its products --> gives the result --+
                                        ^     ^                 | brings none                                      |
@@ -30,6 +30,8 @@ from typing import NamedTuple
 
 from sosmith.verify.certificate_file import Certificate, ItemEntry
 from sosmith.verify.graph import RejectedError, require
+from sosmith.verify.multirate.ring.machine import UNKNOWN, Machine, State
+from sosmith.verify.multirate.ring.verdict import RingVerdict
 from sosmith.verify.parallel.check import CLOCK, FLAGS, OUTPUT, OUTPUT_DEST
 from sosmith.verify.parallel.control import RESET, SINK, SOURCE
 from sosmith.verify.parallel.dependence import Dependence
@@ -42,8 +44,6 @@ from sosmith.verify.program.normal_form import Form, constant, plus
 from sosmith.verify.progress import Progress
 from sosmith.verify.reader.recursion import deep_recursion
 from sosmith.verify.reader.source import read_source
-from sosmith.verify.ring.machine import UNKNOWN, Machine, State
-from sosmith.verify.ring.verdict import RingVerdict
 
 DATA, DEST, READY, VALID = "s_axis_tdata", "s_axis_tdest", "s_axis_tready", "m_axis_tvalid"
 _RINGS, _CONTROL = ("ring_first_memory", "ring_second_memory"), "control_memory"

@@ -1,0 +1,137 @@
+"""What is proven of an FIR filter that decimates, and that whatever is changed in its SystemVerilog is found."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from typing import NamedTuple
+
+import pytest
+
+import sosmith
+from sosmith.gen.output.certificate import about, certificate
+from sosmith.gen.output.verilog import core_verilog
+from sosmith.verify.certificate_file import Certificate, DownsamplingEntry, ItemEntry
+from sosmith.verify.graph import RejectedError
+from sosmith.verify.multirate.ring.check import check_rings
+from sosmith.verify.verification import verify
+
+
+class Made(NamedTuple):
+    """A core with its certificate."""
+
+    design: sosmith.Design
+    text: str
+    certificate: Certificate
+    item: ItemEntry
+
+
+@cache
+def made(channels: int = 1, start: str = "zero", *, hold: bool = False) -> Made:
+    """Make a small filter that decimates by 3, with a pair of taps, one that is subtracted, and one alone."""
+    tree = {
+        "name": "little",
+        "sample_rate": 1000.0,
+        "channels": channels,
+        "input": {"x": {"bits": 7, "range": [-1.0, 1.0], "signed": True}},
+        "filter": {"taps": [0.3, 0.17, 0.0, -0.17, 0.3], "decimate": 3, "hold": hold},
+        "output": {"bits": 7, "range": [-0.5, 0.5], "signed": True},
+        "hardware": {"start": start, "clock": 1e6},
+    }
+    design = sosmith.design(sosmith.Specification.load(tree))
+    core = design.core
+    text = core_verilog(core)
+    own = certificate(core.quantized, core.spec.max_error, about(core, {}))
+    assert own.about is not None
+    assert own.about.item is not None
+    return Made(design, text, own, own.about.item)
+
+
+def check(core: Made, text: str = "") -> None:
+    check_rings(text or core.text, core.certificate, core.item)
+
+
+@pytest.mark.parametrize("hold", [False, True])
+@pytest.mark.parametrize("start", ["zero", "steady"])
+@pytest.mark.parametrize("channels", [1, 3])
+def test_clocks_are_those_of_the_plan(channels: int, start: str, hold: bool) -> None:
+    core = made(channels, start, hold=hold)
+    verdict = check_rings(core.text, core.certificate, core.item)
+    architecture = core.design.core.architecture
+    assert verdict.clearing == architecture.reset_cycles
+    assert verdict.latency == architecture.latency_cycles
+    assert verdict.result_clocks == architecture.cycles_per_result
+    assert verdict.interval == architecture.cycles_per_sample
+    assert verify(core.certificate).bound == core.certificate.claims.bound
+
+
+_ONE = {
+    "the place of a tap": (r"(place_first \} = pointer) \+", r"\1 -"),
+    "the place of a sample": (r"(pointer_plus_1_2 = pointer) \+", r"\1 -"),
+    "how a ring is filled": (r"(pointer_plus_1 = pointer) \+", r"\1 -"),
+    "sum for difference": (r"(\$signed\(ring_first_read_data\)) - (\$signed)", r"\1 + \2"),
+    "a sum that begins late": (r"step == 3'h4", "step == 3'h5"),
+    "an early end": (r"step == 3'h6", "step == 3'h5"),
+    "half a step": (r"16'h0080 : total", "16'h0040 : total"),
+    "a result that is overwritten": (r"(assign code_set = ends) & result_leaves", r"\1 & ends"),
+    "a result that is lost": (r"(assign result_leaves = not_m_axis_tvalid) \| leaves", r"\1 | ends"),
+    "a result that does not stay": (r"(assign leaves = m_axis_tvalid) & m_axis_tready", r"\1 & m_axis_tvalid"),
+    "a rail that is forgotten": (r"rail_now = rail \|", "rail_now = rail_now_part |"),
+    "a rail that stays": (r"rail_next = rail_now & any_phase", "rail_next = rail_now & rail_now"),
+    "a phase": (r"phase == 2'h2", "phase == 2'h3"),
+    "a limit": (r"above \? 8'h3f", "above ? 8'h3e"),
+    "a count": (r"counted < 3'h5;\n  assign counted_next", "counted < 3'h4;\n  assign counted_next"),
+    "samples while it is filled": (
+        r"s_axis_tready = not_running & not_filling",
+        "s_axis_tready = not_running & not_running",
+    ),
+    "a reset that does less": (
+        r"ends_and_result_leaves, not_aresetn",
+        "ends_and_result_leaves, ends_and_result_leaves",
+    ),
+    "a first value": (r"reg filling = 1'h1", "reg filling = 1'h0"),
+}
+
+
+def changed(text: str, pattern: str, by: str) -> str:
+    """Change the first match of a pattern."""
+    other, count = re.subn(pattern, by, text, count=1)
+    assert count == 1, f"there must be {pattern} in the text"
+    return other
+
+
+@pytest.mark.parametrize(
+    ("row", "bit"), [(0, 0), (0, 3), (1, 2), (1, 5), (1, 6), (2, 6), (2, 7), (2, 15), (3, 7), (3, 14)]
+)
+def test_no_bit_of_a_step_is_free(row: int, bit: int) -> None:
+    """Offsets, sign and coefficient of a step, which stand in three rows."""
+    core = made()
+    at, width, value = re.findall(r"steps_memory\[(\d+)\] = (\d+)'h([0-9a-f]+);", core.text)[row]
+    wrong = int(value, 16) ^ 1 << bit
+    text = core.text.replace(f"steps_memory[{at}] = {width}'h{value};", f"steps_memory[{at}] = {width}'h{wrong:04x};")
+    assert text != core.text
+    with pytest.raises(RejectedError):
+        check(core, text)
+
+
+@pytest.mark.parametrize(("pattern", "by"), _ONE.values(), ids=_ONE)
+def test_what_is_changed_is_found(pattern: str, by: str) -> None:
+    core = made()
+    text = changed(core.text, pattern, by)
+    with pytest.raises(RejectedError):
+        check(core, text)
+
+
+def test_a_certificate_that_says_otherwise() -> None:
+    core = made()
+    for factor in (2, 4):
+        other = core.certificate.model_copy(update={"downsampling": DownsamplingEntry(factor=factor, filled=0)})
+        with pytest.raises(RejectedError):
+            check_rings(core.text, other, core.item)
+    filled = core.certificate.model_copy(update={"downsampling": DownsamplingEntry(factor=3, filled=5)})
+    with pytest.raises(RejectedError, match=r"must be filled before the first sample counts|must "):
+        check_rings(core.text, filled, core.item)
+    steady = made(start="steady")
+    short = steady.certificate.model_copy(update={"downsampling": DownsamplingEntry(factor=3, filled=3)})
+    with pytest.raises(RejectedError, match=r"^a filter that decimates must be filled 4 times, not 3$"):
+        verify(short)
