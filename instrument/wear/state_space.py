@@ -34,7 +34,7 @@ KEPT = 32
 LOOK_BACK = 14.0
 """Days after which something that happened is told no more, and hypotheses that differ in it are merged."""
 
-TOLD = 0.65
+TOLD = 0.7
 """Probability from which something that happened to a wheel is told, whatever it was: it is named by the likeliest. In
 days in which nothing happens it is reached less than once in 1,000 (`python -m benchmarks.days`)."""
 
