@@ -63,8 +63,8 @@ class Wheel:
     ----------
     true, double, uncertainty : ndarray, shape (days,)
         Clearance, reading in double precision, and standard uncertainty of what is new each day.
-    shared : float
-        Standard uncertainty that the readings of all days share.
+    shared : ndarray, shape (days,)
+        Standard uncertainty by what the days share, the sensor's deviations: it differs with the temperature.
     codes : ndarray, shape (samples, days, 2)
         What the hardware took.
     sets : list of Datapath
@@ -76,7 +76,7 @@ class Wheel:
     true: Values
     double: Values
     uncertainty: Values
-    shared: float
+    shared: Values
     codes: npt.NDArray[np.int64]
     sets: list[Datapath]
     refused: int
@@ -128,7 +128,7 @@ def in_service(
         true=true,
         double=np.array(double),
         uncertainty=np.array(uncertainty),
-        shared=float(np.mean(shared)),
+        shared=np.array(shared),
         codes=np.stack(taken, axis=1),
         sets=sets,
         refused=refused,
@@ -214,14 +214,17 @@ def judged(wheels: Sequence[Wheel], read: Values, seed: int) -> dict[str, dict[s
     """Return accuracy in %, rms in mm and the share of intervals that hold, of each way to use readings (2, days)."""
     true = np.array([wheel.true for wheel in wheels])
     spread = np.array([wheel.uncertainty for wheel in wheels])
-    shared = np.array([[wheel.shared] for wheel in wheels])
+    shared = np.array([wheel.shared for wheel in wheels])
     total = true.sum(axis=0) + streams(seed, "service")("sum").normal(0.0, SUM_KNOWN_TO, DAYS)
     whole = np.hypot(spread, shared)
     found = {"readings": _of(read, true, np.abs(read - true) <= NORMAL * whole)}
     share = whole**2 / ((whole**2).sum(axis=0) + SUM_KNOWN_TO**2)
     summed = read + share * (total - read.sum(axis=0))
     found["sum"] = _of(summed, true, np.abs(summed - true) <= NORMAL * whole * np.sqrt(1 - share))
-    model = WearModel(shared=float(np.mean(shared)))
+    # The filter takes all days to share alike; what a day has beyond that, by its temperature, is new to it.
+    alike = float(np.sqrt(np.mean(shared**2)))
+    spread = np.sqrt(spread**2 + np.maximum(shared**2 - alike**2, 0.0))
+    model = WearModel(shared=alike)
     for name, known in (("filter", None), ("filter and sum", total)):
         days = [
             DayReading(

@@ -34,7 +34,7 @@ KEPT = 32
 LOOK_BACK = 14.0
 """Days after which something that happened is told no more, and hypotheses that differ in it are merged."""
 
-TOLD = 0.6
+TOLD = 0.7
 """Probability from which something that happened to a wheel is told, whatever it was: it is named by the likeliest. In
 days in which nothing happens it is reached less than once in 1,000 (`python -m benchmarks.days`)."""
 
@@ -94,7 +94,7 @@ class WearModel:
     rate_change: float = 0.06
     rate_changes: float = 1 / 200
     sensor_change: float = 0.3
-    sensor_changes: float = 1 / 100
+    sensor_changes: float = 1 / 500
     off: float = 5.0
     offs: float = 1 / 200
     shared: float = 0.0

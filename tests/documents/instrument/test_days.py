@@ -1,52 +1,81 @@
 """The page of the day's own error is what the record gives, and the record has what is claimed of it."""
 
 import json
+from typing import Any
 
 import pytest
-from benchmarks import calibration_coverage, day_advice, day_bench, day_service, days
+from benchmarks import calibration_coverage, day_advice, day_alarms, day_bench, day_service, days
 from benchmarks.day_page import GOALS, SERVICE_GOALS, page
 
 
 @pytest.fixture(scope="module")
-def record() -> dict[str, list[dict[str, object]]]:
-    found: dict[str, list[dict[str, object]]] = json.loads(days.RECORD.read_text(encoding="utf-8"))
+def record() -> dict[str, Any]:
+    found: dict[str, Any] = json.loads(days.RECORD.read_text(encoding="utf-8"))
     return found
 
 
-def test_the_page_is_what_the_record_gives(record: dict[str, list[dict[str, object]]]) -> None:
+def test_the_page_is_what_the_record_gives(record: dict[str, Any]) -> None:
     assert days.PAGE.read_text(encoding="utf-8") == page(record)
 
 
-def test_every_part_was_measured_in_full(record: dict[str, list[dict[str, object]]]) -> None:
+def test_every_part_was_measured_in_full(record: dict[str, Any]) -> None:
     assert list(record) == list(days.FIRST_SEEDS)
     bench, service = record["bench"], record["service"]
     assert len(bench) == len(day_bench.RUNS) * len(day_bench.TARGETS)
     assert {row["count"] for row in bench} == {days.SEEDS}
     assert len(service) == 2 * len(day_service.WAYS)
-    assert {(row["count"], row["axles"]) for row in service} == {(days.SEEDS, day_service.THROUGH_HARDWARE)}
+    assert {row["count"] for row in service} == {days.SEEDS}
     assert [row["case"] for row in record["coverage"]] == [case.name for case in calibration_coverage.CASES]
     assert len(record["advice"]) == len(day_advice.CASES) * day_advice.EACH
 
 
-def test_what_was_wanted_of_targets_and_filter_is_reached(record: dict[str, list[dict[str, object]]]) -> None:
+def test_what_was_wanted_of_targets_and_filter_is_reached(record: dict[str, Any]) -> None:
     for row in record["bench"]:
-        goal = GOALS.get((str(row["run"]), str(row["targets"])), 0.0)
+        goal = GOALS.get((row["run"], row["targets"]), 0.0)
         assert row["refused"] == 0
-        for by in ("accuracy", "hardware"):
-            assert float(str(row[by])) >= goal
+        assert min(row["accuracy"], row["hardware"]) >= goal
     for row in record["service"]:
         assert row["refused"] == 0
-        assert float(str(row["off"])) < 0.01
+        assert row["off"] < 0.01
         if row["way"] == "filter":
-            assert float(str(row["accuracy"])) >= SERVICE_GOALS[bool(row["targets"])]
-            assert 0.93 <= float(str(row["inside"])) <= 0.98
+            assert min(row["accuracy"], row["hardware"]) >= SERVICE_GOALS[row["targets"]]
+
+
+def test_intervals_hold_what_they_say_in_double_precision_and_by_the_hardware(record: dict[str, Any]) -> None:
+    """Those of the filter allow for more than the emulated sensors do, as the page says, and may hold more."""
+    for row in record["bench"] + record["service"]:
+        for by in ("inside", "inside_hardware"):
+            assert row[by] >= 0.93, row
+            assert row[by] <= 0.98 or str(row.get("way")).startswith("filter"), row
+
+
+def test_no_sensor_fails_silently_but_what_the_page_names(record: dict[str, Any]) -> None:
+    low = [row for row in record["coverage"] if row["silent"] and min(row["inside"]) < calibration_coverage.ENOUGH]
+    text = " ".join(days.PAGE.read_text(encoding="utf-8").split())
+    for row in low:
+        assert row["case"] == "voltage steps by -0.3 V"
+        assert f"{row['case']} ({row['silent']} of {row['count']})" in text
+
+
+def test_happenings_are_told_in_time_and_seldom_without_a_reason(record: dict[str, Any]) -> None:
+    alarms = record["alarms"]
+    for row in alarms["quiet"]:
+        assert row["false"] <= day_alarms.ALLOWED * row["days"]
+    for row in alarms["happenings"]:
+        if row["axle"] or row["error"] < 0.1:
+            assert row["told"] >= 0.95 * row["records"], row
+    for row in alarms["limit"]:
+        if row["offset"] == 0.25:
+            assert row["risks"]["0.05"] > 0.95
 
 
 def test_a_part_is_summed_over_its_seeds() -> None:
     rows = [
-        {"run": "a", "accuracy": value, "hardware": value + 0.01, "order": 2, "bound": 0.1 * value, "seed": k}
+        {"targets": "three", "accuracy": value, "hardware": value, "order": 2, "bound": 0.1 * value, "seed": k}
+        | {"days": 4, "refused": k, "off": 0.01 * k}
         for k, value in enumerate((1.0, 3.0))
     ]
-    (one,) = days.summed(rows, ("run",))
-    assert (one["run"], one["count"], one["accuracy"], one["worst"], one["off"]) == ("a", 2, 2.0, 1.0, 0.01)
-    assert (one["accuracy_error"], one["bound"], one["refused"]) == (1.0, 0.30000000000000004, 0)
+    (one,) = days.summed(rows, ("targets",))
+    assert (one["targets"], one["count"], one["accuracy"], one["worst"]) == ("three", 2, 2.0, 1.0)
+    assert (one["accuracy_error"], one["bound"], one["refused"], one["sets"]) == (1.0, 0.30000000000000004, 1, 8)
+    assert one["off"] == 0.01

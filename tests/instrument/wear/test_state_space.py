@@ -200,11 +200,11 @@ def test_impossible_days_are_refused(days: list[DayReading], sentence: str) -> N
         ({"shared": -1.0}, "shared must be 0 or more, not -1"),
         (
             {"jumps": 0.5},
-            "jumps, rate_changes, sensor_changes and offs must be above 0 and below 0.5 a day together, not 0.52",
+            "jumps, rate_changes, sensor_changes and offs must be above 0 and below 0.5 a day together, not 0.512",
         ),
         (
             {"offs": 0.0},
-            "jumps, rate_changes, sensor_changes and offs must be above 0 and below 0.5 a day together, not 0.025",
+            "jumps, rate_changes, sensor_changes and offs must be above 0 and below 0.5 a day together, not 0.017",
         ),
     ],
 )
