@@ -72,5 +72,5 @@ def test_what_rocq_refused_and_accepted_is_that_of_the_record() -> None:
     edits, designs = record["edits"], record["designs"]
     assert edits["refused"] + edits["no theorem"] == edits["tried"] >= rocq.EDITS
     assert designs["accepted"] == designs["tried"] == len(designs["verdicts"]) >= rocq.DESIGNS
-    words = {word for name in designs["names"] for word in name.replace(",", "").split()}
+    words = {word for name in designs["verdicts"] for word in name.replace(",", "").split()}
     assert words >= {*REALIZATIONS, *FAMILIES, *KINDS}
