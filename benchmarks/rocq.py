@@ -3,7 +3,7 @@
 Of small certificates numbers are edited one by one, at random, and those edits are taken that our verifier rejects:
 Rocq must reject them too, or there must be no theorem. Random designs of all families, kinds and realizations must be
 accepted (`benchmarks.rocq_designs`), each within `--seconds` of processor time. `--edits` and `--random` say how many;
-`--first` goes on with a later draw, and keeps those before it. Seeds are fixed, and of what is not asked for, with 0,
+`--resume` goes on where it was stopped. Seeds are fixed, and of what is not asked for, with 0,
 the record stays. The counts go to benchmarks/rocq.json and into the table of docs/assurance.md. Status 1 if an edit is
 accepted or a design is not. Needs coqc and coqtop.
 """
@@ -19,7 +19,7 @@ import subprocess
 import sys
 from collections import Counter
 from collections.abc import Iterator
-from itertools import zip_longest
+from itertools import islice, zip_longest
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -121,29 +121,24 @@ class Kernel:
         raise EndedError("coqtop must answer, and has ended")
 
 
-def edit_counts(kernel: Kernel, count: int) -> tuple[dict[str, Any], list[str]]:
-    """Try edits that our verifier rejects; return counts, and what Rocq accepted."""
-    counts: Counter[str] = Counter()
+def edit_counts(kernel: Kernel, count: int, *, resume: bool) -> list[str]:
+    """Try edits that our verifier rejects; record the counts, and return what Rocq accepted."""
+    counts = Counter[str](_recorded().get("edits", {}) if resume else {})
     wrong: list[str] = []
     _see_accepted(kernel)
-    for place, new, read in rejected_edits():
-        if counts["tried"] == count:
-            break
-        counts["tried"] += 1
+    for place, new, read in islice(rejected_edits(), counts["tried"], count):
         try:
             made = theorems(read)
+            bounded = any(claim.name == "error_is_bounded" for claim in made.claims)
         except RejectedError:
-            counts["no theorem"] += 1
-            continue
-        if not any(claim.name == "error_is_bounded" for claim in made.claims):
-            counts["no theorem"] += 1
-            continue
-        accepted = kernel.accepts(made)
-        wrong += [f"{'.'.join(map(str, place))} = {new}"] if accepted else []
-        counts["accepted" if accepted else "refused"] += 1
-        print(dict(counts), file=sys.stderr, flush=True)
+            bounded = False
+        accepted = bounded and kernel.accepts(made)
+        wrong += [f"{read.name}: {'.'.join(map(str, place))} = {new}"] if accepted else []
+        counts.update(("tried", "accepted" if accepted else "refused" if bounded else "no theorem"))
+        print(dict(counts), *wrong[-1:], file=sys.stderr, flush=True)
+        _record({"edits": dict(counts)})
     _see_accepted(kernel)
-    return counts, wrong
+    return wrong
 
 
 def rejected_edits() -> Iterator[tuple[PLACE, Any, Certificate]]:
@@ -177,11 +172,10 @@ def _see_accepted(kernel: Kernel) -> None:
             raise RuntimeError(f"the certificate of {certificate.name} must be accepted without an edit")
 
 
-def design_counts(folder: Path, count: int, first: int, seconds: int) -> tuple[dict[str, Any], list[str]]:
-    """Have random designs checked; return counts with the designs by name, and what was not accepted."""
-    kept = _recorded().get("designs", {}).get("verdicts", {}) if first else {}
-    verdicts: dict[str, str] = dict(list(kept.items())[:first])
-    for draw, made in draws(count, first):
+def design_counts(folder: Path, count: int, seconds: int, *, resume: bool) -> list[str]:
+    """Have random designs checked; record the verdicts by name, and return those that were not accepted."""
+    verdicts: dict[str, str] = _recorded().get("designs", {}).get("verdicts", {}) if resume else {}
+    for draw, made in draws(count, len(verdicts)):
         kernel = Kernel(folder, seconds)
         try:
             written = theorems(made)
@@ -195,8 +189,7 @@ def design_counts(folder: Path, count: int, first: int, seconds: int) -> tuple[d
         verdicts[draw.name] = verdict
         print(f"{draw.name}: {verdict}", file=sys.stderr, flush=True)
         _record({"designs": _designs(verdicts)})
-    wrong = [f"{name}: {verdict}" for name, verdict in verdicts.items() if verdict != "accepted"]
-    return _designs(verdicts), wrong
+    return [f"{name}: {verdict}" for name, verdict in verdicts.items() if verdict != "accepted"]
 
 
 def _designs(verdicts: dict[str, str]) -> dict[str, Any]:
@@ -222,19 +215,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--edits", type=int, default=EDITS, help="number of edits")
     parser.add_argument("--random", type=int, default=DESIGNS, help="number of random designs")
-    parser.add_argument("--first", type=int, default=0, help="the first draw that is checked")
+    parser.add_argument("--resume", action="store_true", help="go on behind what the record has")
     parser.add_argument("--seconds", type=int, default=SECONDS, help="processor time for a design")
     chosen = parser.parse_args()
     wrong: list[str] = []
     with TemporaryDirectory() as name:
         folder = Path(name)
         if chosen.edits:
-            made, accepted = edit_counts(Kernel(folder), chosen.edits)
-            _record({"edits": made})
-            wrong += accepted
+            wrong += edit_counts(Kernel(folder), chosen.edits, resume=chosen.resume)
         if chosen.random:
-            _, refused = design_counts(folder, chosen.random, chosen.first, chosen.seconds)
-            wrong += refused
+            wrong += design_counts(folder, chosen.random, chosen.seconds, resume=chosen.resume)
     print("\n".join(wrong))
     print(table(_recorded()), end="")
     sys.exit(bool(wrong))

@@ -2,7 +2,8 @@
 
 Each draw has one of `VARIANTS` (a realization that is asked for, several samples a clock, look-ahead, a decimator, ...)
 and what of families, kinds and starts had the fewest turns so far, among specifications that can be met. Orders go from
-1 to 8, edges from 0.003 of the sample rate on, inputs and outputs from 4 to 24 bits. The seeds are fixed.
+1 to 8, edges from 0.003 of the sample rate on, poles up to 0.999, inputs and outputs from 4 to 24 bits. The seeds are
+fixed.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 from benchmarks.random_designs import random_specification
 
 from sosmith.gen.core import design_core
@@ -26,6 +28,9 @@ from sosmith.verify.certificate_file import Certificate
 
 MAX_ORDER, LOWEST = 8, -2.523
 """Orders, and the power of ten of the lowest edge over the sample rate, 0.003."""
+
+SLOWEST = 0.999
+"""Poles nearer to the unit circle have responses of more than 60,000 samples: theorems, but not in minutes."""
 
 _TRIES = 400
 """Specifications that a draw is chosen from."""
@@ -151,13 +156,20 @@ def _fir_table(rng: random.Random, family: str, kind: str) -> str:
 
 
 def designed(draw: Draw) -> Certificate | None:
-    """Return the certificate of a draw; None if it cannot be met."""
+    """Return the certificate of a draw; None if it cannot be met, or has a pole beyond `SLOWEST`."""
     try:
         spec = from_text(draw.text, Path("random.toml"))
         made = design_core(spec)
     except SosmithError:
         return None
-    return certificate(made.quantized, spec.max_error, online=made.architecture.online)
+    read = certificate(made.quantized, spec.max_error, online=made.architecture.online)
+    return read if slowest_pole(read) < SLOWEST else None
+
+
+def slowest_pole(certificate: Certificate) -> float:
+    """Return the largest magnitude of the exact filter's poles; 0 without poles."""
+    poles = [np.roots([float(value) for value in section.denominator]) for section in certificate.ideal.sections]
+    return max((float(abs(pole)) for each in poles for pole in each), default=0.0)
 
 
 def draws(count: int, first: int = 0) -> Iterator[tuple[Draw, Certificate]]:

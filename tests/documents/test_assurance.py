@@ -71,6 +71,6 @@ def test_what_rocq_refused_and_accepted_is_that_of_the_record() -> None:
     assert rocq.PART.findall(rocq.DOCUMENT.read_text(encoding="utf-8")) == [rocq.table(record)]
     edits, designs = record["edits"], record["designs"]
     assert edits["refused"] + edits["no theorem"] == edits["tried"] >= rocq.EDITS
-    assert designs["accepted"] == designs["tried"] == len(designs["names"]) >= rocq.DESIGNS
-    words = {word for name in designs["names"] for word in name.replace(",", "").split()}
+    assert designs["accepted"] == designs["tried"] == len(designs["verdicts"]) >= rocq.DESIGNS
+    words = {word for name in designs["verdicts"] for word in name.replace(",", "").split()}
     assert words >= {*REALIZATIONS, *FAMILIES, *KINDS}

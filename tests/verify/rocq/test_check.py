@@ -30,9 +30,9 @@ from sosmith.gen.realizations.registry import REALIZATIONS
 from sosmith.model.dataflow.decimator import Decimator
 from sosmith.model.port import Port
 from sosmith.verify.certificate_file import Certificate, certificate_text
-from sosmith.verify.graph import RejectedError
+from sosmith.verify.graph import RejectedError, inputs_of
 from sosmith.verify.rocq.check import GIVEN, check_in_rocq, head, rocq_texts, theorems
-from sosmith.verify.rocq.flat import flattened
+from sosmith.verify.rocq.flat import flattened, used_inputs
 from sosmith.verify.rocq.kernel import ACCEPTED, STANDARD
 
 
@@ -49,6 +49,17 @@ def test_every_code_and_the_error_bound(realization: str, steady: bool, tmp_path
     made = small(realization, steady=steady)
     assert checked(made, tmp_path) <= STANDARD
     assert theorems(made).unchecked == ()
+
+
+@needs_coqc
+@pytest.mark.slow
+def test_a_branch_that_a_section_only_passes_on(tmp_path: Path) -> None:
+    made = small("lattice_wdf", order=5)
+    passed = [
+        stage.name for stage in made.stages if set(stage.outputs) & set(inputs_of(stage)) - set(used_inputs(stage))
+    ]
+    assert passed
+    assert checked(made, tmp_path) <= STANDARD
 
 
 @needs_coqc
