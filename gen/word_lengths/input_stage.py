@@ -200,7 +200,8 @@ def input_stages(
             error = horner_error(coefficients, horner)
             stages = horner.stages
             finest_first.insert(0, InputStage(stages=stages, output=stages[-1].graph.output_ranges[0], error=error))
-            if error <= allowed:
+            # The first one has rows like any other: a program may have no place for products beside finer ones.
+            if error <= allowed and not finer:
                 return tuple(finest_first[:_COARSER])
     raise ShortfallError(
         f"the calibration must keep its error below {float(allowed):.3g} output LSB with {MAX_BITS} fraction bits, "

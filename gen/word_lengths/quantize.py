@@ -65,6 +65,8 @@ class Plan:
         The size that formats are trimmed for.
     quantized : Quantized or None
         The proven design, for a realization without estimates.
+    instead : tuple of Choice
+        Once formats are trimmed, others to fall back on if the whole does not suit.
     """
 
     name: str
@@ -82,6 +84,7 @@ class Plan:
     start: Choice | None
     objective: Objective = SMALL_AREA
     quantized: Quantized | None = None
+    instead: tuple[Choice, ...] = ()
 
     @property
     def allowed(self) -> Fraction:
@@ -117,7 +120,9 @@ class Plan:
         """Return a copy with formats trimmed until no step saves any more."""
         if self.search is None or self.start is None:
             return self
-        return replace(self, start=self.search.trimmed(self.start, float(self.allowed)))
+        smallest = self.search.trimmed(self.start, float(self.allowed))
+        instead = (smallest, self.search.merely_trimmed(self.start, float(self.allowed)))
+        return replace(self, start=self.search.with_free_bits(smallest), instead=instead)
 
 
 def plan(
@@ -233,8 +238,8 @@ def prove(planned: Plan) -> Quantized:
         return _assembled(planned, planned.input_stages[0], (), None)
     allowed = planned.allowed
     if search is not None and start is not None:
-        choice, tried = start, None
-        for _ in range(_ATTEMPTS):
+        choice, tried, instead = start, None, list(planned.instead)
+        for _ in range(_ATTEMPTS + len(instead)):
             if choice == tried:
                 break  # nothing else is to be had
             before = planned.input_stages[choice.input_stage]
@@ -245,7 +250,11 @@ def prove(planned: Plan) -> Quantized:
                 break
             excess = quantized.bound * planned.output.lsb - planned.max_error
             if excess <= 0:
-                return quantized
+                # Words that suit stage by stage may not suit as a whole.
+                if not instead or planned.objective.of_datapath(quantized.datapath) < math.inf:
+                    return quantized
+                choice, *instead = instead
+                continue
             if planned.is_long:
                 break
             tried = choice

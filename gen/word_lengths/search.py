@@ -215,8 +215,15 @@ class Search:
         if len(self._inputs) > 1:
             ways.append(self._trimmed_once(start, allowed, calibration=False))
         ends = [self._trimmed_closer(way, allowed) for way in ways]
-        smallest = min(ends, key=lambda choice: (self.size(choice), self.error(choice)))
-        return self._closer(smallest, more=self._objective.negligible)
+        return min(ends, key=lambda choice: (self.size(choice), self.error(choice)))
+
+    def merely_trimmed(self, start: Choice, allowed: float) -> Choice:
+        """Return formats trimmed without a look at what costs nothing; parameters as of `trimmed`."""
+        return self._trimmed_once(start, allowed)
+
+    def with_free_bits(self, choice: Choice) -> Choice:
+        """Return formats with a smaller error, for a negligible size."""
+        return self._closer(choice, more=self._objective.negligible)
 
     def _trimmed_closer(self, start: Choice, allowed: float) -> Choice:
         choice = self._trimmed_once(start, allowed)
