@@ -19,8 +19,9 @@ from sosmith.gen.fpga.boards import BUILDABLE, MODELLED, PROJECTS, RATE, find_bo
 from sosmith.gen.output.core_facts import CoreFacts, core_facts
 from sosmith.gen.output.manifest import manifest
 from sosmith.gen.quantity import number
+from sosmith.interface.arrays import real_numbers
 from sosmith.interface.drawing import Drawing
-from sosmith.interface.inputs import codes_of, encoded, real_numbers, traces_of
+from sosmith.interface.inputs import codes_of, encoded, traces_of
 from sosmith.interface.quantity import Quantity
 from sosmith.interface.specification import Specification, specification_of
 from sosmith.interface.tables.cost import Cost
@@ -488,7 +489,9 @@ class Design:
         from sosmith.interface.reload import Reload
 
         running = None if active is None else specification_of(active)
-        return Reload.proven(self, specification_of(other), running, reset=reset, version=version, progress=progress)
+        return Reload.proven(
+            self.core, specification_of(other), running, reset=reset, version=version, progress=progress
+        )
 
     def package(
         self,
@@ -758,7 +761,15 @@ class Design:
         """
         from sosmith.interface.tables.design import design_tables
 
-        return design_tables(self, details=details)
+        return design_tables(
+            self.core,
+            self.facts,
+            budget=self.budget,
+            rate_costs=self.rate_costs,
+            estimates=self.estimates,
+            uncertainty=self.uncertainty,
+            details=details,
+        )
 
     def as_dict(self) -> dict[str, Any]:
         """Return the `manifest`, ``uncertainty`` (None if unknown), `estimates`, with a decimator ``rate_costs``."""

@@ -4,19 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.gen.core import filter_of
 from sosmith.gen.filter import response
 from sosmith.gen.filter.design import Filter as Designed
 from sosmith.gen.filter.step_response import SETTLED, StepResponse, step_response
 from sosmith.interface.quantity import Quantity
-
-if TYPE_CHECKING:
-    from sosmith.interface.specification import Specification
 
 Floats = npt.NDArray[np.float64]
 
@@ -39,11 +34,6 @@ class Filter:
 
     designed: Designed = field(repr=False)
     """The filter in the form of the inner packages, with exact sections."""
-
-    @classmethod
-    def of(cls, specification: Specification) -> Filter:
-        """Design the filter of a specification; errors are those of `Specification.filter`."""
-        return cls(filter_of(specification.checked))
 
     @property
     def sample_rate(self) -> float:

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sosmith.gen.core import CoreDesign
+from sosmith.interface.arrays import number_array, real_numbers
 from sosmith.interface.specification import path_of
 from sosmith.model.arrays import Codes
 from sosmith.model.errors import SpecificationError
@@ -33,38 +34,6 @@ def encoded(design: CoreDesign, inputs: Mapping[str, npt.ArrayLike]) -> Codes:
         except ValueError as error:
             raise SpecificationError(str(error)) from None
     return np.stack(columns, axis=-1)
-
-
-def real_numbers(values: npt.ArrayLike, what: str) -> npt.NDArray[np.float64]:
-    """Return an array of `values` in double precision; `what` begins the sentence that refuses others.
-
-    Raises
-    ------
-    SpecificationError
-        If a value is masked or not a real number, or rows differ in length.
-    """
-    array = _array(values, what)
-    if array.dtype.kind in _NO_REAL_NUMBERS:
-        raise SpecificationError(f"{what} must be real numbers, not {_NO_REAL_NUMBERS[array.dtype.kind]}")
-    try:
-        return array.astype(np.float64)
-    except (TypeError, ValueError, OverflowError):  # an array of objects: fractions are numbers, others are not
-        raise SpecificationError(f"{what} must be real numbers in the range of a double, not other objects") from None
-
-
-_NO_REAL_NUMBERS = {"c": "complex ones", "U": "text", "S": "bytes", "M": "dates", "m": "durations", "V": "records"}
-"""What arrays hold that numpy would convert to other numbers than are meant, or to none, by the kind of their type."""
-
-
-def _array(values: npt.ArrayLike, what: str) -> npt.NDArray[np.generic]:
-    """Return an array of any numbers: what numpy would ignore or refuse in its own words is refused here."""
-    masked = int(np.sum(values.mask)) if isinstance(values, np.ma.MaskedArray) else 0
-    if masked:
-        raise SpecificationError(f"{what} must all be known, not masked ({masked} of {np.size(values)}): fill the gaps")
-    try:
-        return np.asarray(values)
-    except ValueError:
-        raise SpecificationError(f"{what} must be in rows of one length, not in rows of different ones") from None
 
 
 def codes_of(design: CoreDesign, inputs: Mapping[str, npt.ArrayLike]) -> Codes:
@@ -138,7 +107,7 @@ def _in_one_shape(design: CoreDesign, inputs: Mapping[str, npt.ArrayLike]) -> li
     missing = [name for name in names if name not in inputs]
     if missing:
         raise SpecificationError(f"the inputs must be {' and '.join(names)}, not without {' and '.join(missing)}")
-    arrays = [_array(inputs[name], f"values of {name}") for name in names]
+    arrays = [number_array(inputs[name], f"values of {name}") for name in names]
     shapes = " and ".join(str(array.shape) for array in arrays)
     # A column of samples is the same for every channel; numpy would take it for a row of one value a channel.
     samples = {len(array) for array in arrays if array.ndim == 2}

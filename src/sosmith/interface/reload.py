@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from sosmith.gen.core import CoreDesign
 from sosmith.gen.facts.table import Table, View
 from sosmith.gen.reload.register_writes import reload_json
 from sosmith.gen.reload.reload import Swap, check_swap, own_set, set_for
@@ -14,7 +15,6 @@ from sosmith.model.errors import falling_short
 
 if TYPE_CHECKING:
     from sosmith.interface.certificate import Progress
-    from sosmith.interface.design import Design
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,23 +23,21 @@ class Reload(View):
 
     Attributes
     ----------
-    design : Design
-        The core.
     wanted : Specification
         What the set is for.
     writes : dict
         The content of the file that `Board.load` takes.
     """
 
-    design: Design = field(repr=False)
     wanted: Specification
     writes: dict[str, Any] = field(repr=False)
+    _core: CoreDesign = field(repr=False)
     _swap: Swap = field(repr=False)
 
     @classmethod
     def proven(
         cls,
-        design: Design,
+        core: CoreDesign,
         wanted: Specification,
         active: Specification | None,
         *,
@@ -48,20 +46,19 @@ class Reload(View):
         progress: Progress,
     ) -> Reload:
         """Prove a set; parameters and errors are those of `Design.reload`."""
-        core = design.core
         progress("set", 0, 0)
         with falling_short(wanted.checked.path):
             new = set_for(core, wanted.checked)
-        with falling_short((active or design.specification).checked.path):
+        with falling_short((core.spec if active is None else active.checked).path):
             before = own_set(core) if active is None else set_for(core, active.checked)
         progress("swap", 0, 0)
         swap = check_swap(core, None if reset else before, new)
-        return cls(design, wanted, reload_json(core, swap, version), swap)
+        return cls(wanted, reload_json(core, swap, version), core, swap)
 
     @property
     def table(self) -> Table:
         """The error bound of the new set, and the transient of the swap."""
-        core, swap, tree = self.design.core, self._swap, self.writes
+        core, swap, tree = self._core, self._swap, self.writes
         output, quantized, allowed = core.datapath.output, swap.new_set.quantized, self.wanted.checked.max_error
         unit, rate = f" {output.unit}".rstrip(), float(core.spec.sample_rate)
         bound = quantized.bound * output.lsb

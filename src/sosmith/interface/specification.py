@@ -195,7 +195,7 @@ class Specification(View):
         clock = 12000000.0
         <BLANKLINE>
         """
-        from sosmith.interface.inputs import real_numbers  # numpy, which a specification from a file does without
+        from sosmith.interface.arrays import real_numbers  # numpy, which a specification from a file does without
 
         real_numbers(sos, "sos")  # which may be decimals of more digits
 
@@ -338,9 +338,10 @@ class Specification(View):
         ShortfallError
             If there is no such filter, for instance because no order meets the edges.
         """
+        from sosmith.gen.core import filter_of
         from sosmith.interface.filter import Filter
 
-        return Filter.of(self)
+        return Filter(filter_of(self.checked))
 
     @property
     def name(self) -> str:

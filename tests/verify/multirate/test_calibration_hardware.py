@@ -71,12 +71,12 @@ def test_sentences() -> None:
         "flag 0 of the calibration = 0, flag 1 of the calibration = 1, not another value",
     )
     rejected(
-        ".s_axis_tdata(s_axis_tdata),\n",
-        ".s_axis_tdata(s_axis_tdata[30:0]),\n",
+        ".m_axis_tvalid(i_valid),\n    .s_axis_tdata(s_axis_tdata),",
+        ".m_axis_tvalid(i_valid),\n    .s_axis_tdata(s_axis_tdata[30:0]),",
         "the port s_axis_tdata of ahead must have 32 bits, not 31",
     )
     rejected(
-        ".m_axis_tready(i_ready),",
+        ".m_axis_tready(m_axis_tready_20),",
         ".m_axis_tready(1'h1),",
         "ahead.m_axis_tready must be what a decimator has there with decimator.filling = 0, decimator.phase = 0, "
         "decimator.waiting = 1, not another value",

@@ -141,20 +141,21 @@ def test_sentences() -> None:
         check_rejected(SMALL, changed, sentence)
 
     named(
-        r"assign write__data_28 = combing \? acc : total;",
-        "assign write__data_28 = combing ? total : acc;",
+        r"assign states_write_data = combing \? acc : total;",
+        "assign states_write_data = combing ? total : acc;",
         "decimator.states must be what a decimator has there after a clock with state of the decimator = 3, "
         "decimator.step = 0, decimator.channel = 0, start of the channel = 1, not another value",
     )
     named(
-        r"if \(write__en\)",
+        r"if \(control_write_enable\)",
         "if (writes)",
         "decimator.control must be what a decimator has there after a clock with state of the decimator = 0, "
         "decimator.channel = 0, not another value",
     )
     sentence = "m_axis_tdest must be the channel, and zeros above"
     named(r"m_axis_tdest\[7:1\] = 7'h00", "m_axis_tdest[7:1] = 7'h01", sentence)
-    with pytest.raises(RejectedError, match=r"^the decimator must have 3 states and 3 other registers, not "):
+    missing = "decimator.clears, decimator.i_ready, decimator.takes, decimator.adds, decimator.gives"
+    with pytest.raises(RejectedError, match=f"^the decimator must have a register {missing}$"):
         check_decimator(written(SMALL._replace(channels=1)), designed(SMALL)[1], 2)
 
 

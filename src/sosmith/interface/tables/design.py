@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING
 
 from sosmith.gen.architectures.architecture import Architecture
 from sosmith.gen.architectures.folded_fir import FoldedFir
 from sosmith.gen.calibration.fit import Fit, read_measurements
+from sosmith.gen.core import CoreDesign
+from sosmith.gen.estimate.estimate import Estimate
 from sosmith.gen.facts.cost_table import cost_table
 from sosmith.gen.facts.design_tables import budget_table, limit_cycles_table, uncertainty_table
 from sosmith.gen.facts.table import Table
@@ -19,35 +20,40 @@ from sosmith.gen.quantity import count, quantity
 from sosmith.gen.specification.specification import Specification
 from sosmith.gen.specification.wear_limits import WearSpec
 from sosmith.instrument.calibration.uncertainty import of_polynomial
-from sosmith.instrument.uncertainty.instrument_budget import budget_json
+from sosmith.instrument.uncertainty.instrument_budget import InstrumentBudget, budget_json
+from sosmith.interface.quantity import Quantity
 from sosmith.model.dataflow.program import Program
 from sosmith.model.port import Port
-
-if TYPE_CHECKING:
-    from sosmith.interface.design import Design
-
 
 Rows = list[Sequence[str]]
 
 
-def design_tables(design: Design, *, details: bool = False) -> list[Table]:
+def design_tables(
+    core: CoreDesign,
+    facts: CoreFacts,
+    *,
+    budget: Mapping[str, Quantity],
+    rate_costs: Mapping[str, RateCosts],
+    estimates: Sequence[Estimate],
+    uncertainty: InstrumentBudget | None,
+    details: bool,
+) -> list[Table]:
     """Say what a design is, and how its error bound comes about; its sections, limit cycles and schedule as details."""
-    facts, output = design.facts, design.facts.output
     tables = [
-        Table(f"{facts.name}: {facts.core}", _overview(design)),
-        budget_table(design.budget, facts.max_error, facts.lsb, facts.unit),
+        Table(f"{facts.name}: {facts.core}", _overview(core, facts, uncertainty)),
+        budget_table(budget, facts.max_error, facts.lsb, facts.unit),
     ]
     if facts.decimation is not None:
-        tables.append(_rates(design.rate_costs, output.unit, facts.channels))
-    if design.estimates:
-        tables.append(cost_table(design.estimates))
+        tables.append(_rates(rate_costs, facts.output.unit, facts.channels))
+    if estimates:
+        tables.append(cost_table(estimates))
     if not details:
         return tables
-    if design.uncertainty is not None:
-        tables.append(uncertainty_table(budget_json(design.uncertainty)))
+    if uncertainty is not None:
+        tables.append(uncertainty_table(budget_json(uncertainty)))
     if facts.sections:
         tables += [_sections(facts.sections), limit_cycles_table(facts.limit_cycles, facts)]
-    calibration = design.core.architecture.calibration
+    calibration = core.architecture.calibration
     before = (
         None
         if calibration is None or calibration.program is None
@@ -57,8 +63,8 @@ def design_tables(design: Design, *, details: bool = False) -> list[Table]:
     return tables + [table for table in (before, own) if table is not None]
 
 
-def _overview(design: Design) -> Rows:
-    facts, spec, architecture = design.facts, design.core.spec, design.core.architecture
+def _overview(core: CoreDesign, facts: CoreFacts, uncertainty: InstrumentBudget | None) -> Rows:
+    spec, architecture = core.spec, core.architecture
     unit = f" {facts.unit}" if facts.unit else ""
     rows: Rows = []
     if facts.filter is not None:
@@ -70,7 +76,7 @@ def _overview(design: Design) -> Rows:
         rows += _decimation(facts.decimation, facts.unit)
     if facts.downsampling is not None:
         rows += _downsampling(facts.downsampling)
-    rows += [*_calibration(design), *facts.reasons.items()]
+    rows += [*_calibration(core, uncertainty), *facts.reasons.items()]
     rows.append(("output", f"{facts.output.bits} bits, one LSB = {facts.lsb:.6g}{unit}"))
     if spec.wear is not None:
         rows.append(("wear flags", _wear_text(spec.wear, facts.output)))
@@ -139,9 +145,9 @@ def _rates(costs: Mapping[str, RateCosts], unit: str, channels: int) -> Table:
     return Table("The same filter without a decimator", rows, ("", *costs))
 
 
-def _calibration(design: Design) -> Iterator[tuple[str, str]]:
+def _calibration(core: CoreDesign, uncertainty: InstrumentBudget | None) -> Iterator[tuple[str, str]]:
     """Say where the calibration comes from, and what a reading is worth."""
-    core, polynomial, worth = design.core, design.core.quantized.polynomial, design.uncertainty
+    polynomial = core.quantized.polynomial
     if polynomial is None:
         return
     m, n = polynomial.orders
@@ -151,7 +157,7 @@ def _calibration(design: Design) -> Iterator[tuple[str, str]]:
         yield "its measurements", _worth(core.spec, core.fit)
     else:
         yield "calibration", f"given: {orders}"
-    yield "reading", UNKNOWN if worth is None else worth.summary
+    yield "reading", UNKNOWN if uncertainty is None else uncertainty.summary
 
 
 def _worth(spec: Specification, fitted: Fit) -> str:
