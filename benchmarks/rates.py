@@ -71,7 +71,7 @@ def factor_table() -> str:
         longer = 100 * (costs.delay / direct.delay - 1)
         folds, gain = ("-", "-", "-"), "-"
         if found is not None:
-            most = max(band.gain_db for band in found.aliasing)
+            most = max(band.passing_db for band in found.aliasing)
             levels = (found.largest_db, found.direct_largest_db)
             folds = (f"{most:.0f} dB, {found.stages} stages", *(f"{level:.0f} dB" for level in levels))
             gain = f"within {found.deviation_db:.2g} dB"
@@ -128,11 +128,11 @@ def band_table() -> str:
     """Return what folds from each band, into the pass band and anywhere, with the factor of "auto"."""
     found = decimation_facts(locomotive("auto"))
     assert found is not None
-    rows = ["| from | gain at most | at the output | into the pass band from | gain of the decimator at most |\n"]
+    rows = ["| from | gain at most | at the output | into the pass band from | gain into it at most |\n"]
     rows.append("| --- | --- | --- | --- | --- |\n")
     rows += [
         f"| {band.whole_low:.6g} to {band.whole_high:.6g} Hz | {band.largest_db:.2f} dB | {band.largest_at:.3g} Hz "
-        f"| {band.low:.6g} to {band.high:.6g} Hz | {band.gain_db:.2f} dB |\n"
+        f"| {band.low:.6g} to {band.high:.6g} Hz | {band.passing_db:.2f} dB |\n"
         for band in found.aliasing
     ]
     return "".join(rows)

@@ -20,7 +20,8 @@ core is read from its SystemVerilog, and its clocks are followed one by one (`so
    nothing but the last clock of a sum depends on it. There the core waits until the result before has left.
 
 With several channels, all this is shown of any one of them: what is kept of it is in its control word, and no clock of
-its samples writes a word of another channel. Names of registers count: under a wrong name a proof is not found.
+its samples writes a word of another channel. Names of registers count: under a wrong name a proof is not found. The
+source must keep a sample on offer until it is accepted, as AXI4-Stream asks.
 """
 
 from __future__ import annotations
