@@ -57,13 +57,13 @@ def _lines(found: Spectrum, count: int) -> list[int]:
     floor = _noise_amplitude(found)
     lines: list[int] = []
     last = len(height) - 1 if found.sides[-1] == 1 else len(height) + FINER  # a line this near is one at half the rate
-    for k in sorted(local, key=lambda k: (-height[k], k)):
+    for k in sorted(local.tolist(), key=lambda k: (-height[k], k)):
         amplitude = found.fine_amplitude[k]
         if lines and amplitude < DYNAMIC_RANGE * found.fine_amplitude[lines[0]]:
             break
         hidden = OVER_LEAKAGE * (_leaked(found, lines, k) + found.detrended[k] * (k >= RESOLVED * FINER))
         if amplitude > max(floor[min(max(round(k / FINER), 1), len(floor) - 1)], hidden):
-            lines.append(int(k) if k < last - FINER // 2 else last)
+            lines.append(k if k < last - FINER // 2 else last)
             if sum(one >= RESOLVED * FINER for one in lines) == count:
                 break
     return lines
