@@ -5,6 +5,7 @@ accuracy is compared with the paper's; ways of fitting are compared. Takes about
 campaign.json, pictures, specifications, hardware and reports; with --document also docs/campaign.md, its pictures and
 outcome.json. With --only-methods, only the ways of fitting are compared anew, and the rest is that of outcome.json;
 with --without-methods, it is the other way round.
+With --only-rule, only the linear fits of the paper's rule are counted anew.
 """
 
 from __future__ import annotations
@@ -16,10 +17,12 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from examples.wear_campaign.campaign import carry_out, methods_campaign
+from examples.wear_campaign.campaign import SCENARIOS, carry_out, methods_campaign
 from examples.wear_campaign.document import document
+from examples.wear_campaign.methods import by_the_rule_alone
 from examples.wear_campaign.pictures import pictures
 
+from sosmith.instrument.scenarios.file import load_scenario
 from sosmith.model.text_files import write_contents
 from sosmith.terminal import note, show_progress
 
@@ -36,23 +39,30 @@ def main() -> None:
     parser.add_argument("--document", action="store_true", help="also write docs/campaign.md and its pictures")
     parts = parser.add_mutually_exclusive_group()
     parts.add_argument("--only-methods", action="store_true", help="compare only the ways of fitting anew")
+    parts.add_argument("--only-rule", action="store_true", help="count only the paper's rule's linear fits anew")
     parts.add_argument("--without-methods", action="store_true", help="do everything else anew")
     arguments = parser.parse_args()
     settings = tomllib.loads((HERE / "campaign.toml").read_text(encoding="utf-8"))
     settings |= {name: value for name, value in vars(arguments).items() if name in settings and value is not None}
     if arguments.seeds is not None:
-        settings["methods"]["bench_seeds"] = arguments.seeds
+        settings["methods"]["rule_seeds"] = arguments.seeds
     if settings["seeds"] < 2:
         parser.error(f"--seeds must be at least 2, not {settings['seeds']}")
     earlier = json.loads((HERE / "outcome.json").read_text(encoding="utf-8"))
     with show_progress() as step:
-        if arguments.only_methods:
+        if arguments.only_rule:
+            scenarios = {name: load_scenario(SCENARIOS / f"{name}.toml") for name in settings["bench"]["scenarios"]}
+            rule = by_the_rule_alone(settings, scenarios, arguments.output / "rule", step)
+            results, series = earlier | {"settings": settings, "rule": rule}, {}
+        elif arguments.only_methods:
             filter_table = earlier["ride"]["filters"][-1]["table"]
             compared = methods_campaign(settings, filter_table, arguments.output / "methods", step)
             results, series = {"settings": settings, **compared}, {}
             results |= {name: earlier[name] for name in ("bench", "ride", "week", "reloads")}
         else:
-            recorded = {name: earlier[name] for name in ("methods", "wear")} if arguments.without_methods else None
+            recorded = (
+                {name: earlier[name] for name in ("methods", "rule", "wear")} if arguments.without_methods else None
+            )
             results, series = carry_out(settings, arguments.output, step, methods=recorded)
         step("pictures and document")
         drawn = pictures(results, series)

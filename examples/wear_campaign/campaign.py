@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from examples.wear_campaign import bench, depot, hardware, ride, week
-from examples.wear_campaign.methods import side_by_side
+from examples.wear_campaign.methods import by_the_rule_alone, side_by_side
 from examples.wear_campaign.reloads import all_weeks
 from examples.wear_campaign.spread import spread
 from examples.wear_campaign.wear_intervals import wear_covered
@@ -56,8 +56,9 @@ def methods_campaign(settings: dict[str, Any], filter_table: str, folder: Path, 
     names = [*settings["bench"]["scenarios"], settings["week"]["scenario"]]
     scenarios = {name: load_scenario(SCENARIOS / f"{name}.toml") for name in names}
     compared = side_by_side(settings, scenarios, filter_table, folder, progress)
+    rule = by_the_rule_alone(settings, scenarios, folder, progress)
     progress("intervals of wear", 0, 0)
-    return {"methods": compared, "wear": wear_covered()}
+    return {"methods": compared, "rule": rule, "wear": wear_covered()}
 
 
 def bench_campaign(settings: dict[str, Any], folder: Path, progress: Progress) -> tuple[dict[str, Any], dict[str, Any]]:

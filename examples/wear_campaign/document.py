@@ -36,7 +36,7 @@ def document(results: dict[str, Any]) -> str:
         "equation 7: 100 % "
         "minus "
         "the mean of |measured - true| / true over the readings.",
-        *section(results["methods"], results["wear"], settings),
+        *section(results["methods"], results["rule"], results["wear"], settings),
         _bench(results["bench"], settings),
         _ride(results["ride"], settings),
         _week(results["week"], settings),

@@ -259,10 +259,10 @@ def cases(settings: dict[str, Any], scenarios: dict[str, ScenarioFile], filter_t
     week = hardware.instrument(folder, "week", RATE, calibration, filter_table, uncertainty=stated[1])
 
     own, all_seeds = settings["methods"], settings["seeds"]
-    bench_seeds, some_seeds = own["bench_seeds"], min(all_seeds, own["variant_seeds"])
+    some_seeds = min(all_seeds, own["variant_seeds"])
 
     def bench_case(
-        name: str, sensor: str, scenario: ScenarioFile, seeds: int = bench_seeds, days: int = own["interval_days"]
+        name: str, sensor: str, scenario: ScenarioFile, seeds: int = all_seeds, days: int = own["interval_days"]
     ) -> Case:
         return Case(name, sensor, seeds, lambda seed: on_the_bench(with_sensor(scenario, sensor), bench, seed, days))
 
@@ -286,6 +286,28 @@ def cases(settings: dict[str, Any], scenarios: dict[str, ScenarioFile], filter_t
     found.append(week_case(f"{week_name}, near", first, near, some_seeds))
     found.append(week_case(f"{week_name}, outliers", first, scenarios[week_name], some_seeds, own["outliers"]))
     return found
+
+
+def by_the_rule_alone(
+    settings: dict[str, Any], scenarios: dict[str, ScenarioFile], folder: Path, progress: Progress
+) -> list[dict[str, Any]]:
+    """Return the accuracy and the order of the paper's rule on the bench, for as many seeds as its chances need."""
+    own, calibration = settings["methods"], hardware.calibration_table(EQUATION_5A)
+    core = hardware.instrument(folder, "bench", settings["bench"]["sample_rate"], calibration, PAPER_FILTER)
+    rows = []
+    for sensor in own["sensors"]:
+        for name in settings["bench"]["scenarios"]:
+            scenario = with_sensor(scenarios[name], sensor)
+            row: dict[str, Any] = {"case": name, "sensor": sensor, "accuracy": [], "order": []}
+            for seed in range(1, own["rule_seeds"] + 1):
+                progress(f"the paper's rule: {name}, {sensor}", seed, own["rule_seeds"])
+                made = fit(measured(scenario, seed))
+                trace = emulate_file(scenario, bench_of(core), seed=seed)
+                found = judged(Made(made.polynomial, made.orders[0]), trace, core)
+                row["accuracy"].append(round(found["accuracy"], DIGITS))
+                row["order"].append(made.orders[0])
+            rows.append(row)
+    return rows
 
 
 def figures(case: Case, confidence: float, progress: Callable[[int], None]) -> dict[str, Any]:

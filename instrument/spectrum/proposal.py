@@ -146,10 +146,10 @@ def _best(contents: Sequence[Content], wish: Wish, sample_rate: float, passband:
     """
     masks = [mask for part in PARTS_OF_DISTURBANCE if (mask := _mask(contents, wish, part * wish.share)) is not None]
     least = [
-        minimum_order(passband.value, stop.value, passed.value, stopped.value, sample_rate)[0]
+        minimum_order(passband.value, stop.value, passing.value, stopping.value, sample_rate)[0]
         if passband.value < stop.value
         else MAX_ORDER + 1
-        for stop, passed, stopped in masks
+        for stop, passing, stopping in masks
     ]
     if wish.passband is not None:
         for mask, order in zip(masks, least, strict=True):  # the most first, and with it the lowest order
@@ -161,8 +161,8 @@ def _best(contents: Sequence[Content], wish: Wish, sample_rate: float, passband:
         return None
     for order in range(least[-1], MAX_ORDER + 1):  # of equal shares
         for mask in masks:
-            stop, passed, stopped = mask
-            edge = _highest_pass_edge(order, stop.value, passed.value, stopped.value, sample_rate)
+            stop, passing, stopping = mask
+            edge = _highest_pass_edge(order, stop.value, passing.value, stopping.value, sample_rate)
             reason = (
                 f"as high as order {order} allows, for the least delay; at least {passband.value:.5g} Hz: "
                 f"{passband.reason}"

@@ -64,13 +64,23 @@ def test_the_figures_of_methods_are_those_of_the_recorded_seeds() -> None:
     assert len(rows) == 9 + 8
     for row in rows:
         for method, figures in row["methods"].items():
-            own = found["settings"]["methods"]
-            bench = own["bench_seeds"] if row["case"].startswith("bench") else found["settings"]["seeds"]
-            seeds = own["variant_seeds"] if "," in row["case"] else bench
+            seeds = found["settings"]["methods"]["variant_seeds"] if "," in row["case"] else found["settings"]["seeds"]
             assert len(figures["accuracy"]) == seeds
             assert max(map(len, figures.values())) == seeds  # fewer intervals: no fit on any day of a week
             expected = spread(figures["accuracy"], found["settings"]["confidence"])
             assert row["accuracy"][method] == pytest.approx(expected, rel=1e-12)
+
+
+def test_the_first_seeds_of_the_rule_alone_are_those_of_the_methods() -> None:
+    found = outcome()
+    benches = [row for row in found["methods"] if row["case"] in found["settings"]["bench"]["scenarios"]]
+    assert len(found["rule"]) == len(benches) == 6
+    for alone, row in zip(found["rule"], benches, strict=True):
+        assert (alone["case"], alone["sensor"]) == (row["case"], row["sensor"])
+        assert len(alone["accuracy"]) == len(alone["order"]) == found["settings"]["methods"]["rule_seeds"]
+        paper = row["methods"]["paper"]
+        assert alone["accuracy"][: len(paper["accuracy"])] == pytest.approx(paper["accuracy"], abs=2e-4)
+        assert alone["order"][: len(paper["order"])] == paper["order"]
 
 
 @pytest.mark.slow
@@ -78,7 +88,6 @@ def test_the_figures_of_methods_are_those_of_the_recorded_seeds() -> None:
 def test_methods_give_the_recorded_figures_again(number: int, tmp_path: Path) -> None:
     """The first seeds of a bench, and of a week with the coil."""
     settings = outcome()["settings"] | {"seeds": 2}
-    settings["methods"] |= {"bench_seeds": 2}
     names = [*settings["bench"]["scenarios"], settings["week"]["scenario"]]
     scenarios = {name: load_scenario(campaign.SCENARIOS / f"{name}.toml") for name in names}
     table = outcome()["ride"]["filters"][-1]["table"]

@@ -49,7 +49,8 @@ def surprise_of(
     """Return a sentence if the rows of a file look like a slip, else an empty string.
 
     They are held against the newest version, where it is calibrated: a slip is told if the rows fit the version with it
-    undone (`FITS` times its rms residual) and not as they are (`OFF` times). Rows that differ from the version
+    undone (`FITS` times its rms residual) and not as they are (`OFF` times); the error of another day may come on top
+    where they are `OFF` times nearer with the slip undone. Rows that differ from the version
     `OFF` times as much as two sensors of the type do are told as well, whatever they are. The rows of a sensor
     without a version are held against the type, whose tolerances then say what is expected.
 
@@ -82,7 +83,9 @@ def surprise_of(
         return ""
     undone = [(_off(curve, slip.undone(d, V, T), expected), slip) for slip in _SLIPS]
     least, slip = min(undone, key=lambda one: one[0])
-    if least <= FITS or (gross and least * OFF <= as_it_is):
+    another_day = 0.0 if version is None or sensor_type is None else sensor_type.systematic / version.rms
+    explained = gross or least <= FITS * math.hypot(1.0, another_day)
+    if least <= FITS or (explained and least * OFF <= as_it_is):
         first, second = (_rms(curve, one) for one in (columns, slip.undone(d, V, T)))
         return (
             f"{slip.sentence}: the rms residual against {against} is {first:.3g} mm as it is, and {second:.3g} mm with "

@@ -51,6 +51,17 @@ def test_a_slip_is_found_against_a_version(known: Measurements, version: Version
     assert found.endswith(" mm with that undone")
 
 
+@pytest.mark.parametrize("slip", ["inches", "centimetres", "swapped"])
+def test_a_slip_is_found_though_the_day_errs_by_more_than_the_version(
+    known: Measurements, version: Version, slip: str
+) -> None:
+    """The version is known to 0.02 mm rms, and the right file is off it by 0.11 mm: that is the error of its day."""
+    right = measured(1, 12, scatter=0.02, seed=2)
+    right = replace(right, clearance=right.clearance + 0.11)
+    assert not surprise_of(right, known, version, TYPE)
+    assert surprise_of(with_slip(right, slip), known, version, TYPE).startswith(SLIPS[slip][0])
+
+
 def test_degrees_fahrenheit_are_found_where_the_temperature_counts(known: Measurements, version: Version) -> None:
     cold = measured(1, 12, scatter=0.02, seed=2)
     T = cold.temperature / 3 + 15
