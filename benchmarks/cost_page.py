@@ -33,7 +33,8 @@ from benchmarks.cost_goals import (
     goal_table,
     tries,
 )
-from benchmarks.peers import PEERS
+from benchmarks.firmware import recorded as firmware
+from benchmarks.peers import PEERS, PUBLISHED
 from benchmarks.synthesis import GOAL, TARGETS, title
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
@@ -221,6 +222,29 @@ def peer_table(record: Figures) -> str:
     return "\n".join(lines)
 
 
+def published_table() -> str:
+    """Return a Markdown table of what other projects publish of theirs."""
+    lines = [
+        "| project | design | FPGA | LUT | FF | multipliers | fmax, MHz | samples per second, each channel | source |",
+        "|---|---|---|---|---|---|---|---|---|",
+    ]
+    for each in PUBLISHED:
+        lines.append(
+            f"| {each.project} | {each.what} | {each.fpga} | {each.luts:,} | {each.flip_flops:,} | {each.multipliers} "
+            f"| {each.fmax} | {each.samples} | {each.source} |"
+        )
+    return "\n".join(lines)
+
+
+def firmware_table() -> str:
+    """Return a Markdown table of the C models on microcontrollers."""
+    lines = ["| core | processor | instructions a sample | code, bytes |", "|---|---|---|---|"]
+    lines += [
+        f"| {each.example} | {each.core} | {each.instructions:.0f} | {each.code:,} |" for each in firmware().models
+    ]
+    return "\n".join(lines)
+
+
 def plot(record: Figures) -> str:
     """Return an SVG of logic against samples per second and of logic against channels, one panel per target."""
     colours = dict(zip(EXAMPLES, ("C0", "C1", "C2"), strict=True))
@@ -370,5 +394,16 @@ ECP5-85F, out of context, with Yosys 0.70, nextpnr-ecp5 and one seed. The compar
 widths, throughput and what can be changed at run time differ. LUT RAM is counted for this project only.
 
 {peer_table(record)}
+
+What these and another project publish of three sections, each in its own way of counting, with other filters and other
+FPGAs; nothing is said of their errors:
+
+{published_table()}
+
+## The same without an FPGA
+
+The C model of each example gives the same codes on a microcontroller, with the same bound: [firmware.md](firmware.md).
+
+{firmware_table()}
 {left}"""
     return {"docs/cost.md": text, "docs/images/cost.svg": plot(record)}

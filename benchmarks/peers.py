@@ -46,3 +46,34 @@ PEERS = (
     Peer("filter-blocks, 2018-08", "24 bits", 965, 57, 194, 18, 52.4, UNKNOWN),
     Peer("Bedrock, 2026-06", "three sections, 28-bit data, reloadable", 588, 207, 939, 12, 84.4, UNKNOWN),
 )
+
+
+class Published(NamedTuple):
+    """A core of another project as it publishes its figures; `source` is the file in its repository."""
+
+    project: str
+    what: str
+    fpga: str
+    luts: int
+    flip_flops: int
+    multipliers: int
+    fmax: str
+    samples: str
+    source: str
+
+
+PUBLISHED = (
+    Published("litedsp", "three equal sections, I and Q", "ECP5", 1722, 834, 24, "57.2", "57.2 M", "doc/resources.md"),
+    Published("litedsp", "the same, folded by three", "ECP5", 1646, 1293, 24, "134.4", "44.8 M", "doc/resources.md"),
+    Published(
+        "hdlguy/iir_filter",
+        "three sections with a multiplier each",
+        "Artix-7",
+        250,
+        406,
+        3,
+        "163, from a slack of 3.853 ns at 10 ns",
+        "about 23 M, at 7 clocks",
+        "verilog/ooc/results",
+    ),
+)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import signal
+import sys
 from collections.abc import Iterator
 
 import pytest
@@ -66,3 +67,11 @@ def _signals() -> Iterator[None]:
     yield
     for number, handler in SIGNALS.items():
         signal.signal(number, handler)
+
+
+@pytest.fixture(autouse=True)
+def _formats_are_searched(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Keep no trimmed formats within a test: it may have changed what the search does. Its commands do, as any."""
+    kept = sys.modules.get("sosmith.gen.realizations.kept_formats")
+    if kept is not None:
+        monkeypatch.setattr(kept, "cache_folder", lambda: None)

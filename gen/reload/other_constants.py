@@ -11,6 +11,7 @@ from sosmith.gen.filter.design import Filter
 from sosmith.gen.proof.cascade_proof import quantized_response
 from sosmith.gen.proof.linear_model import linear_models
 from sosmith.gen.proof.polynomial_error import horner_error, rounded
+from sosmith.gen.realizations.kept_formats import Choice
 from sosmith.gen.realizations.registry import REALIZATIONS, Section, realization_of
 from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
 from sosmith.gen.reload.first_samples import Limits, first_samples
@@ -18,7 +19,7 @@ from sosmith.gen.word_lengths.cascade import cascade, chosen_formats, parts_of, 
 from sosmith.gen.word_lengths.input_stage import InputStage, normalised, starting_like
 from sosmith.gen.word_lengths.quantize import gain_at_zero, gain_of
 from sosmith.gen.word_lengths.quantized import Quantized, assembled
-from sosmith.gen.word_lengths.search import Choice, Search
+from sosmith.gen.word_lengths.search import Search
 from sosmith.gen.word_lengths.settling import with_settling
 from sosmith.model.dataflow.graph import Op
 from sosmith.model.errors import ShortfallError

@@ -17,6 +17,7 @@ from typing import cast
 
 from sosmith.gen.filter.design import Filter
 from sosmith.gen.proof.cascade_proof import CascadeProof, ideal_gain
+from sosmith.gen.realizations.kept_formats import Choice, kept_or_made
 from sosmith.gen.realizations.registry import REALIZATIONS, Section, realization_of
 from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
 from sosmith.gen.word_lengths.bit_limits import MAX_BITS
@@ -28,7 +29,7 @@ from sosmith.gen.word_lengths.objective import SMALL_AREA, Objective
 from sosmith.gen.word_lengths.ordering import best_order
 from sosmith.gen.word_lengths.output_stage import output_stage
 from sosmith.gen.word_lengths.quantized import Quantized, assembled
-from sosmith.gen.word_lengths.search import Choice, Search
+from sosmith.gen.word_lengths.search import Search
 from sosmith.model.errors import ShortfallError
 from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
@@ -120,9 +121,11 @@ class Plan:
         """Return a copy with formats trimmed until no step saves any more."""
         if self.search is None or self.start is None:
             return self
-        smallest = self.search.trimmed(self.start, float(self.allowed))
-        instead = (smallest, self.search.merely_trimmed(self.start, float(self.allowed)))
-        return replace(self, start=self.search.with_free_bits(smallest), instead=instead)
+        search, start, allowed = self.search, self.start, float(self.allowed)
+        key = self.realization, search.key, allowed
+        smallest = kept_or_made(start, ("smallest", *key), lambda: search.trimmed(start, allowed))
+        merely = kept_or_made(start, ("merely trimmed", *key), lambda: search.merely_trimmed(start, allowed))
+        return replace(self, start=search.with_free_bits(smallest), instead=(smallest, merely))
 
 
 def plan(

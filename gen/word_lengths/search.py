@@ -30,6 +30,7 @@ import numpy.typing as npt
 from sosmith.gen.filter.design import estimated_length
 from sosmith.gen.proof.linear_model import Source, linear_model, quantizers, transfer_function
 from sosmith.gen.realizations.coefficients import lowest_terms, round_significant, with_fewer_digits
+from sosmith.gen.realizations.kept_formats import Choice
 from sosmith.gen.realizations.registry import Section, realization_of
 from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
 from sosmith.gen.word_lengths.bit_limits import MIN_BITS
@@ -65,18 +66,6 @@ _UNNOTICED = 2.0**-10
 
 _STEPS = (1, 2, 3)
 """Bits that one step may drop: several, as a shorter fraction may save something only once it is the shortest one."""
-
-
-@dataclass(frozen=True)
-class Choice:
-    """Index of the input stage, and the formats of every section that can be chosen."""
-
-    input_stage: int
-    formats: tuple[SectionFormat, ...]
-
-    def with_format(self, k: int, form: SectionFormat) -> Choice:
-        """Return a copy with another format of section k."""
-        return replace(self, formats=(*self.formats[:k], form, *self.formats[k + 1 :]))
 
 
 class _Input(NamedTuple):
@@ -152,6 +141,13 @@ class Search:
     def work(self) -> int:
         """Samples of the responses to all coefficients together, which decide how long trimming takes."""
         return sum(len(slope) for estimate in self._estimates for slope in estimate.slopes.values())
+
+    @property
+    def key(self) -> tuple[object, ...]:
+        """All that `trimmed` depends on besides the realization, with equal representations where it is equal."""
+        rows = [[float(value) for value in row] for row in self._rows]
+        inputs = [(*each.x, float(each.error), float(each.size)) for each in self._inputs]
+        return rows, inputs, self._windows, self._objective
 
     def under(self, objective: Objective) -> Search:
         """Return the same search for another objective."""

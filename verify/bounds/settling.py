@@ -28,6 +28,9 @@ from sosmith.verify.graph import Transfer, inputs_of, label, require
 SETTLED = Fraction(1, 2)
 """What may be left of any other past, in output LSBs."""
 
+_LONGEST = 1 << 24
+"""Samples of the longest response: those that a design may have, up to a far smaller rest than it looks at."""
+
 
 def without_counter(stage: StageEntry, samples: int | None) -> StageEntry:
     """Prove that the last stage flags so many samples after a start; return it without what does.
@@ -116,7 +119,7 @@ def check_fading(sections: Sequence[StageEntry], samples: int) -> None:
         If a response is too long.
     """
     models = [Transfer(section) for section in sections]
-    over = inverse(prod((model.denominator for model in models), start=fmpq_poly([1])))
+    over = inverse(prod((model.denominator for model in models), start=fmpq_poly([1])), _LONGEST)
     tails: list[tuple[Fraction, list[int]]] = []
     slack = Fraction(0)
     for number, section in enumerate(sections):

@@ -19,10 +19,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
+from sosmith.verify.graph import require
+
 Form = tuple[tuple[int, int], ...]
 """Pairs of an atom's number and its factor, sorted; atom 0 is the number 1."""
 
 ONE = 0
+
+_MOST_BITS = 1024
+"""Widest product; no type of C holds a tenth of it."""
 
 
 @dataclass
@@ -65,12 +70,20 @@ class Forms:
         return sum(factor * self._rests[atom] for atom, factor in form)
 
     def product(self, a: Form, b: Form) -> Form:
-        """Return the product of two forms."""
+        """Return the product of two forms.
+
+        Raises
+        ------
+        RejectedError
+            If it is wider than any that is computed.
+        """
         for one, other in ((a, b), (b, a)):
             if is_number(one):
                 return scaled(other, one[0][1] if one else 0)
         (a, in_a), (b, in_b) = _without_factor(a), _without_factor(b)
         ends = [x * y for x in self.range_of(a) for y in self.range_of(b)]
+        bits = max(map(abs, ends)).bit_length()
+        require(bits <= _MOST_BITS, f"a product must have at most {_MOST_BITS} bits, not {bits}")
         rest = self.rest(a) * self.rest(b)
         return scaled(self._atom(("*", *sorted((a, b))), min(ends), max(ends), rest), in_a * in_b)
 

@@ -106,9 +106,12 @@ def design_command(
     if as_json:
         print_json(designed.as_dict() if cost is None else designed.as_dict() | {"board": cost})
         return
-    from sosmith.interface.build import build_table
+    tables = designed.tables(details=details)
+    if cost is not None:
+        from sosmith.interface.build import build_table
 
-    print_tables([*designed.tables(details=details), *([] if cost is None else [build_table(cost)])])
+        tables.append(build_table(cost))
+    print_tables(tables)
 
 
 @click.command("generate")

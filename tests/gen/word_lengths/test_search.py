@@ -15,13 +15,14 @@ from tests.gen.word_lengths.filters import OUT, SIGNED, butterworth
 from sosmith.gen.filter.design import Filter
 from sosmith.gen.proof.linear_model import Source, linear_model
 from sosmith.gen.realizations.coefficients import lowest_terms, round_significant
+from sosmith.gen.realizations.kept_formats import Choice
 from sosmith.gen.realizations.registry import CASCADES, REALIZATIONS, Section
 from sosmith.gen.realizations.section_format import SectionFormat
 from sosmith.gen.word_lengths import quantize as quantize_module
 from sosmith.gen.word_lengths.cost import cost_of, cost_of_graphs
 from sosmith.gen.word_lengths.quantize import Plan, plan, prove
 from sosmith.gen.word_lengths.quantized import Quantized
-from sosmith.gen.word_lengths.search import Choice, Search, _largest
+from sosmith.gen.word_lengths.search import Search, _largest
 from sosmith.model.dataflow.graph import Range
 from sosmith.model.sections.direct_form import DirectForm1, Product
 

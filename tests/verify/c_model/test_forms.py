@@ -94,7 +94,8 @@ def test_other_ways_to_write_a_value_have_its_form(places: int) -> None:
     assert forms.shifted(total((x, 1), (y, -power)), places) == total((floor, 1), (y, -1))
     assert forms.shifted(scaled(x, 1 << 20), places + 20) == floor
     assert forms.shifted(forms.past(x), places) == forms.past(floor)
-    assert forms.product(scaled(x, 4), y) == scaled(forms.product(y, x), 4)
+    assert forms.product(scaled(x, 4), y) == forms.product(y, scaled(x, 4)) == scaled(forms.product(y, x), 4)
+    assert forms.product(scaled(x, 4), scaled(y, 6)) == scaled(forms.product(scaled(x, 1), scaled(y, 3)), 8)
     assert forms.shifted(x, 40) == forms.shifted(x, 50) != forms.shifted(y, 40)
     assert forms.shifted(total((x, 1), (number(power >> 1), 1)), places) != floor
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from sosmith.verify.c_model import expressions
+from sosmith.verify.c_model import forms as c_forms
 from sosmith.verify.graph import RejectedError
 from sosmith.verify.parallel import forms as parallel_forms
 from sosmith.verify.parallel.forms import Forms
@@ -83,7 +83,6 @@ SQUARERS: dict[str, Callable[[], Squarer]] = {
     "hardware": hardware,
     "graph": graph,
     "program": lambda: ({(0,): 1}, lambda x: normal_form.times(x, x)),
-    "C model": lambda: (expressions.variable("x"), lambda x: expressions.product(x, x)),
 }
 
 
@@ -95,6 +94,15 @@ def test_squares_of_squares_end(kind: str) -> None:
         value = squared(value)
     with pytest.raises(RejectedError, match=r"^a product must have at most 64 factors, not 128$"):
         squared(value)
+
+
+def test_squares_of_squares_in_a_c_model_end() -> None:
+    forms = c_forms.Forms()
+    value = forms.variable("x", -8, 7)
+    for _ in range(8):
+        value = forms.product(value, value)
+    with pytest.raises(RejectedError, match=r"^a product must have at most 1024 bits, not 1537$"):
+        forms.product(value, value)
 
 
 def test_products_of_long_sums_end() -> None:

@@ -19,7 +19,6 @@ from sosmith.gen.output.decimation_facts import DecimationFacts, DownsamplingFac
 from sosmith.gen.quantity import count, quantity
 from sosmith.gen.specification.specification import Specification
 from sosmith.gen.specification.wear_limits import WearSpec
-from sosmith.instrument.calibration.uncertainty import of_polynomial
 from sosmith.instrument.uncertainty.instrument_budget import InstrumentBudget, budget_json
 from sosmith.interface.quantity import Quantity
 from sosmith.model.dataflow.program import Program
@@ -164,6 +163,8 @@ def _worth(spec: Specification, fitted: Fit) -> str:
     """Return what a fitted calibration is worth, in the unit of its measurements: the proof covers arithmetic only."""
     assert spec.calibration is not None
     assert spec.calibration.data is not None
+    from sosmith.instrument.calibration.uncertainty import of_polynomial  # with scipy.special, which is long in coming
+
     uncertainty = of_polynomial(read_measurements(spec.calibration.data), fitted)
     low, high = uncertainty.limits
     missed = f"; {uncertainty.lack.warning}" if uncertainty.lack.structured else ""
