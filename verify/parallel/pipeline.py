@@ -230,7 +230,7 @@ class Pipeline:
         fields: Callable[[str, int, int], Form | None] = lambda name, low, width: None,
         others: Set[str] = frozenset(),
     ) -> Evaluation:
-        """Return the logic where registers, inputs, `others` hold what `content` says, and memories what `word` does."""
+        """Return the logic where registers, inputs, `others` hold what `content` says, memories what `word` does."""
         cuts = (self._control.cuts - {opened}) | others
         return Evaluation(
             self._netlist, self.forms, content, self._graph.shortened, word=word, cuts=cuts, fields=fields
