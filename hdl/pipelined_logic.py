@@ -83,6 +83,7 @@ class PipelinedLogic:
         self._adders = adders
         self._multiples: dict[int, Value] = {}
         self._used = used_bits(graph)
+        self._awaited: dict[int, Signal] = {}
         self.names = unique_names(graph)
         self.wires: list[Value] = []
 
@@ -95,7 +96,7 @@ class PipelinedLogic:
             return self.wires[index]
         if own > pipeline_stage:
             # A state that is updated in a later pipeline stage: if the sample before is still there, the update is due.
-            return Mux(self._valid[own], self.wires[node.operands[0]], self.wires[index])
+            return Mux(self._valid[own], self._following(index), self.wires[index])
         if node.op in {Op.FLOOR, Op.FRACTION} and self._is_state_of(node.operands[0], pipeline_stage):
             return logic(self._graph, node, [self.wires[node.operands[0]]])
         if (index, pipeline_stage) not in self._passed:
@@ -105,6 +106,15 @@ class PipelinedLogic:
             with self._m.If(self._takes[pipeline_stage - 1]):
                 self._m.d.sync += register.eq(before)
         return self._passed[index, pipeline_stage]
+
+    def _following(self, index: int) -> Value:
+        """Next value of a state, which may be yet to be made."""
+        source = self._graph.nodes[index].operands[0]
+        if source < len(self.wires):
+            return self.wires[source]
+        if source not in self._awaited:
+            self._awaited[source] = Signal(self._shape(source), name=f"{self.names[index]}_next")
+        return self._awaited[source]
 
     def connect(self, inputs: Sequence[Value], apart: Collection[int] = ()) -> None:
         """Make the logic of all nodes from the values of the inputs; synthesis must not merge the nodes in `apart`."""
@@ -125,6 +135,7 @@ class PipelinedLogic:
                     value = self._multiple(index) if of_adders else logic(self._graph, node, operands, factor)
                     self._m.d.comb += wire.eq(value)
                 self.wires.append(wire)
+        self._m.d.comb += [awaited.eq(self.wires[source]) for source, awaited in self._awaited.items()]
 
     def _is_state_of(self, index: int, pipeline_stage: int) -> bool:
         """Whether a node is a state in its own pipeline stage, so that bits of it take no registers of their own."""

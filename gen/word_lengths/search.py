@@ -378,9 +378,7 @@ class Search:
     def error(self, choice: Choice) -> float:
         """Estimated sum of the errors of input stage, coefficients and rounding, in output LSBs."""
         rounding = sum(
-            estimate.gains.get(name, 0.0) * 2.0**-frac
-            for estimate, form in zip(self._estimates, choice.formats, strict=True)
-            for name, frac in form.fracs.items()
+            estimate.rounding(form.fracs) for estimate, form in zip(self._estimates, choice.formats, strict=True)
         )
         return self._inputs[choice.input_stage].error + rounding + self.coefficient_error(choice)
 
@@ -520,6 +518,16 @@ class _Estimate:
     spreads: dict[str, dict[str, float]]
     optional: tuple[str, ...]
     products: tuple[str, ...]
+
+    def rounding(self, fracs: Mapping[str, int]) -> float:
+        """Error at the filter's output of quantizers that keep so many fraction bits."""
+        error = sum(self.gains.get(name, 0.0) * 2.0**-frac for name, frac in fracs.items())
+        if self.products and all(name in fracs for name in self.products):
+            grain = max(fracs[name] for name in (*self.products, "v"))  # of the total, whose bits v drops
+            error -= self.gains.get("v", 0.0) * 2.0**-grain
+            if len(self.products) % 2:  # half a unit is left of what would centre them
+                error += self.gains[self.products[0]] * 2.0 ** -fracs[self.products[0]]
+        return error
 
     def limits_of(self, node: str, fracs: Mapping[str, int]) -> tuple[float, float]:
         """Limits of a node with quantizers: they can make a nonnegative node negative, which adds a sign bit."""

@@ -40,7 +40,21 @@ def pipeline_stages(graph: Graph) -> list[int]:
         if part and any(graph.nodes[i].op not in NO_LOGIC for i in whole - part):
             for i in part:
                 stages[i] += 1
-    return _with_products_later(graph, stages)
+    return _with_products_later(graph, _with_errors_earlier(graph, stages))
+
+
+def _with_errors_earlier(graph: Graph, stages: list[int]) -> list[int]:
+    """Add what a tap sum dropped to what waits for it a pipeline stage before, from where its few bits are seen."""
+    stages = [*stages]
+    for index, node in enumerate(graph.nodes):
+        if node.op is not Op.ADD or graph.concatenated(node) is not None:
+            continue
+        for error, other in (node.operands, node.operands[::-1]):
+            state = graph.nodes[error]
+            fed_back = state.op is Op.DELAY and graph.nodes[state.operands[0]].op is Op.FRACTION
+            if fed_back and stages[error] == stages[index] > stages[other] and graph.nodes[other].op is not Op.DELAY:
+                stages[index] -= 1
+    return stages
 
 
 def _with_products_later(graph: Graph, stages: list[int]) -> list[int]:
@@ -61,7 +75,11 @@ def _with_products_later(graph: Graph, stages: list[int]) -> list[int]:
                 if user not in moved and moved & set(other.operands)
             }
         before = _times(graph, stages)
-        if moved & set(graph.outputs) or before[own] < max(before) or any(stages[user] == own for user in users):
+        if (
+            moved & set(graph.outputs)
+            or before[own] + _PARTIAL_PRODUCT < max(before)
+            or any(stages[user] == own for user in users)
+        ):
             continue
         later = [stage + (i in moved and stage == own) for i, stage in enumerate(stages)]
         after = _times(graph, later) if max(later) == max(stages) else [max(before) + 1]

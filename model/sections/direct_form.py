@@ -23,7 +23,8 @@ multiplier. As c_i is small and the error is differenced, next to nothing of it 
 
 A product may drop bits as well, below those that the total keeps. What that costs grows with the peak gain of
 1 / A(z), and the words of v, and all that is added to it, get as much shorter. Where there is room below the bits of
-``-m1 y(n-1)``, a constant centres it.
+``-m1 y(n-1)``, a constant centres it. Its operand is a state of its own if it is a sum of y alone with all its bits: it
+is added up as soon as y(n) is there, so that the next sample begins with the multiplication.
 
 A1 and A2 keep their relative precision in few bits however low the cutoff, and the gain at zero
 frequency is exactly one whatever they are rounded to.
@@ -167,9 +168,14 @@ class DirectForm1:
         taps_y = [g.floor(v, self.y_frac, f"y{i}") for i, v in enumerate(past, start=1)]
         # States are there first, and products that need y(n-1) last: so they are added.
         products: list[tuple[bool, tuple[int, Wire]]] = []
+        early: list[tuple[Wire, Product]] = []
         for product in self.products:
             taps = [*zip(product.x, taps_x, strict=False)], [*zip(product.y, taps_y, strict=False)]
-            operand = _operand(g, product, *taps)
+            if self._is_early(product):
+                operand = g.delay(f"{product.operand}_1", self._operand_frac(product), *(product.range or (0, 0)))
+                early.append((operand, product))
+            else:
+                operand = _operand(g, product, *taps)
             scaled = g.scale(operand, product.coefficient, product.frac, product.label)
             if product.floored is not None:
                 scaled = g.floor(scaled, min(g[scaled].frac, product.floored))
@@ -186,7 +192,11 @@ class DirectForm1:
         terms += [term for _, term in sorted(products, key=lambda each: each[0])]
         v = g.bound(g.floor(g.combine(terms), frac), *self.v_range, "v")
         g.connect(v1, v)
-        return g.build([g.floor(v, self.y_frac, "y")])
+        y = g.floor(v, self.y_frac, "y")
+        for operand, product in early:
+            newer = [*zip(product.y, [y, *taps_y], strict=False)]
+            g.connect(operand, _operand(g, product, (), newer))
+        return g.build([y])
 
     def _centred(self, g: GraphBuilder, term: tuple[int, Wire]) -> tuple[int, Wire]:
         """Return a term with what centres the errors of the products, if there is room below its bits."""
@@ -198,6 +208,12 @@ class DirectForm1:
         shifted, constant = g.shift(wire, factor.bit_length() - 1), g.constant(int(halves), frac, "centre_of_products")
         fits = g[constant].width - frac <= -g[shifted].frac
         return (1, g.add(shifted, constant)) if fits else term
+
+    def _is_early(self, p: Product) -> bool:
+        """Whether the operand of a product is added up at the sample before."""
+        drops = p.floored is not None and p.floored < self._product_frac(p)
+        whole = p.kept is None or p.kept >= self._operand_frac(p)
+        return drops and whole and p.range is not None and all(p.y) and not any(p.x)
 
     @property
     def _floored_fracs(self) -> list[int]:

@@ -164,6 +164,7 @@ def _checked(netlist: Netlist, certificate: Certificate, channels: int, inside: 
     try:
         pipeline.check_states()
         _check_output(pipeline.buffered(), netlist, pipeline, graph, certificate, prefix)
+        pipeline.check_followed()
         if channels > 1:
             dest = pipeline.buffered().net(OUTPUT_DEST)
             right = pipeline.same(dest, pipeline.channel, netlist.widths[OUTPUT_DEST])

@@ -15,6 +15,9 @@ it belongs to a sample before or behind, by as many as there are in between::
                                  [v] ------>              seen from 1:   delay(n) = the one before delay(n+1)
                                                           seen from 3:   delay(n) = the operand at n-1
 
+What a state is about to take over, the net with its name and ``_next``, is the code of the operand for the sample at
+the state's own position. Seen from a position before, while that sample moves on, it belongs to the sample before.
+
 A register that belongs to another position without a known number of samples in between holds nothing that is known,
 unless its node lasts: then samples in between do not count.
 """
@@ -22,8 +25,9 @@ unless its node lasts: then samples in between do not count.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from contextlib import contextmanager
+from functools import partial
 from typing import NamedTuple
 
 from sosmith.verify.certificate_file import Certificate
@@ -33,7 +37,7 @@ from sosmith.verify.parallel.channels import DEST
 from sosmith.verify.parallel.control import RESET, Buffer, Case, Control, UndecidedError, about, cases
 from sosmith.verify.parallel.dependence import Dependence
 from sosmith.verify.parallel.equality import same_word
-from sosmith.verify.parallel.evaluation import Content, Evaluation
+from sosmith.verify.parallel.evaluation import Evaluation
 from sosmith.verify.parallel.forms import Forms, shifted
 from sosmith.verify.parallel.graph_codes import GraphCodes
 from sosmith.verify.parallel.netlist import Netlist
@@ -125,6 +129,7 @@ class Pipeline:
         self._found: dict[str, Form] = {}
         self._second: dict[str, Form] = {}
         self._open: list[str] = []
+        self._followed: set[str] = set()
         self.states: dict[str, State] = {}
         self.memories: StateMemories | None = None
         self._counters: dict[str, Counter] = {}
@@ -172,14 +177,19 @@ class Pipeline:
         def fields(name: str, low: int, width: int) -> Form | None:
             return self._field(low, width) if name == DATA and position == self._source else None
 
-        return self.logic(content, word, fields=fields)
+        return self.logic(content, word, fields=fields, others=self._following_at(position).keys())
 
     def seen_from(self, position: int, case: Case, frame: int) -> Content:
         """Return what registers and inputs hold for the sample at a position; `frame` numbers what is not known."""
+        following = self._following_at(position)
 
         def content(name: str) -> Form:
             if name in self._control.names:
                 return self._control_bit(name, case)
+            if name in following:
+                self._followed.add(name)
+                state = self._following(following[name], position, case)
+                return self._unknown(name, frame) if state is None else state
             if name in {DATA, DEST}:
                 return self._entering(name) if position == self._source else self._unknown(name, frame)
             require(name in self._netlist.registers, f"the port {name} must not be used here")
@@ -193,6 +203,14 @@ class Pipeline:
             return self.content_of(name) if known else self._unknown(name, frame)
 
         return content
+
+    def _following_at(self, position: int) -> dict[str, State]:
+        """Return the nets that hold, for a sample before its state, what the state is about to take over."""
+        return {
+            f"{name}_next": state
+            for name, state in self.states.items()
+            if f"{name}_next" in self._netlist.drivers and position < state.behind
+        }
 
     def constant_word(self, name: str) -> Form:
         """Return the word of a memory that never changes, for the channel of a sample."""
@@ -220,9 +238,10 @@ class Pipeline:
         *,
         opened: str = "",
         fields: Callable[[str, int, int], Form | None] = lambda name, low, width: None,
+        others: Set[str] = frozenset(),
     ) -> Evaluation:
-        """Return the logic where registers and inputs hold what `content` says, and memories what `word` does."""
-        cuts = self._control.cuts - {opened}
+        """Return the logic where registers, inputs, `others` hold what `content` says, memories what `word` does."""
+        cuts = (self._control.cuts - {opened}) | others
         return Evaluation(
             self._netlist, self.forms, content, self._graph.shortened, word=word, cuts=cuts, fields=fields
         )
@@ -361,7 +380,10 @@ class Pipeline:
             return None
         if name in self._netlist.registers:
             return self.content_of(name)
-        sources = self._positions_of(self._dependence.of_net(name))
+        leaves = self._dependence.of_net(name)
+        if any(leaf.startswith(f"{name}_passed") for leaf in leaves):
+            return None  # by way of what a state is about to take over from a later position
+        sources = self._positions_of(leaves)
         if len(sources) != 1:
             return None
         (position,) = sources
@@ -381,6 +403,28 @@ class Pipeline:
             self._check_state(name)
         if self.memories is not None:
             self.memories.check()
+
+    def check_followed(self) -> None:
+        """Prove that what states are about to take over is that, where it was used.
+
+        Raises
+        ------
+        RejectedError
+            If it is not.
+        """
+        for name, state in self.states.items():
+            if f"{name}_next" not in self._followed:
+                continue
+            (source,) = self._graph.nodes[state.node].operands
+            wanted = self._graph.seen(source, self._graph.nodes[state.node].stage)
+            net, full, valid = f"{name}_next", self._control.full, self._control.valid[state.behind]
+            fixed = {RESET: 1, full: 0, valid: 1}
+            for _, word in cases(fixed, partial(self._net_at, net, state.behind)):
+                right = self.same(word, wanted, self._netlist.widths[net])
+                require(right, f"{net} must be {self._graph.nodes[source].label}, not another value")
+
+    def _net_at(self, name: str, position: int, case: Case) -> Form:
+        return self.at(position, case).net(name)
 
     def _check_state(self, name: str) -> None:
         state, register = self.states[name], self._netlist.registers[name]
@@ -481,6 +525,20 @@ class Pipeline:
         between = range(state.behind + 1, position)
         require(position < len(valid), "a position must be inside the pipeline")
         return self._graph.past((node, ago - 1 - self._samples_in(between, case)))
+
+    def _following(self, state: State, position: int, case: Case) -> Form | None:
+        """Return what a state is about to take over, as the sample at a position before sees it; None if not known."""
+        node, ago = self._graph.origin(state.node)
+        control = self._control
+        if position < 0 or state.behind >= len(control.valid):
+            return None
+        for name, wanted in ((control.full, 0), (control.valid[state.behind], 1)):
+            if name not in case:
+                raise UndecidedError(name)
+            if case[name] != wanted:
+                return None
+        between = range(position + 1, state.behind)
+        return self._graph.past((node, ago + self._samples_in(between, case)))
 
     def _samples_in(self, positions: Iterable[int], case: Case) -> int:
         count = 0

@@ -33,6 +33,12 @@ _FEEDBACK = {"df1": (0, 0), "df1_ef1": (1, 0), "df1_ef2": (2, 1)}
 _NAMES = {*_FEEDBACK, "df2t", "delta", "state_space", "normal"}
 
 
+_OF_SUMS = frozenset(
+    {Operation.ADD, Operation.SUBTRACT, Operation.SHIFT, Operation.BOUND, Operation.FLOOR, Operation.DELAY}
+)
+"""What sums of a node and its earlier values are made of."""
+
+
 @dataclass(frozen=True)
 class Recursion:
     """The part of a section that leads to one output.
@@ -87,9 +93,22 @@ class Recursion:
         return [[fraction(self.transfer.matrix[i][j]) for j in self.loop] for i in self.loop]
 
     def _holds(self, root: int) -> bool:
-        """Whether all states in a loop hold earlier values of one node."""
+        """Whether all states in a loop hold earlier values of one node, or sums of them."""
         states = self.transfer.states
-        return bool(self.loop) and all(self.transfer.undelayed(states[k])[0] == root for k in self.loop)
+        return bool(self.loop) and all(self._is_sum_of(self.transfer.undelayed(states[k])[0], root) for k in self.loop)
+
+    def _is_sum_of(self, index: int, root: int) -> bool:
+        """Whether a node adds up nothing but a node and its earlier values."""
+        left, seen = [index], {root}
+        while left:
+            at = left.pop()
+            if at not in seen:
+                seen.add(at)
+                node = self.stage.nodes[at]
+                if node.op not in _OF_SUMS:
+                    return False
+                left += node.operands
+        return True
 
     @cached_property
     def is_direct(self) -> bool:
