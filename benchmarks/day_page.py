@@ -56,9 +56,9 @@ def _head() -> list[str]:
     return [
         "# The day's own error",
         "",
-        "Written by `python -m benchmarks.days --document`, all of it by one run of that command on the project's own",
-        "emulation, with seeds of which none was used while building. Accuracy is the paper's equation 7. +- is the",
-        "standard error of the mean.",
+        "Written by `python -m benchmarks.days --document`, which measures all of it on the project's own emulation,",
+        "goes on where it was interrupted, and measures anew what the code has changed for. By none of its seeds was",
+        "anything chosen. Accuracy is the paper's equation 7. +- is the standard error of the mean.",
         "",
         "The arithmetic errs by less than a micrometre; a day errs by 0.12 to 0.2 mm, which the measurements of other",
         "days cannot know. Two things help: reference targets in the morning, and the average over the days.",

@@ -46,7 +46,7 @@ SENSORS = 20
 """Sensors of each kind that is not as its type."""
 
 FIRST_SEEDS = {"bench": 39001, "service": 69101, "alarms": 69201, "advice": 19301, "coverage": 19401}
-"""None of these seeds was used while building."""
+"""By none of these seeds was anything chosen."""
 
 PROCESSES = 2
 
