@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from sosmith.verify.graph import require
 from sosmith.verify.rocq.cascade import Cascade, Row, Rows
 from sosmith.verify.rocq.claims import Claim
 from sosmith.verify.rocq.flat import FlatGraph
@@ -142,7 +143,9 @@ def windows_of(cascade: Cascade, start: StartNodes | None) -> Windows:
     """Return the ranges of the sources."""
     if start is None:
         return Windows(cascade, None, 0)
-    (entry,) = cascade.sections[0].wires
+    wires = cascade.sections[0].wires
+    require(len(wires) == 1, f"the first section must use one input behind a start, not {len(wires)}")
+    (entry,) = wires
     return Windows(cascade, entry, start.span)
 
 

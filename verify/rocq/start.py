@@ -43,7 +43,9 @@ def start_of(graph: FlatGraph) -> StartNodes | None:
         return None
     stage, offset = graph.stages[places[0]], graph.offsets[places[0]]
     nodes = stage.nodes
-    (sample,) = inputs_of(stage)
+    inputs = inputs_of(stage)
+    require(len(inputs) == 1, f"a start must have one input, not {len(inputs)}")
+    (sample,) = inputs
     change = stage.outputs[0]
     difference = _operand(nodes, change, Operation.BOUND)
     since, first = nodes[difference].operands if nodes[difference].op is Operation.SUBTRACT else (0, 0)

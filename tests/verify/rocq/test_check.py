@@ -188,6 +188,15 @@ def test_a_start_that_holds_something_else_has_no_theorem() -> None:
         theorems(Certificate.model_validate(tree))
 
 
+def test_a_first_section_that_uses_the_first_sample_has_no_theorem() -> None:
+    tree = json.loads(certificate_text(small(order=1, steady=True)))
+    nodes = tree["stages"][1]["nodes"]
+    change, held = (at for at, node in enumerate(nodes) if node["op"] == "input")
+    next(node for node in nodes if node["op"] == "delay" and node["operands"] == [change])["operands"] = [held]
+    with pytest.raises(RejectedError, match=r"^the first section must use one input behind a start, not 2$"):
+        theorems(Certificate.model_validate(tree))
+
+
 @needs_coqc
 @pytest.mark.slow
 @pytest.mark.parametrize("realization", ["df1", "df1_ef2", "lattice_wdf"])
