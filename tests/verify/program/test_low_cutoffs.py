@@ -1,4 +1,4 @@
-"""Long programs: filters of high order at low cutoffs, whose words have many digits, are proven when folded or serial."""
+"""Long programs: filters of high order at low cutoffs, whose words have many digits, are proven, folded and serial."""
 
 import pytest
 from tests.gen.designs import EXAMPLES
