@@ -37,7 +37,7 @@ from sosmith.verify.parallel.channels import DEST
 from sosmith.verify.parallel.control import RESET, Buffer, Case, Control, UndecidedError, about, cases
 from sosmith.verify.parallel.dependence import Dependence
 from sosmith.verify.parallel.equality import same_word
-from sosmith.verify.parallel.evaluation import Evaluation
+from sosmith.verify.parallel.evaluation import Content, Evaluation
 from sosmith.verify.parallel.forms import Forms, shifted
 from sosmith.verify.parallel.graph_codes import GraphCodes
 from sosmith.verify.parallel.netlist import Netlist
