@@ -221,9 +221,9 @@ def judged(wheels: Sequence[Wheel], read: Values, seed: int) -> dict[str, dict[s
     share = whole**2 / ((whole**2).sum(axis=0) + SUM_KNOWN_TO**2)
     summed = read + share * (total - read.sum(axis=0))
     found["sum"] = _of(summed, true, np.abs(summed - true) <= NORMAL * whole * np.sqrt(1 - share))
-    # The filter takes all days to share alike; what a day has beyond that, by its temperature, is new to it.
-    alike = float(np.sqrt(np.mean(shared**2)))
-    spread = np.sqrt(spread**2 + np.maximum(shared**2 - alike**2, 0.0))
+    # The filter takes all days to share alike, the mean; what a day has more or less than that is new to it.
+    alike = float(np.mean(shared))
+    spread = np.hypot(spread, shared - alike)
     model = WearModel(shared=alike)
     for name, known in (("filter", None), ("filter and sum", total)):
         days = [

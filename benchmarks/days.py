@@ -45,8 +45,8 @@ SEEDS = 40
 SENSORS = 20
 """Sensors of each kind that is not as its type."""
 
-FIRST_SEEDS = {"bench": 39001, "service": 69101, "alarms": 69201, "advice": 19301, "coverage": 19401}
-"""By none of these seeds was anything chosen."""
+FIRST_SEEDS = {"bench": 39001, "service": 79101, "alarms": 69201, "advice": 19301, "coverage": 19401}
+"""By none of these seeds was anything chosen; sets that were looked at while building are not among them."""
 
 PROCESSES = 2
 
