@@ -58,7 +58,7 @@ def _head() -> list[str]:
         "",
         "Written by `python -m benchmarks.days --document`, which measures all of it on the project's own emulation,",
         "goes on where it was interrupted, and measures anew what the code has changed for. By none of its seeds was",
-        "anything chosen: sets of seeds that were looked at while building, three of the bench and of the service, gave",
+        "anything chosen: sets of seeds that were looked at while building, three of bench and service, gave",
         "way to new ones. Accuracy is the paper's equation 7. +- is the standard error of the mean.",
         "",
         "The arithmetic errs by less than a micrometre; a day errs by 0.12 to 0.2 mm, which the measurements of other",
