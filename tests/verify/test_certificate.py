@@ -360,18 +360,18 @@ def test_a_range_too_narrow_for_what_is_possible(end: str) -> None:
             id="range of a product",
         ),
         pytest.param(
-            lambda t: change(t, "y", 3, operands=[12]),
-            r"node 12 \(floor y\) of section0 must have operands before it, not \(12,\)",
+            lambda t: change(t, "y", 3, operands=[14]),
+            r"node 14 \(floor y\) of section0 must have operands before it, not \(14,\)",
             id="operand after",
         ),
         pytest.param(
             lambda t: change(t, "y", 3, operands=[9, 10]),
-            r"node 12 \(floor y\) of section0 must have 1 operands, not 2",
+            r"node 14 \(floor y\) of section0 must have 1 operands, not 2",
             id="operands too many",
         ),
         pytest.param(
             lambda t: change(t, "y", 3, parameter=1),
-            r"node 12 \(floor y\) of section0 must have no parameter that it does not use, not \(1, 0\)",
+            r"node 14 \(floor y\) of section0 must have no parameter that it does not use, not \(1, 0\)",
             id="parameter unused",
         ),
         pytest.param(
@@ -401,6 +401,23 @@ def test_a_lie_is_rejected_with_its_reason(lie: Callable[[Any], Any], message: s
     tree = tree_of()
     lie(tree)
     rejected(tree, message)
+
+
+@pytest.mark.parametrize("key", ["parameter", "parameter_frac"])
+def test_a_parameter_without_a_use_is_rejected_at_every_node(key: str) -> None:
+    """It would change nothing, and so stand for nothing: two texts would certify one design."""
+    seen = set()
+    for stage in tree_of()["stages"]:
+        for index, node in enumerate(stage["nodes"]):
+            if key not in node and (key, node["op"]) != ("parameter_frac", "scale"):
+                seen.add(node["op"])
+                tree = tree_of()
+                changed = next(one for one in tree["stages"] if one["name"] == stage["name"])["nodes"]
+                changed[index][key] = 1
+                what = re.escape(f"node {index} ({' '.join(filter(None, (node['op'], node.get('name'))))})")
+                unused = r"\(1,( 0)?\)" if key == "parameter" else r"\((0, )?1,?\)"
+                rejected(tree, rf"{what} of .* must have no parameter that it does not use, not {unused}")
+    assert seen >= {"input", "add", "subtract", "floor", "clamp", "bound", "delay"}
 
 
 def test_an_error_equal_to_what_is_allowed_is_within_it() -> None:
@@ -608,7 +625,7 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: py
     path = tmp_path / "c.json"
     path.write_text(text_of(BENCH), encoding="utf-8")
     assert run(monkeypatch, "verify", str(path)) == 0
-    assert "proven: flange_wear_bench, 116 nodes within their ranges, 8 by peak gains" in capsys.readouterr().out
+    assert "proven: flange_wear_bench, 124 nodes within their ranges, 8 by peak gains" in capsys.readouterr().out
     assert run(monkeypatch, "verify", str(path), "--json") == 0
     printed = json.loads(capsys.readouterr().out)
     assert printed["proven"] is True
