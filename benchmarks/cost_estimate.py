@@ -2,10 +2,11 @@
 
 Synthesizes designs that seeds draw, one after the other, and records them in benchmarks/cost_estimate.json after each;
 it can be stopped at any time, and goes on where it was. Then fits the factors in gen/estimate/fitted.json to some of
-them, and writes the errors on the others to docs/cost.md. `--count 0` only fits and writes. `--cores` adds cores of
-benchmarks/cost.json whose synthesis is recorded and up to date. `--check` computes the quantities of all rows anew,
-writes nothing, and fails if one differs; `--renew` records them, after a change of what is counted. Needs the packages
-of the extra "boards".
+them, and writes the errors on the others to docs/cost.md. `--count 0` only fits and writes. `--again` begins anew,
+after a change of the hardware: what is the same as recorded is kept, and what it has not come to is recorded no more.
+`--cores` adds cores of benchmarks/cost.json whose synthesis is recorded and up to date. `--check` computes the
+quantities of all rows anew, writes nothing, and fails if one differs; `--renew` records them, after a change of what is
+counted. Needs the packages of the extra "boards".
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from benchmarks import cost_cores
 from benchmarks.cost import mark, source
 from benchmarks.cost_cores import CORES, architecture_on, fmax, targets_in
 from benchmarks.cost_draws import draw
-from benchmarks.cost_estimate_record import Recorded, designed, name_of, nine_in_ten, recorded, rows_of, write
+from benchmarks.cost_estimate_record import Recorded, designed, in_turn, name_of, nine_in_ten, recorded, rows_of, write
 from benchmarks.cost_fit import errors, fitted
 from benchmarks.cost_page import document
 from benchmarks.synthesis import TARGETS
@@ -37,20 +38,22 @@ from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.model.errors import SosmithError
 
 COUNT = 576
-"""Seeds that are drawn."""
+"""Seeds that are drawn when the record is complete."""
 
 _LEAST_CORES = 3
 """Placed cores from which on their clocks are told."""
 
 
-def measured(seed: int) -> Recorded:
-    """Design and synthesize what a seed draws."""
+def measured(seed: int, known: Recorded | None = None) -> Recorded:
+    """Design what a seed draws, and synthesize it unless it is the same as in the row that is known."""
     try:
         design = designed(seed)
     except SosmithError as error:
         return {"seed": seed, "refused": str(error)}
     board, name = find_board(draw(seed).board), design.datapath.name
     text = to_verilog(to_rtlil(design.architecture.component(), name))
+    if known is not None and known.get("source") == mark(text):
+        return {**known, **_told(design.architecture, board)}
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"{name}.sv"
         path.write_text(text, encoding="utf-8")
@@ -72,13 +75,14 @@ def _told(architecture: Architecture, board: Board) -> Recorded:
     return {"board": board.name, "architecture": architecture.name, "quantities": quantities}
 
 
-def measure(count: int) -> None:
-    """Synthesize what is not recorded yet."""
-    rows = recorded()
+def measure(count: int, *, again: bool = False) -> None:
+    """Synthesize what is not recorded yet; `again` says to record everything anew."""
+    before = {row.get("seed"): row for row in recorded()}
+    rows = [row for row in recorded() if not again or "seed" not in row]
     done = {row.get("seed") for row in rows}
-    for seed in range(1, count + 1):
+    for seed in in_turn(count):
         if seed not in done:
-            rows.append(measured(seed))
+            rows.append(measured(seed, before.get(seed)))
             write(rows)
             print(f"draw {seed}: {rows[-1].get('refused') or rows[-1]['luts']}", file=sys.stderr, flush=True)
 
@@ -158,6 +162,7 @@ def main() -> None:
     """Measure, fit and write."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--count", type=int, default=COUNT, help="seeds to draw, from 1 on")
+    parser.add_argument("--again", action="store_true", help="keep only rows that are the same when drawn again")
     parser.add_argument("--cores", action="store_true", help="add the cores of benchmarks/cost.json")
     parser.add_argument("--check", action="store_true", help="only compare the quantities of all rows")
     parser.add_argument("--renew", action="store_true", help="count the quantities of all rows anew")
@@ -166,7 +171,7 @@ def main() -> None:
         sys.exit("\n".join(changed()) or None)
     if options.renew:
         write(renewed())
-    measure(options.count)
+    measure(options.count, again=options.again)
     if options.cores:
         add_cores()
     fit()

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+import tomllib
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -48,6 +51,33 @@ def write(rows: Sequence[Recorded]) -> None:
 def is_unseen(seed: int) -> bool:
     """Say whether a draw is for testing only."""
     return seed > FITTED_UP_TO
+
+
+def in_turn(count: int) -> list[int]:
+    """Return the seeds up to `count` in the order of synthesis, which may end at any of them.
+
+    Architectures and families of FPGA take turns, each with its seeds in their order: two that are for the fit, and
+    between them one for testing only.
+    """
+    groups: defaultdict[tuple[str, str], tuple[list[int], list[int]]] = defaultdict(lambda: ([], []))
+    for seed in range(1, count + 1):
+        drawn = draw(seed)
+        architecture = tomllib.loads(drawn.toml)["hardware"]["architecture"]
+        groups[architecture, find_board(drawn.board).device.family][is_unseen(seed)].append(seed)
+    rounds = zip_longest(*(_two_to_one(*groups[key]) for key in sorted(groups)))
+    return [seed for each in rounds for seed in each if seed is not None]
+
+
+def _two_to_one(of_fit: Sequence[int], unseen: Sequence[int]) -> Iterator[int]:
+    first, second = iter(of_fit), iter(unseen)
+    while of_fit and unseen:
+        for source in (first, second, first):
+            seed = next(source, None)
+            if seed is None:
+                yield from second if source is first else first
+                return
+            yield seed
+    yield from (*of_fit, *unseen)
 
 
 def designed(seed: int) -> CoreDesign:

@@ -24,7 +24,7 @@ _OF_FLIP_FLOPS = {"registers", "cores", "ports", "channels", "guards", "decimato
 _EXPECTED = {
     **{"ports": 180.0, "guarded_ports": 200.0, "guards": 100.0, "cores": 20.0, "decimators": 20.0, "units": 20.0},
     **{"channels": 5.0, "counters": 5.0, "lines": 4.0, "residuals": 3.0, "words": 2.5, "opcodes": 2.0, "shifts": 2.0},
-    **{"logic": 2.0, "guarded_stages": 2.0, "operands": 1.5, "accumulators": 1.3, "soft_products": 1.7, "merged": 2.0},
+    **{"logic": 2.0, "guarded_stages": 2.0, "operands": 1.5, "accumulators": 1.3, "soft_products": 1.7},
 }
 """LUT4 that one of a quantity is expected to take where it is not about 1, before the fit."""
 

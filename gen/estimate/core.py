@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from sosmith.gen.architectures.architecture import Architecture
 from sosmith.gen.architectures.folded_fir import FoldedFir
-from sosmith.gen.estimate.graphs import of_pipelined
+from sosmith.gen.estimate.graphs import of_pipelined, of_start
 from sosmith.gen.estimate.memories import of_memory
 from sosmith.gen.estimate.online import of_units
 from sosmith.gen.estimate.pipelined import Pipelined
@@ -27,6 +27,7 @@ from sosmith.hdl.plan.unfolding import unfolded_stages
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.decimator import Decimator
 from sosmith.model.reload.constants import constants, with_room
+from sosmith.model.sections.start import PassingStage, StartStage
 
 
 def quantities_of(architecture: Architecture, device: Device) -> Quantities:
@@ -54,6 +55,9 @@ def _of_stages(architecture: Architecture, device: Device) -> Quantities:
     datapath, channels = whole.behind_decimator, channel_bits(architecture.channels)
     stages = _pipelined(architecture, datapath)
     made: Quantities = Counter()
+    for start in _starts(architecture, datapath):
+        made += of_start(start)
+        made["registers"] += 2
     for stage in stages:
         made += of_pipelined(stage, device, protect=architecture.protect, loads=architecture.reload)
     made["guards"] += architecture.protect != "none"
@@ -77,10 +81,24 @@ def _pipelined(architecture: Architecture, datapath: Datapath) -> Sequence[Pipel
     if architecture.look_ahead:
         return [Pipelined.of_turns(plan) for plan in plans(stages)]
     graphs = [(stage.graph, made) for stage, made in zip(stages, architecture.adders, strict=True)]
+    if _starts(architecture, datapath):  # no stage passes the first sample on
+        graphs = [
+            ((stage.section if isinstance(stage, PassingStage) else stage).graph, made)
+            for stage, made in zip(stages, architecture.adders, strict=True)
+            if not isinstance(stage, StartStage)
+        ]
     if architecture.channels == 1:
         return [Pipelined.of_one(graph, made) for graph, made in graphs]
     channels, rewrites = architecture.channels, architecture.protect != "none"
     return [Pipelined.of_channels(graph, channels, made, rewrites=rewrites) for graph, made in graphs]
+
+
+def _starts(architecture: Architecture, datapath: Datapath) -> list[StartStage]:
+    """Return the stages that keep the first sample in one place: those for one channel where no sample checks it."""
+    several = architecture.channels > 1 or architecture.samples_per_clock > 1
+    if several or architecture.look_ahead or architecture.protect != "none":
+        return []
+    return [stage for stage in datapath.stages if isinstance(stage, StartStage)]
 
 
 def _of_shell(datapath: Datapath, architecture: Architecture) -> Quantities:

@@ -11,6 +11,7 @@ from sosmith.gen.estimate.quantities import Quantities, check_bits, of_check_bit
 from sosmith.gen.estimate.sums import of_sums
 from sosmith.gen.fpga.boards import Device
 from sosmith.model.dataflow.graph import Graph, Node, Op
+from sosmith.model.sections.start import StartStage
 
 
 def of_pipelined(plan: Pipelined, device: Device, *, protect: str = "none", loads: bool = False) -> Quantities:
@@ -22,11 +23,18 @@ def of_pipelined(plan: Pipelined, device: Device, *, protect: str = "none", load
         elif index not in plan.adders and node.op not in SUMS:
             made += _operation(graph, node, device, loads=loads)
         if node.op not in {Op.CONSTANT, Op.SHIFT}:
-            passes = plan.uses.get(index, 0) - plan.stages[index]
-            made["registers"] += node.width * max(passes, 0)
-    made["registers"] += sum(graph.nodes[i].width for i in graph.outputs) + 2 * plan.depth
+            made["registers"] += plan.used[index] * plan.passes(index)
+    made["registers"] += sum(graph.nodes[i].width for i in graph.outputs if not plan.is_state(i)) + 2 * plan.depth
     made["guarded_stages"] += plan.depth * (protect != "none")
     return made
+
+
+def of_start(stage: StartStage) -> Quantities:
+    """Count what takes the first sample off every sample, and keeps it in one place."""
+    graph = stage.graph
+    change = graph.nodes[graph.outputs[0]].width
+    states = sum(graph.nodes[i].width for i in graph.delays)
+    return Counter({"sums": change, "logic": len(graph.delays), "registers": change + states + 2})
 
 
 def _operation(graph: Graph, node: Node, device: Device, *, loads: bool) -> Quantities:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 from sosmith.hdl.plan.interleaving import schedule
 from sosmith.hdl.plan.look_ahead import TurnPlan
-from sosmith.hdl.plan.pipeline import inner_sums, pipeline_stages
+from sosmith.hdl.plan.pipeline import pipeline_stages
+from sosmith.hdl.plan.used_bits import used_bits
 from sosmith.model.dataflow.graph import Graph, Op
 
 SUMS = {Op.ADD, Op.SUBTRACT}
@@ -37,8 +38,8 @@ class Pipelined:
         Least number of samples from one of a channel to its next.
     block_ram : bool
         Whether the memories are asked to be block RAM.
-    apart : collection of int
-        Nodes that synthesis must not merge with others.
+    shares : bool
+        Whether an output that is the upper part of a state's next value takes no register of its own.
     """
 
     graph: Graph
@@ -48,13 +49,12 @@ class Pipelined:
     words: int = 1
     distance: int = 1
     block_ram: bool = False
-    apart: Collection[int] = ()
+    shares: bool = False
 
     @classmethod
     def of_one(cls, graph: Graph, adders: Collection[int]) -> Pipelined:
         """Return the plan for one channel."""
-        stages = pipeline_stages(graph)
-        return cls(graph, tuple(stages), adders, apart=inner_sums(graph, stages))
+        return cls(graph, tuple(pipeline_stages(graph)), adders, shares=True)
 
     @classmethod
     def of_channels(cls, graph: Graph, channels: int, adders: Collection[int], *, rewrites: bool) -> Pipelined:
@@ -66,8 +66,7 @@ class Pipelined:
     def of_turns(cls, plan: TurnPlan) -> Pipelined:
         """Return the plan with look-ahead."""
         held = plan.loops if plan.turns > 1 else ()
-        sums = [index for index, node in enumerate(plan.graph.nodes) if node.op in SUMS]
-        return cls(plan.graph, tuple(plan.pipeline_stages), (), held, plan.turns, apart=sums)
+        return cls(plan.graph, tuple(plan.pipeline_stages), (), held, plan.turns)
 
     @property
     def depth(self) -> int:
@@ -92,34 +91,31 @@ class Pipelined:
             use(output, self.depth - 1)
         return found
 
-    @cached_property
-    def users(self) -> Mapping[int, list[int]]:
-        """Nodes that use each node, be it through nodes that are the same signal."""
-        nodes = self.graph.nodes
-        found: dict[int, list[int]] = {index: [] for index in range(len(nodes))}
-        for user, node in enumerate(nodes):
-            if node.op not in _WIRES:
-                for operand in node.operands:
-                    found[self.source(operand)].append(user)
-        for output in self.graph.outputs:
-            found[self.source(output)].append(len(nodes))
-        return found
-
     def source(self, index: int) -> int:
         """Return the node that makes the signal of a node."""
         while self.graph.nodes[index].op in _WIRES:
             (index,) = self.graph.nodes[index].operands
         return index
 
-    def is_merged(self, index: int, user: int) -> bool:
-        """Say whether synthesis adds up at once what a sum or a product and the sum that uses it add up."""
-        together = self.users[index] == [user] and self.stages[index] == self.stages[user]
-        return together and index not in self.apart
+    @cached_property
+    def used(self) -> Sequence[int]:
+        """Bits of each node that its signal has: of a sum those that are used, of another node all."""
+        bits = used_bits(self.graph)
+        return [bits[i] if node.op in SUMS else node.width for i, node in enumerate(self.graph.nodes)]
 
-    def width(self, index: int) -> int:
-        """Return the bits of a node that are used: fewer if its range is stated to be smaller."""
-        nodes = self.graph.nodes
-        direct = [node for node in nodes if index in node.operands]
-        if not direct or index in self.graph.outputs or any(node.op is not Op.BOUND for node in direct):
-            return nodes[index].width
-        return min(nodes[index].width, max(node.width for node in direct))
+    def passes(self, index: int) -> int:
+        """Return how many registers pass a node on; bits that are cut off a state are taken from where that is."""
+        node, own = self.graph.nodes[index], self.stages[index]
+        if node.op in {Op.FLOOR, Op.FRACTION} and self.graph.nodes[node.operands[0]].op is Op.DELAY:
+            own = max(own, self.stages[node.operands[0]])
+        return max(self.uses.get(index, 0) - own, 0)
+
+    def is_state(self, output: int) -> bool:
+        """Say whether an output needs no register, as a state holds it."""
+        if not self.shares or self.stages[output] != self.depth - 1:
+            return False
+        nodes, index = self.graph.nodes, output
+        following = {nodes[delay].operands[0] for delay in self.graph.delays}
+        while index not in following and nodes[index].op in {Op.FLOOR, *_WIRES}:
+            (index,) = nodes[index].operands
+        return index in following

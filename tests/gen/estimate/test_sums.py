@@ -1,4 +1,4 @@
-"""Sums as synthesis makes them: those that only one other uses are added up at once."""
+"""Sums as synthesis makes them: each is a carry chain of its own, over the bits that are used."""
 
 from collections.abc import Collection
 
@@ -9,13 +9,10 @@ from sosmith.gen.estimate.sums import of_sums
 from sosmith.model.dataflow.graph import GraphBuilder, Wire
 
 
-def counted(
-    g: GraphBuilder, *outputs: Wire, stages: tuple[int, ...] = (), adders: Collection[int] = ()
-) -> tuple[int, int, int]:
-    """Return carries, what is added up three by three, and what is with a constant."""
+def carries(g: GraphBuilder, *outputs: Wire, stages: tuple[int, ...] = (), adders: Collection[int] = ()) -> int:
+    """Return the bits of carry chains."""
     graph = g.build(outputs)
-    found = of_sums(Pipelined(graph, stages or (0,) * len(graph.nodes), adders))
-    return found["sums"], found["merged"], found["rounded"]
+    return of_sums(Pipelined(graph, stages or (0,) * len(graph.nodes), adders))["sums"]
 
 
 def three(frac: int = 0) -> tuple[GraphBuilder, Wire, Wire, Wire]:
@@ -26,62 +23,71 @@ def three(frac: int = 0) -> tuple[GraphBuilder, Wire, Wire, Wire]:
 
 def test_a_sum_takes_a_carry_for_each_bit() -> None:
     g, a, b, _ = three()
-    assert counted(g, g.add(a, b)) == (9, 0, 0)
+    assert carries(g, g.add(a, b)) == 9
 
 
-def test_a_sum_that_one_other_uses_is_added_up_with_it() -> None:
+def test_sums_that_follow_each_other_are_chains_of_their_own() -> None:
     g, a, b, c = three()
-    assert counted(g, g.add(g.add(a, b), c)) == (10, 8, 0)
-
-
-def test_a_sum_with_two_users_is_made_by_itself() -> None:
+    assert carries(g, g.add(g.add(a, b), c)) == 9 + 10
     g, a, b, c = three()
-    first = g.add(a, b)
-    assert counted(g, g.add(first, c), first) == (9 + 10, 0, 0)
+    assert carries(g, g.add(g.shift(g.add(a, b), 2), c)) == 9 + (12 - 2)  # c has the lowest two bits alone
 
 
-def test_a_sum_behind_a_register_is_made_by_itself() -> None:
+def test_bits_above_those_that_are_used_take_no_carries() -> None:
     g, a, b, c = three()
-    assert counted(g, g.add(g.add(a, b), c), stages=(0, 0, 0, 0, 1)) == (9 + 10, 0, 0)
+    assert carries(g, g.bound(g.add(g.add(a, b), c), -128, 127)) == 8 + 8
 
 
-def test_a_sum_is_added_up_with_one_that_shifts_it() -> None:
-    g, a, b, c = three()
-    assert counted(g, g.add(g.shift(g.add(a, b), 2), c)) == (10, 8, 0)  # c has the lowest two bits alone
-
-
-@pytest.mark.parametrize(("subtracted", "carries"), [("", 5), ("coarse", 5), ("fine", 9)])
-def test_what_one_operand_has_alone_takes_no_carries_unless_it_is_subtracted(subtracted: str, carries: int) -> None:
+@pytest.mark.parametrize(("subtracted", "bits"), [("", 5), ("coarse", 5), ("fine", 9)])
+def test_what_one_operand_has_alone_takes_no_carries_unless_it_is_subtracted(subtracted: str, bits: int) -> None:
     g = GraphBuilder()
     fine, coarse = g.input("fine", 4, -128, 127), g.input("coarse", 0, -8, 7)
     sums = {"": lambda: g.add(fine, coarse), "coarse": lambda: g.subtract(fine, coarse)}
-    assert counted(g, sums.get(subtracted, lambda: g.subtract(coarse, fine))()) == (carries, 0, 0)
+    assert carries(g, sums.get(subtracted, lambda: g.subtract(coarse, fine))()) == bits
 
 
-def test_a_constant_is_an_operand() -> None:
+def test_bits_below_the_lowest_one_of_a_constant_take_no_carries() -> None:
     g, a, _, _ = three(frac=4)
-    assert counted(g, g.add(a, g.constant(1, 1))) == (9 - 3, 0, 0)
-    g, a, b, _ = three(frac=4)
-    assert counted(g, g.add(g.add(a, b), g.constant(1, 1))) == (10, 0, 8)
+    assert carries(g, g.add(a, g.constant(1, 1))) == 9 - 3
+    g, a, _, _ = three(frac=4)
+    assert carries(g, g.subtract(a, g.constant(24, 4))) == 9 - 3
+    g, a, _, _ = three(frac=4)
+    assert carries(g, g.subtract(g.constant(24, 4), a)) == 9
 
 
-def test_a_constant_below_all_bits_is_wires() -> None:
+def test_what_lies_below_all_bits_is_wires() -> None:
     g, a, _, _ = three()
-    assert counted(g, g.add(a, g.constant(1, 1))) == (0, 0, 0)
+    assert carries(g, g.add(a, g.constant(1, 1))) == 0
+    g, a, b, _ = three()
+    assert carries(g, g.add(a, g.fraction(g.shift(b, -2), 0))) == 0
 
 
-def test_the_last_sum_of_a_product_by_a_constant_is_added_up_with_what_uses_it() -> None:
-    """5 a = a + 4 a, where 4 a has no lowest two bits; 5 a + b has three operands from there on."""
+def test_what_is_put_below_a_sum_leaves_it_as_it_is() -> None:
+    """The upper 9 bits are a + b; what is added then begins where c does, two bits higher than the lowest."""
+    g, a, b, c = three()
+    joined = g.add(g.add(a, b), g.fraction(g.shift(c, -2), 0))
+    assert carries(g, joined) == 9
+    assert carries(g, g.add(joined, c)) == 9 + 10
+
+
+def test_a_sum_with_zero_is_wires_unless_the_other_is_subtracted() -> None:
+    g, a, _, _ = three()
+    assert carries(g, g.add(g.constant(0, 0), a)) == carries(g, g.subtract(a, g.constant(0, 0))) == 0
+    assert carries(g, g.subtract(g.constant(0, 0), a)) == 9
+
+
+def test_products_by_constants_are_sums_of_their_own() -> None:
+    """5 a = a + 4 a, where 4 a has no lowest two bits."""
     g, a, b, _ = three()
     product = g.scale(a, 5, 0)
-    assert counted(g, g.add(product, b), adders=[product]) == (11, 8, 0)
+    assert carries(g, g.add(product, b), adders=[product]) == (11 - 2) + 11
+
+
+def test_products_of_an_operand_share_sums_in_the_same_pipeline_stage() -> None:
+    """21 a = 16 a + 5 a is one sum more, or three where 5 a is another pipeline stage's."""
     g, a, _, _ = three()
-    product = g.scale(a, 5, 0)
-    assert counted(g, product, adders=[product]) == (11 - 2, 0, 0)
-
-
-def test_a_sum_that_two_products_share_is_made_by_itself() -> None:
-    """5 a is a product of its own, and 21 a = 16 a + 5 a."""
-    g, a, b, _ = three()
     five, more = g.scale(a, 5, 0), g.scale(a, 21, 0)
-    assert counted(g, g.add(five, b), g.add(more, b), adders=[five, more]) == (9 + 11 + 13, 8, 0)
+    shared = carries(g, five, more, adders=[five, more])
+    assert shared == (11 - 2) + (13 - 4)
+    alone = carries(g, five, more, stages=(0, 0, 0, 0, 1), adders=[five, more])
+    assert alone > shared
