@@ -17,7 +17,7 @@ from sosmith.gen.search import AskedRealization, Response, Search
 from sosmith.gen.specification.choices import AUTO, CORES, ERROR_FEEDBACK
 from sosmith.gen.specification.combinations import asked_by
 from sosmith.gen.specification.specification import Specification
-from sosmith.gen.word_lengths.decimator import PreStage, pre_stage_of
+from sosmith.gen.word_lengths.decimation.decimator import PreStage, pre_stage_of
 from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.gen.word_lengths.selection import Progress
 from sosmith.model.dataflow.datapath import Datapath

@@ -17,7 +17,7 @@ from sosmith.gen.realizations.registry import LOOK_AHEAD, REALIZATIONS
 from sosmith.gen.specification import combinations
 from sosmith.gen.specification.choices import AUTO
 from sosmith.gen.specification.specification import Specification
-from sosmith.gen.word_lengths.decimator import PreStage
+from sosmith.gen.word_lengths.decimation.decimator import PreStage
 from sosmith.gen.word_lengths.objective import FEW_ADDERS
 from sosmith.gen.word_lengths.other_realization import with_realization
 from sosmith.gen.word_lengths.quantize import Plan, least_size, plan, prove

@@ -14,7 +14,7 @@ from sosmith.gen.filter.design import Filter, decay_length
 from sosmith.gen.filter.response import complex_response, group_delay
 from sosmith.gen.specification.specification import CalibrationSpec, Specification
 from sosmith.gen.specification.uncertainty import UncertaintySpec
-from sosmith.gen.word_lengths.decimator import PreStage
+from sosmith.gen.word_lengths.decimation.decimator import PreStage
 from sosmith.instrument.calibration.coefficient_covariance import CoefficientUncertainty, of_least_squares
 from sosmith.instrument.uncertainty.budget import SHARE, Budget, Contribution, Kind, of_limits
 from sosmith.instrument.wear.assessment import ClearanceUncertainty

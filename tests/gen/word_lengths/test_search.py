@@ -20,9 +20,10 @@ from sosmith.gen.realizations.registry import CASCADES, REALIZATIONS, Section
 from sosmith.gen.realizations.section_format import SectionFormat
 from sosmith.gen.word_lengths import quantize as quantize_module
 from sosmith.gen.word_lengths.cost import cost_of, cost_of_graphs
+from sosmith.gen.word_lengths.estimates import largest_magnitude
 from sosmith.gen.word_lengths.quantize import Plan, plan, prove
 from sosmith.gen.word_lengths.quantized import Quantized
-from sosmith.gen.word_lengths.search import Search, _largest
+from sosmith.gen.word_lengths.search import Search
 from sosmith.model.dataflow.graph import Range
 from sosmith.model.sections.direct_form import DirectForm1, Product
 
@@ -121,7 +122,7 @@ def test_the_largest_error_is_that_of_the_worst_input(ends: tuple[float, float],
     response = sign * np.array([0.5, -0.125, -2.0, 0.75, 0.25, 0.5])
     driven = np.outer(ends, response)
     tops, bottoms = driven.max(axis=0).cumsum(), driven.min(axis=0).cumsum()
-    assert _largest(response, [ends]) == max(0, *tops, *-bottoms)
+    assert largest_magnitude(response, [ends]) == max(0, *tops, *-bottoms)
 
 
 @pytest.mark.parametrize("realization", ["df1", "df1_ef1", "df1_ef2"])

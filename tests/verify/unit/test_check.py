@@ -57,13 +57,13 @@ def test_every_realization(spec: str, realization: str, architecture: str, chann
 
 FOLDED_BREAKS = {
     "a narrower adder": (
-        r"assign \{ added_wide\[32:27\], added \} = \$signed\((.*)\) \+ \$signed\(product\);",
-        r"assign { added_wide[32:27], added } = $signed(\1) + $signed(product[24:0]);",
+        r"assign \{ added_wide\[32\], added \} = \$signed\((.*)\) \+ \$signed\(product\);",
+        r"assign { added_wide[32], added } = $signed(\1) + $signed(product[30:0]);",
         "added must be the sum before and the product, not another value",
     ),
     "no sign of the product": (
         r"\+ \$signed\(product\);",
-        r"+ $signed({ 1'h0, product[25:0] });",
+        r"+ $signed({ 1'h0, product[30:0] });",
         "added must be the sum before and the product, not another value",
     ),
     "no sign of a factor": (
@@ -72,7 +72,7 @@ FOLDED_BREAKS = {
         "product must be as asked after a clock, not another value",
     ),
     "no sign of what is carried": (
-        r"(assign total\[26:8\] = carried \? )\{ total_high\[18\], ",
+        r"(assign total\[31:8\] = carried \? )\{ total_high\[23\], ",
         r"\1{ 1'h0, ",
         "added must be the sum before and the product, not another value",
     ),

@@ -254,7 +254,7 @@ def test_a_name_is_a_plain_identifier(name: str, copy: Callable[..., Path]) -> N
         proof(forge(folder, renamed))
 
 
-@pytest.mark.parametrize(("name", "old", "new"), [("plain.c", " >> 11", " >> 12"), ("plain.h", "int32_t s0", "int s0")])
+@pytest.mark.parametrize(("name", "old", "new"), [("plain.c", " >> 10", " >> 11"), ("plain.h", "int32_t s0", "int s0")])
 def test_the_c_model_is_read(name: str, old: str, new: str, copy: Callable[..., Path]) -> None:
     folder = copy(PARALLEL)
     changed(folder, name, old, new)

@@ -20,8 +20,8 @@ from sosmith.gen.output.core_facts import core_facts
 from sosmith.gen.output.decimation_facts import direct_design, rate_costs
 from sosmith.gen.output.manifest import manifest
 from sosmith.gen.specification.specification import from_text, from_tree
-from sosmith.gen.word_lengths import decimator as decimator_module
-from sosmith.gen.word_lengths.calibration import calibration_before_decimator
+from sosmith.gen.word_lengths.decimation import decimator as decimator_module
+from sosmith.gen.word_lengths.decimation.calibration import calibration_before_decimator
 from sosmith.gen.word_lengths.quantized import CALIBRATION, DECIMATION
 from sosmith.instrument.scenarios.traces import traces_for
 from sosmith.instrument.uncertainty.instrument_budget import instrument_of

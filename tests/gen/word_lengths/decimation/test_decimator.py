@@ -15,7 +15,7 @@ from sosmith.gen.output.core_facts import core_facts
 from sosmith.gen.output.decimation_facts import direct_design, rate_costs
 from sosmith.gen.output.manifest import manifest
 from sosmith.gen.specification.specification import from_text
-from sosmith.gen.word_lengths.decimator import pre_stage_of
+from sosmith.gen.word_lengths.decimation.decimator import pre_stage_of
 from sosmith.gen.word_lengths.quantized import DECIMATION
 from sosmith.instrument.scenarios.traces import traces_for
 from sosmith.interface.design import Design

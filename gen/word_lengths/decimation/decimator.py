@@ -9,7 +9,7 @@ from fractions import Fraction
 from sosmith.gen.filter.decimation import Decimation, choose, decimated
 from sosmith.gen.filter.design import Filter
 from sosmith.gen.specification.specification import FilterSpec
-from sosmith.gen.word_lengths.calibration import calibration_before_decimator
+from sosmith.gen.word_lengths.decimation.calibration import calibration_before_decimator
 from sosmith.gen.word_lengths.quantize import gain_of
 from sosmith.gen.word_lengths.quantized import CALIBRATION, DECIMATION, Quantized
 from sosmith.model.dataflow.datapath import Datapath

@@ -1,0 +1,1 @@
+"""What stands before a decimated filter: its decimator, and the calibration before that."""

@@ -1,0 +1,236 @@
+"""Double-precision estimates of a cascade's errors: by coefficient, by quantizer, and the ranges of its nodes.
+
+The gain to the output for a quantizer, the response of the derivative for a coefficient, so that errors of several
+coefficients may cancel. They only guide the choice of word lengths; the result is proven afterwards.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from itertools import zip_longest
+
+import numpy as np
+import numpy.typing as npt
+
+from sosmith.gen.filter.design import estimated_length
+from sosmith.gen.proof.linear_model import Source, linear_model, quantizers, transfer_function
+from sosmith.gen.realizations.registry import Section, realization_of
+from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
+from sosmith.model.arithmetic.recursive_filters import lfilter, sosfilt
+from sosmith.model.dataflow.graph import Op
+from sosmith.model.errors import ShortfallError
+
+Array = npt.NDArray[np.float64] | npt.NDArray[np.float32]
+
+Window = tuple[float, float]
+"""Smallest and largest value of an input."""
+
+_EXACT_BITS = 50
+"""Significant bits at which a coefficient counts as exact."""
+
+_ENOUGH = 1 << 14
+"""Number of values to which long responses are added up."""
+
+_LOST = 2.0**-16
+"""Share of a response's sum of magnitudes that may be lost when samples with different signs are added up."""
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Double-precision estimates for a section.
+
+    Attributes
+    ----------
+    ideal : dict of str to float
+        Coefficients by name.
+    slopes : dict of str to array
+        Change of the filter's impulse response for a unit change of each coefficient; long ones as sums of neighbouring
+        samples.
+    gains : dict of str to float
+        Largest centred error at the filter's output for each quantizer, if it rounds to integers.
+    limits : dict of str to tuple of float
+        Smallest and largest value of every node with a stated range, without quantizers.
+    spreads : dict of str to dict of str to float
+        Largest centred error at every such node for each of the section's quantizers, if it rounds to integers.
+    optional : tuple of str
+        Names in `gains` of the quantizers that are optional.
+    products : tuple of str
+        Those of them that are products.
+    """
+
+    ideal: dict[str, float]
+    slopes: dict[str, Array]
+    gains: dict[str, float]
+    limits: dict[str, tuple[float, float]]
+    spreads: dict[str, dict[str, float]]
+    optional: tuple[str, ...]
+    products: tuple[str, ...]
+
+    def rounding(self, fracs: Mapping[str, int]) -> float:
+        """Error at the filter's output of quantizers that keep so many fraction bits."""
+        error = sum(self.gains.get(name, 0.0) * 2.0**-frac for name, frac in fracs.items())
+        if self.products and all(name in fracs for name in self.products):
+            grain = max(fracs[name] for name in (*self.products, "v"))  # of the total, whose bits v drops
+            error -= self.gains.get("v", 0.0) * 2.0**-grain
+            if len(self.products) % 2:  # half a unit is left of what would centre them
+                error += self.gains[self.products[0]] * 2.0 ** -fracs[self.products[0]]
+        return error
+
+    def limits_of(self, node: str, fracs: Mapping[str, int]) -> tuple[float, float]:
+        """Limits of a node with quantizers: they can make a nonnegative node negative, which adds a sign bit."""
+        low, high = self.limits[node]
+        spread = sum(self.spreads[node].get(name, 0.0) * 2.0**-frac for name, frac in fracs.items())
+        return low - spread, high + spread
+
+
+def estimates_of(rows: Sequence[Sequence[float]], realization: str, windows: Sequence[Window]) -> list[Estimate]:
+    """Estimate every section of a cascade.
+
+    Parameters
+    ----------
+    rows : sequence of sequence of float
+        b0, b1, b2, 1, a1, a2 of each section.
+    realization : str
+        Its name, known to `sosmith.gen.realizations.registry.realization_of`.
+    windows : sequence of Window
+        What the cascade's input keeps to; of several, one at a time.
+
+    Raises
+    ------
+    ShortfallError
+        If a section cannot be built, or its response does not decay in time.
+    """
+    sos = np.array(rows, dtype=np.float64)
+    impulse = np.zeros(estimated_length(sos))
+    impulse[0] = 1.0
+    through = [sosfilt(sos[:k], impulse) if k else impulse for k in range(len(rows))]
+    behind = [sosfilt(sos[k + 1 :], impulse) if k + 1 < len(rows) else impulse for k in range(len(rows))]
+    others = [sosfilt(np.delete(sos, k, axis=0), impulse) if len(rows) > 1 else impulse for k in range(len(rows))]
+    result = []
+    for k, row in enumerate(rows):
+        section = _exact(row, realization)
+        model = linear_model(section.graph)
+        poles = _floats(model.denominator)
+        names = {i: section.graph.nodes[i].name for i in model.bounds}
+        quantizers = [source for source in model.sources if source.kept is not None]
+        result.append(
+            Estimate(
+                ideal={name: integer * 2.0**-frac for name, (integer, frac) in section.coefficients.items()},
+                slopes={name: _slope(row, realization, section, name, others[k]) for name in section.coefficients},
+                gains={s.name: _gain(s, model.output, poles, behind[k]) for s in quantizers},
+                limits={
+                    name: _limits(_filtered(model.sources[0].numerators[i], poles, through[k]), windows)
+                    for i, name in names.items()
+                },
+                spreads={name: {s.name: _gain(s, i, poles, impulse) for s in quantizers} for i, name in names.items()},
+                optional=section.optional_quantizers,
+                products=tuple(name for name in _products(section) if name in {s.name for s in quantizers}),
+            )
+        )
+    return _added_up(result)
+
+
+def largest_magnitude(response: Array, windows: Sequence[Window]) -> float:
+    """Largest magnitude of a response to inputs that stay within a window from reset on."""
+    low, high = windows[0]  # of several, all give the same
+    if low > 0 or high < 0:
+        return max(map(abs, _limits(response, windows)))
+    # With zero between its ends, the worst input never brings the output back: whole sums are enough.
+    magnitudes, total = float(np.abs(response).sum()), float(response.sum())
+    above, below = (magnitudes + total) / 2, (magnitudes - total) / 2
+    return max(above * high - below * low, below * high - above * low)
+
+
+def _products(section: Section) -> tuple[str, ...]:
+    """Names of the products whose quantizers are optional."""
+    return tuple(n.name for n in section.graph.nodes if n.op is Op.SCALE and n.name in section.optional_quantizers)
+
+
+def _added_up(estimates: Sequence[Estimate]) -> list[Estimate]:
+    """Replace slopes that are much longer than `_ENOUGH` by sums of neighbours, as long as these have the same sign."""
+    slopes = [slope for estimate in estimates for slope in estimate.slopes.values()]
+    step = 1
+    while len(slopes[0]) >= 2 * step * _ENOUGH and all(
+        np.abs(_sums(slope, 2 * step)).sum() >= (1 - _LOST) * np.abs(slope).sum() for slope in slopes
+    ):
+        step *= 2
+    return [
+        replace(estimate, slopes={name: _single(_sums(slope, step)) for name, slope in estimate.slopes.items()})
+        for estimate in estimates
+    ]
+
+
+def _single(values: Array) -> Array:
+    """Cut values to single precision if they are many."""
+    return values.astype(np.float32) if len(values) > 2 * _ENOUGH else values
+
+
+def _sums(values: Array, step: int) -> Array:
+    return values if step == 1 else np.add.reduceat(values, np.arange(0, len(values), step))
+
+
+def _gain(quantizer: Source, node: int, poles: Sequence[float], behind: Array) -> float:
+    """Largest error through a node of a quantizer to integers: half a unit for FLOOR (centred), one for TRUNCATE."""
+    unit = 1.0 if quantizer.low < 0 else 0.5
+    return unit * float(np.abs(_filtered(quantizer.numerators[node], poles, behind)).sum())
+
+
+def _exact(
+    row: Sequence[float], realization: str, coefficients: Mapping[str, tuple[int, int]] | None = None
+) -> Section:
+    """Build a section with exact coefficients, except for those given, in which every quantizer drops bits."""
+    build = realization_of(realization).build
+    # An operand has bits to drop only if its terms have fraction bits: those of the input, too, as b0's has no others.
+    formats = SectionFormat(coefficient_bits=_EXACT_BITS, coefficients=coefficients or {}, x=unknown_range(1))
+    section = build(row, formats, "section")
+    fracs = dict.fromkeys(quantizers(section.graph), 1) | dict.fromkeys(section.optional_quantizers, 0)
+    fracs |= dict.fromkeys(_products(section), 2)  # more than v keeps, which would drop nothing otherwise
+    return build(row, replace(formats, fracs=fracs), "section")
+
+
+def _slope(row: Sequence[float], realization: str, section: Section, name: str, others: Array) -> Array:
+    """Impulse response of the derivative of a section by a coefficient, filtered by all other sections."""
+    integer, frac = section.coefficients[name]
+    shift = max(0, 30 - abs(integer).bit_length())
+    step = max(1, abs(integer) << shift >> 24)
+    moved = (integer << shift) + step, frac + shift
+    try:
+        moved_to = _exact(row, realization, {name: moved})
+    except ShortfallError:
+        moved_to = _exact(row, realization, {name: (moved[0] - 2 * step, moved[1])})
+        step = -step
+    (b, a), (changed_b, changed_a) = transfer_function(section.graph), transfer_function(moved_to.graph)
+    delta = step * Fraction(2) ** -moved[1]
+    terms = [
+        (above - below) / delta
+        for above, below in zip_longest(_product(changed_b, a), _product(b, changed_a), fillvalue=Fraction(0))
+    ]
+    return _filtered((1,), _floats(changed_a), _filtered(terms, _floats(a), others))
+
+
+def _product(a: Sequence[Fraction], b: Sequence[Fraction]) -> list[Fraction]:
+    result = [Fraction(0)] * (len(a) + len(b) - 1)
+    for i, x in enumerate(a):
+        for j, y in enumerate(b):
+            result[i + j] += x * y
+    return result
+
+
+def _floats(values: Sequence[Fraction | int]) -> list[float]:
+    return [float(value) for value in values]
+
+
+def _filtered(numerator: Sequence[Fraction | int], denominator: Sequence[float], values: Array) -> Array:
+    return lfilter(_floats(numerator), denominator, values)
+
+
+def _limits(response: Array, windows: Sequence[Window]) -> tuple[float, float]:
+    """Smallest and largest value of a response to inputs that stay within a window from reset on."""
+    smallest = largest = 0.0
+    for ends in windows:
+        low, high = response * ends[0], response * ends[1]
+        smallest = min(smallest, float(np.minimum(low, high).cumsum().min()))
+        largest = max(largest, float(np.maximum(low, high).cumsum().max()))
+    return smallest, largest
