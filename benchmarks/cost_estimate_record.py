@@ -163,8 +163,9 @@ and `explore` show estimates of LUT4 and flip-flops. They count bits of sums, pr
 memories in the plan of the hardware as synthesis makes them, each times a factor for its architecture and family of
 FPGA: the bits of each sum that are used, products that several multiplier blocks make, memories in slices, of block RAM
 or of LUT4 by what Yosys weighs them with. Factors are fitted to synthesis with Yosys of what seeds up to {FITTED_UP_TO}
-draw{of_cores}. Errors are those on what later seeds draw, which was looked at neither by the fit nor while quantities
-were chosen. {drawn}
+draw{of_cores}, and drawn to those of an earlier version of the hardware, as few draws tell of each. Errors are those on
+what later seeds draw, which was looked at neither by the fit nor while quantities were chosen. {drawn}
+
 Drawn are filters of all families, kinds and realizations, orders 1 to 4, some calibrated, with up to 32 channels,
 reload, protect, start, decimate, look-ahead, several samples a clock and limits of multipliers, but no parallel cores
 with reload on FPGAs without multiplier blocks. iCE40 is the UP5K and the HX8K, ECP5 the LFE5U-25F, Gowin the GW1NR-9C.
