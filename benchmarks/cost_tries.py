@@ -33,7 +33,7 @@ TRIES = (
             "Sums from LUT4 instead of carry cells (`synth_ecp5 -noccu2`): 2,349.",
             "More optimization by ABC (`-abc2`), retiming (`-retime`): 623 as without.",
         ),
-        obstacle="506 of the 623 are 253 carry cells, counted as two LUT4 each: each bit of a sum is half a carry cell.",
+        obstacle="506 of the 623 are 253 carry cells, counted as two LUT4 each; each bit of a sum is half of one.",
     ),
     Tried(
         goal="flange_wear_locomotive folded on iCE40 UP5K, at most 10 % more logic cells for 64 channels than for one: "

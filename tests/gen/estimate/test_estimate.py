@@ -18,7 +18,7 @@ from benchmarks.cost_estimate_record import (
     recorded,
     rows_of,
 )
-from benchmarks.cost_fit import errors, fitted
+from benchmarks.cost_fit import EARLIER, Row, errors, fitted
 
 from sosmith.gen.architectures.registry import ARCHITECTURES
 from sosmith.gen.core import CoreDesign, design_core
@@ -92,6 +92,23 @@ def test_the_factors_are_those_of_the_fit() -> None:
                 recorded_factors = told[architecture][family][target]
                 for name in factors.keys() | recorded_factors.keys():  # another machine may leave one at 0
                     assert factors.get(name, 0.0) == pytest.approx(recorded_factors.get(name, 0.0), abs=0.01), name
+
+
+def test_factors_that_no_design_tells_of_are_those_of_the_earlier_fit() -> None:
+    earlier = json.loads(EARLIER.read_text(encoding="utf-8"))
+    quantities = {"words": 18, "unheard_of": 80, "registers": 60}
+    row = Row(
+        name="", architecture="folded", family="ecp5", unseen=False, quantities=quantities, luts=200, flip_flops=50
+    )
+    found = fitted([row])
+    for architecture, families in found.items():
+        for family, of in families.items():
+            words = of["luts"].get("words", 0)
+            assert words >= 0
+            if (architecture, family) != ("folded", "ecp5"):
+                assert words == earlier[architecture][family]["luts"].get("words", 0)
+    assert found["folded"]["ecp5"]["luts"]["unheard_of"] > 1
+    assert found["folded"]["ice40"]["luts"]["unheard_of"] > 1  # as on the other family
 
 
 def with_every_quantity() -> list[Recorded]:
