@@ -119,6 +119,16 @@ def nine_in_ten(found: Sequence[float]) -> float:
     return float(np.ceil(100 * np.sort(np.abs(found))[int(np.ceil(0.9 * len(found))) - 1]) / 100)
 
 
+def _drawn(record: Sequence[Recorded]) -> str:
+    """Say how many of the seeds are recorded, and in which order they were taken."""
+    seeds = [row for row in record if "seed" in row]
+    refused = sum("refused" in row for row in seeds)
+    return (
+        f"Recorded are {len(seeds)} draws of the hardware as it is, of which {refused} cannot be met.\n"
+        "Architectures and families take turns, each with its seeds in their order."
+    )
+
+
 def section(record: Sequence[Recorded]) -> str:
     """Return the section of docs/cost.md."""
     rows, factors = rows_of(record), json.loads(FITTED.read_text(encoding="utf-8"))["factors"]
@@ -143,19 +153,22 @@ def section(record: Sequence[Recorded]) -> str:
         ends = f"{100 * nine_in_ten(luts):.0f} % | {100 * nine_in_ten(flip_flops):.0f} %"
         lines.append(f"| {title} | {len(of_fit)} | {len(tested)} | {share} | {ends} |")
     table = "\n".join(lines)
+    of_cores = ", and of cores above" if any("core" in row for row in record) else ""
+    drawn = _drawn(record)
     return f"""
 ## Estimates before synthesis
 
 Written by `python -m benchmarks.cost_estimate` from `benchmarks/cost_estimate.json`. `design`, the report, the studio
 and `explore` show estimates of LUT4 and flip-flops. They count bits of sums, products, choices, comparisons and
 memories in the plan of the hardware as synthesis makes them, each times a factor for its architecture and family of
-FPGA: sums that are merged, products that several multiplier blocks make, memories in slices, of block RAM or of LUT4 by
-what Yosys weighs them with. Factors are fitted to synthesis with Yosys of what the seeds up to {FITTED_UP_TO} draw, and
-of cores above. Errors are those on what later seeds draw, which was looked at neither by the fit nor while quantities
-were chosen. Drawn are filters of all families, kinds and realizations, orders 1 to 4, some calibrated, with up to 32
-channels, reload, protect, start, decimate, look-ahead, several samples a clock and limits of multipliers, but no
-parallel cores with reload on FPGAs without multiplier blocks. iCE40 is the UP5K and the HX8K, ECP5 the LFE5U-25F, Gowin
-the GW1NR-9C.
+FPGA: the bits of each sum that are used, products that several multiplier blocks make, memories in slices, of block RAM
+or of LUT4 by what Yosys weighs them with. Factors are fitted to synthesis with Yosys of what seeds up to {FITTED_UP_TO}
+draw{of_cores}, and drawn to those of an earlier version of the hardware, as few draws tell of each. Errors are those on
+what later seeds draw, which was looked at neither by the fit nor while quantities were chosen. {drawn}
+
+Drawn are filters of all families, kinds and realizations, orders 1 to 4, some calibrated, with up to 32 channels,
+reload, protect, start, decimate, look-ahead, several samples a clock and limits of multipliers, but no parallel cores
+with reload on FPGAs without multiplier blocks. iCE40 is the UP5K and the HX8K, ECP5 the LFE5U-25F, Gowin the GW1NR-9C.
 
 {table}
 """

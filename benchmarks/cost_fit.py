@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import json
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,6 +18,10 @@ from sosmith.gen.architectures.registry import ARCHITECTURES
 from sosmith.gen.estimate.estimate import TITLES, total
 
 Factors = dict[str, float]
+
+EARLIER = Path(__file__).with_name("cost_earlier.json")
+"""Factors by architecture, family and target, fitted to 389 syntheses of the hardware as it was before sums were carry
+chains of their own, with seeds that are for the fit alone."""
 
 _NO_LUTS = {"registers", "memory_bits", "blocks", "rams"}
 """Quantities that take no LUT4."""
@@ -30,7 +37,7 @@ _EXPECTED = {
 
 _PULLS = (0.2, 0.6, 0.8)
 """How strongly factors are drawn: those of all designs to what is expected, those of an architecture to these, and
-those of a family of FPGA to those of the architecture."""
+those of a family of FPGA to `EARLIER` ones, or to those of the architecture where a quantity is new to it."""
 
 
 _LEAST = 0.1
@@ -68,7 +75,7 @@ def fitted(rows: Sequence[Row]) -> dict[str, dict[str, dict[str, Factors]]]:
     """Return the factors of LUT4 and of flip-flops, by architecture and family.
 
     They minimize the squares of relative errors, and are not negative. Those of an architecture are drawn to those of
-    all, and those of a family to those of its architecture, as few designs tell of each.
+    all, and those of a family to those of an earlier fit or of its architecture, as few designs tell of each.
     """
     found: dict[str, dict[str, dict[str, Factors]]] = defaultdict(lambda: defaultdict(dict))
     known = [row for row in rows if not row.unseen]
@@ -84,11 +91,28 @@ def fitted(rows: Sequence[Row]) -> dict[str, dict[str, dict[str, Factors]]]:
             common = _least_squares(here, chosen, target, of_all, _PULLS[1])
             for family in TITLES:
                 own = [row for row in here if row.family == family]
-                factors = _least_squares(own, chosen, target, common, _PULLS[2])
+                before = _with_earlier(architecture, family, target, chosen, common)
+                factors = _least_squares(own, chosen, target, before, _PULLS[2])
                 found[architecture][family][target] = {
                     name: round(float(factor), 3) for name, factor in zip(chosen, factors, strict=True) if factor
                 }
     return {architecture: dict(families) for architecture, families in found.items()}
+
+
+def _with_earlier(
+    architecture: str, family: str, target: str, names: Sequence[str], common: npt.NDArray[np.float64]
+) -> npt.NDArray[np.float64]:
+    """Return the factors of an earlier fit; those in common for quantities that it had in no family."""
+    families = _earlier()[architecture]
+    known = {name for of in families.values() for name in of[target]}
+    own = families[family][target]
+    return np.array([own.get(name, 0.0) if name in known else usual for name, usual in zip(names, common, strict=True)])
+
+
+@cache
+def _earlier() -> dict[str, dict[str, dict[str, Factors]]]:
+    content: dict[str, dict[str, dict[str, Factors]]] = json.loads(EARLIER.read_text(encoding="utf-8"))
+    return content
 
 
 def _least_squares(

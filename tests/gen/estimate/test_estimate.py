@@ -1,14 +1,24 @@
 """The estimate of cost before synthesis: its error on recorded synthesis, its quantities, and what it is for."""
 
 import json
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from benchmarks import cost_estimate
 from benchmarks.cost_draws import draw
-from benchmarks.cost_estimate_record import GOAL, Recorded, designed, nine_in_ten, recorded, rows_of
-from benchmarks.cost_fit import errors, fitted
+from benchmarks.cost_estimate_record import (
+    GOAL,
+    Recorded,
+    designed,
+    in_turn,
+    is_unseen,
+    nine_in_ten,
+    recorded,
+    rows_of,
+)
+from benchmarks.cost_fit import EARLIER, Row, errors, fitted
 
 from sosmith.gen.architectures.registry import ARCHITECTURES
 from sosmith.gen.core import CoreDesign, design_core
@@ -84,6 +94,23 @@ def test_the_factors_are_those_of_the_fit() -> None:
                     assert factors.get(name, 0.0) == pytest.approx(recorded_factors.get(name, 0.0), abs=0.01), name
 
 
+def test_factors_that_no_design_tells_of_are_those_of_the_earlier_fit() -> None:
+    earlier = json.loads(EARLIER.read_text(encoding="utf-8"))
+    quantities = {"words": 18, "unheard_of": 80, "registers": 60}
+    row = Row(
+        name="", architecture="folded", family="ecp5", unseen=False, quantities=quantities, luts=200, flip_flops=50
+    )
+    found = fitted([row])
+    for architecture, families in found.items():
+        for family, of in families.items():
+            words = of["luts"].get("words", 0)
+            assert words >= 0
+            if (architecture, family) != ("folded", "ecp5"):
+                assert words == earlier[architecture][family]["luts"].get("words", 0)
+    assert found["folded"]["ecp5"]["luts"]["unheard_of"] > 1
+    assert found["folded"]["ice40"]["luts"]["unheard_of"] > 1  # as on the other family
+
+
 def with_every_quantity() -> list[Recorded]:
     """Return rows with every quantity and family of each architecture, which are designed at once."""
     drawn = [row for row in recorded() if "seed" in row and "refused" not in row]
@@ -114,6 +141,41 @@ def test_estimates_are_the_recorded_quantities_times_the_factors(row: Recorded) 
     assert told.luts == round(sum(factors["luts"].get(name, 0) * amount for name, amount in found.items()))
     assert told.luts == pytest.approx(row["luts"], rel=0.4)
     assert told.flip_flops == pytest.approx(row["flip_flops"], rel=0.4)
+
+
+def test_architectures_and_families_take_turns_two_draws_for_the_fit_and_one_to_test() -> None:
+    seeds = in_turn(576)
+    assert sorted(seeds) == list(range(1, 577))
+    groups = [(_architecture(seed), find_board(draw(seed).board).device.family) for seed in seeds[:36]]
+    assert groups[:12] == groups[12:24] == groups[24:] == sorted(set(groups))
+    for own in (seeds[k:36:12] for k in range(12)):
+        assert [is_unseen(seed) for seed in own] == [False, True, False]
+        assert own[0] < own[2]
+    assert in_turn(5) == [1, 5, 2, 3, 4]
+
+
+def _architecture(seed: int) -> str:
+    return str(tomllib.loads(draw(seed).toml)["hardware"]["architecture"])
+
+
+def test_what_is_the_same_when_drawn_again_is_not_synthesized(monkeypatch: pytest.MonkeyPatch) -> None:
+    (row,) = (row for row in recorded() if row.get("seed") == 3)
+    known = {**row, "luts": 1, "quantities": {}}
+    assert cost_estimate.measured(3, known) == {**row, "luts": 1}
+    core = {"core": "of another kind"}
+    monkeypatch.setattr(cost_estimate, "recorded", lambda: [known, {"seed": 4}, core])
+    monkeypatch.setattr(cost_estimate, "in_turn", lambda count: [5, 3][:count])
+    asked: list[object] = []
+
+    def measured(seed: int, known: Recorded | None) -> Recorded:
+        asked.append((seed, known))
+        return {"seed": seed, "luts": 7}
+
+    monkeypatch.setattr(cost_estimate, "measured", measured)
+    monkeypatch.setattr(cost_estimate, "write", lambda rows: asked.append([*rows]))
+    cost_estimate.measure(2, again=True)
+    first, second = {"seed": 5, "luts": 7}, {"seed": 3, "luts": 7}
+    assert asked == [(5, None), [core, first], (3, known), [core, first, second]]
 
 
 @pytest.mark.parametrize(("added", "faults"), [(0, None), (1, "draw 3 must have the quantities recorded, not others")])
