@@ -29,11 +29,14 @@ class ReadBack:
         Gain of the filter behind it at zero frequency.
     voltages : tuple of float
         Lowest and highest voltage of the input.
+    bound : float
+        Proven bound of the error of a result, in mm.
     """
 
     polynomial: Polynomial
     gain: float
     voltages: Range
+    bound: float
 
     def voltage(self, result: float, temperature: float) -> tuple[float, float]:
         """Return the steady voltage in V of a steady result in mm, and V per mm there.

@@ -14,7 +14,7 @@ RANGE = (0.0, 10.0)
 @pytest.mark.parametrize(("gain", "temperature"), [(1.0, 21.0), (0.98, -5.0), (1.02, 98.0)])
 def test_the_voltage_of_a_result_comes_back(voltage: float, gain: float, temperature: float) -> None:
     result = gain * float(EQUATION_5A(voltage, temperature))
-    found, slope = ReadBack(EQUATION_5A, gain, RANGE).voltage(result, temperature)
+    found, slope = ReadBack(EQUATION_5A, gain, RANGE, 0.0).voltage(result, temperature)
     assert found == pytest.approx(voltage, abs=1e-9)
     near = np.clip([voltage - 1e-4, voltage + 1e-4], *RANGE)
     rise = gain * np.diff(EQUATION_5A(near, temperature))[0] / np.diff(near)[0]
@@ -23,11 +23,11 @@ def test_the_voltage_of_a_result_comes_back(voltage: float, gain: float, tempera
 
 def test_what_has_no_voltage_or_two_is_refused() -> None:
     with pytest.raises(ShortfallError, match=r"^the result must be 1\.084 to 10\.71 mm by the calibration, not 11$"):
-        ReadBack(EQUATION_5A, 1.0, RANGE).voltage(11.0, 21.0)
+        ReadBack(EQUATION_5A, 1.0, RANGE, 0.0).voltage(11.0, 21.0)
     bent = Polynomial.from_numbers([[1.0], [-1.0], [0.25]])
     message = (
         "^the active calibration must rise with the voltage, for the voltage to follow from the clearance, not fall at "
         "0 V$"
     )
     with pytest.raises(ShortfallError, match=message):
-        ReadBack(bent, 1.0, RANGE).voltage(2.0, 21.0)
+        ReadBack(bent, 1.0, RANGE, 0.0).voltage(2.0, 21.0)

@@ -23,7 +23,7 @@ GAUGE: dict[str, Any] = {
     "input": {"voltage": {"bits": 16, "range": [0.0, 10.0]}, "temperature": {"bits": 12, "range": [0.0, 128.0]}},
     "calibration": {"coefficients": [[1.16, -0.0036], [0.3672, 0.0006618], [0.05812]]},
     "filter": {"family": "butterworth", "kind": "lowpass", "order": 1, "cutoff": 20.0},
-    "output": {"bits": 16, "range": [0.0, 16.0], "unit": "mm", "max_error": 0.01},
+    "output": {"bits": 16, "range": [0.0, 16.0], "unit": "mm", "max_error": 0.0005},
     "hardware": {"realization": "df1_ef1", "architecture": "parallel"},
 }
 """An instrument that follows a target in some hundredths of a second."""

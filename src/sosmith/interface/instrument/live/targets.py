@@ -50,7 +50,8 @@ class LiveReading:
     voltage, temperature : float
         Mean voltage in V that this result is of, and temperature in degC.
     scatter, uncertainty : float
-        Standard deviation of a single result and standard uncertainty of the mean, in V.
+        Standard deviation of a single result and standard uncertainty of the mean, in V; the core's proven bound of the
+        error counts as half the width of a rectangular distribution.
     count : int
         Number of results.
     """
@@ -183,16 +184,18 @@ class LiveTargets:
         step, least = f"reading {clearance:g} mm", 1.0 if self._back is not None else LEAST
         mean = self._reader.read(seconds, STEADY * uncertainty * least, lambda done, total: progress(step, done, total))
         voltage, slope = mean.value, 1.0
+        # Of a result that stands still, anything within the proven bound may be the error, the same in all results.
+        error = float(self._board.identity.output_port.lsb) / 2 / math.sqrt(3)
         if self._back is not None:
             voltage, slope = self._back.voltage(mean.value, temperature)
-        quantum = float(self._board.identity.output_port.lsb) / math.sqrt(12)
+            error = self._back.bound / math.sqrt(3)
         return LiveReading(
             clearance,
             mean.value,
             voltage,
             temperature,
             slope * mean.scatter,
-            slope * math.hypot(mean.uncertainty, quantum),
+            slope * math.hypot(mean.uncertainty, error),
             mean.count,
         )
 
@@ -209,12 +212,15 @@ def _read_back(about: Identity, files: Path | None, loaded: Mapping[str, Any] | 
     voltage = about.input_ports[0]
     rows: Any
     if loaded is not None:
-        if not {"calibration", "zero_frequency_gain"} <= loaded.keys():
+        if not {"calibration", "zero_frequency_gain", "error_bound"} <= loaded.keys():
             raise SpecificationError("the set must say its calibration, as `sosmith reload` writes it, not only words")
         rows, gain = loaded["calibration"], float(loaded["zero_frequency_gain"])
+        bound = float(loaded["error_bound"])
     else:
-        ideal = read_certificate(folder / f"{about.name}.certificate.json").ideal
+        certificate = read_certificate(folder / f"{about.name}.certificate.json")
+        ideal = certificate.ideal
         rows, gain = ideal.polynomial, 1.0
+        bound = float(Fraction(certificate.claims.bound)) * float(about.output_port.lsb)
         for section in ideal.sections:
             gain *= float(sum(map(Fraction, section.numerator)) / sum(map(Fraction, section.denominator)))
     if not rows or not gain:
@@ -222,7 +228,7 @@ def _read_back(about: Identity, files: Path | None, loaded: Mapping[str, Any] | 
             f"the core {about.name} must have a calibration, and pass what stands still, for its targets to be read"
         )
     low, high = voltage.decode(np.array([voltage.lowest, voltage.highest])).tolist()
-    return ReadBack(Polynomial.from_numbers(rows), gain, (low, high))
+    return ReadBack(Polynomial.from_numbers(rows), gain, (low, high), bound)
 
 
 def readings_table(readings: list[LiveReading]) -> Table:
