@@ -34,7 +34,7 @@ TEXTS = {
     "cascade": STEADY.replace("bits = 8", "bits = 16").replace("order = 2", "order = 5"),
     "wide": WIDE.replace("bits = 12", "bits = 32").replace("bits = 24", "bits = 32").replace("0.0005", '"faithful"'),
 }
-REALIZATIONS = {"delta": "delta"}
+REALIZATIONS = {"delta": "delta", "wide": "df1_ef2"}
 
 
 class Model(NamedTuple):
@@ -226,7 +226,7 @@ def test_another_header_is_refused(old: str, new: str, model: Callable[[str], Mo
 
 def test_a_state_that_does_not_hold_its_values_is_refused(model: Callable[[str], Model]) -> None:
     header = model("wide").header
-    changed = re.sub(r"int64_t (s\d+);", r"int32_t \1;", header, count=1)
+    changed = re.sub(r"__int128 (s\d+);", r"int64_t \1;", header, count=1)
     assert changed != header
     with pytest.raises(RejectedError, match=r"^state \d+ must hold -?\d+\.\.\d+$"):
         model("wide").check(header=changed)
