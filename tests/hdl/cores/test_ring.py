@@ -1,3 +1,4 @@
+# amaranth: UnusedElaboratable=no
 """The core with rings: what it refuses, and what a half-band decimator takes on an FPGA."""
 
 from __future__ import annotations
