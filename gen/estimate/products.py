@@ -11,6 +11,9 @@ from sosmith.gen.word_lengths.cost import Multiplication, Operand, multiplicatio
 from sosmith.model.dataflow.graph import Graph, Node, Op
 from sosmith.model.reload.constants import bits_of
 
+_LEAST_BITS = 3
+"""Bits of a part of a product from which on it takes a multiplier block, as synthesis has them."""
+
 
 class Product(NamedTuple):
     """A product as the hardware has it.
@@ -21,17 +24,21 @@ class Product(NamedTuple):
         Its operands, data first.
     constant : int or None
         What is multiplied by, as many bits as the factor; None for two values.
+    width : int or None
+        Bits of the result, if its range takes fewer than the operands have together.
     """
 
     operands: Multiplication
     constant: int | None = None
+    width: int | None = None
 
     @property
     def bits(self) -> int:
         """Bits that are computed: all of them, or as many as a negative constant has without a sign."""
         data, factor = self.operands.size
         cut = self.constant is not None and self.constant < 0 and not self.operands.data.signed
-        return factor if cut else data + factor
+        bits = factor if cut else data + factor
+        return bits if self.width is None else min(bits, self.width)
 
     @property
     def is_wires(self) -> bool:
@@ -46,10 +53,10 @@ def product_in(graph: Graph, node: Node, *, loads: bool) -> Product | None:
         return None
     if loads:
         factor = Operand(bits_of(node.parameter), signed=True) if node.op is Op.SCALE else found.factor
-        return Product(Multiplication(found.data, factor))
+        return Product(Multiplication(found.data, factor), width=node.width)
     if node.op is Op.SCALE:
-        return Product(found, node.parameter)
-    return _of_constant_node(graph, node) or Product(found)
+        return Product(found, node.parameter, node.width)
+    return _of_constant_node(graph, node) or Product(found, width=node.width)
 
 
 def _of_constant_node(graph: Graph, node: Node) -> Product | None:
@@ -63,19 +70,28 @@ def _of_constant_node(graph: Graph, node: Node) -> Product | None:
             bits = node.width if constant.signed and not value.signed else constant.width
             signed = constant.signed and value.signed
             operands = Multiplication(Operand(value.width, value.signed), Operand(bits, signed))
-            return Product(operands, constant.parameter)
+            return Product(operands, constant.parameter, node.width)
     return None
 
 
 def of_product(product: Product, device: Device) -> Quantities:
     """Count a product as synthesis makes it on a device."""
-    operands, constant = product
+    operands, constant = product.operands, product.constant
     if product.is_wires:
         return Counter({"sums": operands.data.bits} if constant is not None and constant < 0 else {})
     if device.multiplier is None:
         return _soft(operands) if constant is None else Counter({"soft_products": _added_bits(product, constant)})
     block = device.factor_bits
-    return Counter({"blocks": operands.blocks_of(block), "joined": _joined(product, block)})
+    blocks = operands.blocks_of(block) - _narrow_parts(product, device)
+    return Counter({"blocks": blocks, "joined": _joined(product, block)})
+
+
+def _narrow_parts(product: Product, device: Device) -> int:
+    """Return the parts of a product of several blocks of which so few bits are left that they are made of LUT4."""
+    block = device.factor_bits
+    starts = [range(0, size, block) for size in product.operands.size]
+    left = [product.bits - low - high for low in starts[0] for high in starts[1] if low + high]
+    return sum(0 < bits < _LEAST_BITS for bits in left)
 
 
 def _joined(product: Product, block: int) -> int:
