@@ -168,17 +168,18 @@ def _verdict(found: dict[str, Any]) -> list[str]:
         {pairs["polynomial", "parallel", "luts"]:,.0f}. It costs {of_table("block_rams_at_once"):.0f} block RAM, or
         {2 * of_table("block_rams_at_once"):.0f} with a second bank, and {of_table("reload_words"):,.0f} words to load
         in place of {pairs["polynomial", "parallel", "words"]:.0f}. That is worth it for samples at every clock or
-        nearly so, which no sensor of wear gives, and it is not built: `parallel` has the polynomial, too. How many segments
-        a table needs depends on the curve of the day, so that hardware with a table refuses a curve that is bent more
-        than what it was made for; the polynomial of its order has no such limit, but that of its coefficients' widths.
+        nearly so, which no sensor of wear gives, and it is not built: `parallel` has the polynomial, too. How many
+        segments a table needs depends on the curve of the day, so that hardware with a table refuses a curve that is
+        bent more than what it was designed with; the polynomial of its order has no such limit, but that of its
+        coefficients' widths.
     """
     return ["## Which is cheaper", "", *_wrapped(shared), *_wrapped(own)]
 
 
 def _room(found: dict[str, Any]) -> list[str]:
     text = """
-        In `parallel` every coefficient has as many bits as that of the curve that the hardware is designed with, and one
-        more. Curves of days and sensors that are hardly apart differ much in their coefficients. `calibrate export
+        In `parallel` every coefficient has as many bits as that of the curve that the hardware is designed with, and
+        one more. Curves of days and sensors that are hardly apart differ much in their coefficients. `calibrate export
         --room` writes a curve to design with in whose coefficients every curve within so many mm over the ports fits,
         proven by Markov's inequality for coefficients. Here each curve's own hardware, by itself, is given the sets of
         all curves; *refused* are those that do not fit.

@@ -35,7 +35,8 @@ def chebyshev(order: int) -> tuple[int, ...]:
     >>> chebyshev(2)
     (1, -8, 8)
     """
-    before, this = (1,), (-1, 2)
+    before: tuple[int, ...] = (1,)
+    this: tuple[int, ...] = (-1, 2)
     if order == 0:
         return before
     for _ in range(order - 1):  # T_(n+1) = 2 (2 x - 1) T_n - T_(n-1)

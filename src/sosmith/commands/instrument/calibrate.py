@@ -320,7 +320,7 @@ def export_command(
         sosmith calibrate export --sensor left --room 1 -o hardware.toml
     """
     if room is not None and file_format != "toml":
-        raise click.UsageError(f"--format must be toml with --room, not {file_format}")
+        raise SpecificationError(f"--format must be toml with --room, not {file_format}")
     from sosmith.interface.instrument.calibration_store import CalibrationStore
 
     kept = CalibrationStore(store)
