@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import re
 import tempfile
 from collections.abc import Iterator
 from dataclasses import replace
@@ -16,7 +17,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from benchmarks.day_bench import MAX_ERROR, ORDER, RATE, SCENARIOS, TARGETS, calibrated
+from benchmarks.day_bench import MAX_ERROR, ORDER, RATE, SCENARIOS, SET_ERROR, TARGETS, calibrated
 from benchmarks.day_table_page import page
 from benchmarks.interpolated_table import Table, rows_of, smallest
 from examples.wear_campaign import hardware
@@ -25,10 +26,12 @@ from examples.wear_campaign.bench import PAPER_FILTER
 from sosmith.gen.architectures.architecture import Architecture
 from sosmith.gen.architectures.folded import Folded
 from sosmith.gen.architectures.parallel import Parallel
+from sosmith.gen.calibration.day_room import with_day_room
 from sosmith.gen.core import design_core, polynomial_of
 from sosmith.gen.estimate.estimate import estimated, on_board
 from sosmith.gen.fpga.boards import find_board
 from sosmith.gen.reload.register_writes import bank_size
+from sosmith.gen.reload.reload import check_swap, other_set
 from sosmith.gen.specification.specification import Specification, load
 from sosmith.gen.word_lengths.input_stage import normalised
 from sosmith.instrument.scenarios.file import load_scenario
@@ -48,6 +51,9 @@ RUN, SENSORS, FIRST_SEED = "bench_43_50", 20, 39001
 
 ALLOWED = {"1 LSB": None, "as on the bench": Fraction(str(MAX_ERROR)), "half a target's uncertainty": Fraction(1, 100)}
 """Errors in mm that the calibration is allowed by itself; None is the output's LSB."""
+
+ROOMS = (None, Fraction(1, 2), Fraction(1))
+"""Room in mm that hardware for other curves is designed with."""
 
 BOARD = "ulx3s_25f"
 """Its FPGA is that of explorations, and has block RAMs of 18 kbit and multipliers of 18 bits."""
@@ -160,17 +166,57 @@ def one_curve(polynomial: Polynomial, folder: Path) -> list[dict[str, Any]]:
     return found
 
 
+def with_room(polynomials: list[Polynomial], folder: Path, room: Fraction | None) -> dict[str, Any]:
+    """Return what parallel hardware for each curve costs, and how many sets of the other curves it refuses."""
+    luts, blocks, refused, reasons = list[int](), list[int](), 0, set[str]()
+    for own in polynomials:
+        spec = specification(own, folder)
+        ports = [(port.zero, port.zero + port.lsb * 2**port.bits) for port in spec.inputs]
+        designed = own if room is None else with_day_room(own, ports, room)[0]
+        spec = specification(designed, folder)
+        spec = replace(spec, hardware=replace(spec.hardware, architecture="parallel"))
+        core = design_core(spec, core="calibration", board=find_board(BOARD))
+        estimate = estimated(core.architecture, find_board(BOARD))
+        assert estimate is not None, "the board's family is estimated"
+        luts.append(estimate.luts)
+        blocks.append(estimate.multiplier_blocks)
+        for other in polynomials:
+            try:
+                check_swap(core, None, other_set(core, polynomial=other, max_error=SET_ERROR))
+            except ShortfallError as error:
+                refused += 1
+                reasons.add(re.sub(r"-?\d+", "N", str(error)))
+    return {
+        "room": None if room is None else float(room),
+        "luts": sorted(luts),
+        "blocks": sorted(blocks),
+        "sets": len(polynomials) ** 2,
+        "refused": refused,
+        "reasons": sorted(reasons),
+    }
+
+
 def measured() -> dict[str, Any]:
     """Return the record."""
     with tempfile.TemporaryDirectory() as folder, show_progress() as step:
         found = list[list[dict[str, Any]]]()
-        for number, polynomial in enumerate(curves()):
+        polynomials = list(curves())
+        for number, polynomial in enumerate(polynomials):
             step("curve", number, SENSORS)
-            spec = specification(polynomial, Path(folder))
             found.append(one_curve(polynomial, Path(folder)))
+        spec = specification(polynomials[0], Path(folder))
+        step("room", 0, len(ROOMS))
+        rooms = [with_room(polynomials, Path(folder), room) for room in ROOMS]
     lsb = spec.output.lsb
     allowed = {name: float(lsb if given is None else given) for name, given in ALLOWED.items()}
-    return {"curves": found, "allowed": allowed, "lsb": float(lsb), "order": ORDER, "first_seed": FIRST_SEED}
+    return {
+        "curves": found,
+        "rooms": rooms,
+        "allowed": allowed,
+        "lsb": float(lsb),
+        "order": ORDER,
+        "first_seed": FIRST_SEED,
+    }
 
 
 def main() -> None:

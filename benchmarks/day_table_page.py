@@ -17,7 +17,7 @@ Pick = Callable[[dict[str, Any]], float]
 
 def page(found: dict[str, Any]) -> str:
     """Return the page."""
-    return "\n".join([*_head(found), *_memory(found), *_logic(found), *_verdict(found)])
+    return "\n".join([*_head(found), *_memory(found), *_logic(found), *_verdict(found), *_room(found)])
 
 
 def middle(found: dict[str, Any], allowed: str, way: str, pick: Pick) -> float:
@@ -48,7 +48,8 @@ def _head(found: dict[str, Any]) -> list[str]:
     subject = f"""
         Written by `python -m benchmarks.day_table --document`. The day's own curve goes to the hardware as a
         polynomial, of orders {order}, 1 where it needs them
-        ([calibration.md](calibration.md#two-ways-of-fitting)). Would a table with proven interpolation be cheaper? Both are costed here for the curves of {count} sensors of
+        ([calibration.md](calibration.md#two-ways-of-fitting)).
+        Would a table with proven interpolation be cheaper? Both are costed here for the curves of {count} sensors of
         the bench at 43 to 50 °C with five targets on the morning (seeds {first} to {first + count - 1} of
         [days.md](days.md)), with the same ports, as a calibration by itself that may be loaded.
     """
@@ -153,7 +154,8 @@ def _verdict(found: dict[str, Any]) -> list[str]:
         sample has {CLOCKS:,.0f} clocks, a table with lines {folded}:
         {pairs["linear", "folded", "luts"]:,.0f} LUT4 and {of_table("block_rams"):.0f} block RAM, or
         {2 * of_table("block_rams"):.0f} with a second bank, where the polynomial takes
-        {pairs["polynomial", "folded", "luts"]:,.0f} LUT4 and no memory more. With a program that cannot be loaded, so that the
+        {pairs["polynomial", "folded", "luts"]:,.0f} LUT4 and no memory more. With a program that cannot be loaded,
+        so that the
         filter cannot either, the table would take {of_table("fixed_program"):,.0f} LUT4 beside its block RAM. It takes
         {pairs["linear", "folded", "clocks"]:.0f} clocks in place of {pairs["polynomial", "folded", "clocks"]:.0f}, for
         which nothing there waits, and {of_table("reload_words"):,.0f} words to load in place of
@@ -165,9 +167,31 @@ def _verdict(found: dict[str, Any]) -> list[str]:
         {pairs["polynomial", "parallel", "blocks"]:.0f}, and {pairs["linear", "parallel", "luts"]:,.0f} LUT4 in place of
         {pairs["polynomial", "parallel", "luts"]:,.0f}. It costs {of_table("block_rams_at_once"):.0f} block RAM, or
         {2 * of_table("block_rams_at_once"):.0f} with a second bank, and {of_table("reload_words"):,.0f} words to load
-        in place of {pairs["polynomial", "parallel", "words"]:.0f}. That is worth it for samples at every clock or nearly
-        so, which no sensor of wear gives, and it is not built: `parallel` has the polynomial, too. How many segments a
-        table needs depends on the curve of the day, so that hardware with a table refuses a curve that is bent more
-        than what it was made for; the polynomial of its order has no such limit, but that of its coefficients' widths.
+        in place of {pairs["polynomial", "parallel", "words"]:.0f}. That is worth it for samples at every clock or
+        nearly so, which no sensor of wear gives, and it is not built: `parallel` has the polynomial, too. How many
+        segments a table needs depends on the curve of the day, so that hardware with a table refuses a curve that is
+        bent more than what it was designed with; the polynomial of its order has no such limit, but that of its
+        coefficients' widths.
     """
     return ["## Which is cheaper", "", *_wrapped(shared), *_wrapped(own)]
+
+
+def _room(found: dict[str, Any]) -> list[str]:
+    text = """
+        In `parallel` every coefficient has as many bits as that of the curve that the hardware is designed with, and
+        one more. Curves of days and sensors that are hardly apart differ much in their coefficients. `calibrate export
+        --room` writes a curve to design with in whose coefficients every curve within so many mm over the ports fits,
+        proven by Markov's inequality for coefficients. Here each curve's own hardware, by itself, is given the sets of
+        all curves; *refused* are those that do not fit.
+    """
+    rows = [
+        [
+            "-" if row["room"] is None else f"{row['room']:g}",
+            f"{row['refused']} of {row['sets']}",
+            f"{median_low(row['luts']):,} ({max(row['luts']):,})",
+            f"{median_low(row['blocks'])} ({max(row['blocks'])})",
+        ]
+        for row in found["rooms"]
+    ]
+    header = "room, mm | refused | LUT4 | multiplier blocks"
+    return ["## Room for the curves of other days", "", *_wrapped(text), *_table(header, rows)]

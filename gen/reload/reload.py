@@ -30,6 +30,7 @@ from sosmith.model.dataflow.program import Program
 from sosmith.model.errors import ShortfallError, SpecificationError
 from sosmith.model.polynomial import Polynomial
 from sosmith.model.reload.constants import constants, packed, values_of, with_ranges, with_room
+from sosmith.model.sections.horner import HornerStep
 from sosmith.model.sections.output import OutputStage
 from sosmith.model.sections.start import StartStage
 
@@ -38,6 +39,11 @@ ADVICE = (
     "the first one with the new set"
 )
 """Remedy if a swap is refused."""
+
+ROOM = (
+    "hardware for the curves of other days must be designed with room for them, as `calibrate export --room` writes it"
+)
+"""Remedy if a coefficient of a calibration is too wide."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -349,13 +355,15 @@ def _check_parallel(hardware: Datapath, other: Datapath, what: str) -> None:
         If not; names the first mismatch.
     """
     loadable = constants(hardware)
+    polynomials = [each for each in loadable if isinstance(hardware.stages[each.stage], HornerStep)]
     for old, new in zip(with_room(hardware).stages, other.stages, strict=True):
         if [*map(structure, old.graph.nodes)] != [*map(structure, new.graph.nodes)]:
             raise ShortfallError(f"the {what} must fit the hardware: {old.name} must have the same operations")
-    try:
-        packed(values_of(other, loadable), loadable)
-    except ValueError as error:
-        raise ShortfallError(f"the {what} must fit the hardware: {error}") from None
+    for some, remedy in ((polynomials, f"; {ROOM}"), (loadable, "")):
+        try:
+            packed(values_of(other, some), some)
+        except ValueError as error:
+            raise ShortfallError(f"the {what} must fit the hardware: {error}{remedy}") from None
     for old, new in zip(with_room(hardware).stages, other.stages, strict=True):
         for room, node in zip(old.graph.nodes, new.graph.nodes, strict=True):
             low, high = _word(room)

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
+from sosmith.gen.calibration.day_room import with_day_room
 from sosmith.gen.calibration.fit import COLUMNS, DATE_COLUMN, UNCERTAINTY_COLUMNS
+from sosmith.instrument.calibration.acceptance import Range
 from sosmith.instrument.calibration.advice import Advice
 from sosmith.instrument.calibration.coefficient_covariance import CoefficientUncertainty, of_bayes, of_least_squares
 from sosmith.instrument.calibration.measurement_store import Source, StoredMeasurement, Version, as_measurements
@@ -234,6 +238,28 @@ def specification_table(sensor: str, version: Version, made: Calibration | None 
         "[calibration]\n"
         f"coefficients = {_coefficients(version)}\n"
     ) + ("" if made is None else _uncertainty_table(coefficient_uncertainty(made)))
+
+
+def design_table(sensor: str, version: Version, ranges: Sequence[Range], room: float) -> str:
+    """TOML for a specification of hardware in whose coefficients every curve near that of a version fits.
+
+    Parameters
+    ----------
+    sensor, version
+        As for `specification_table`.
+    ranges : sequence of Range
+        Ranges of voltage and temperature of the ports.
+    room : float
+        How far other curves may be from that of the version in mm; more than 0.
+    """
+    ports = [(Fraction(low), Fraction(high)) for low, high in ranges]
+    polynomial, off = with_day_room(version.polynomial, ports, Fraction(room))
+    name = sensor.replace("\\", "\\\\")
+    return (
+        f"# To design hardware with, not to measure with: off by up to {float(off):.3g} mm until a set is loaded.\n"
+        f"# Every curve within {room:g} mm of sensor {name}, version {version.number} of {version.date}, fits.\n"
+        f"[calibration]\ncoefficients = {[[float(a) for a in row] for row in polynomial.coefficients]}\n"
+    )
 
 
 def coefficient_uncertainty(made: Calibration) -> CoefficientUncertainty:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import tomllib
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from tests.gen.designs import EXAMPLES
 from tests.instrument.calibration.measuring import readings, write_csv
 
 from sosmith.commands.instrument.calibrate import calibrate
+from sosmith.gen.calibration.day_room import with_day_room
 from sosmith.gen.calibration.fit import fit, read_measurements
 from sosmith.gen.core import design_core
 from sosmith.gen.specification.specification import example, load
@@ -23,7 +25,7 @@ from sosmith.instrument.calibration.self_updating import Addition, add, refused_
 from sosmith.instrument.uncertainty.instrument_budget import instrument_of
 from sosmith.interface.specification import Specification
 from sosmith.model.errors import ShortfallError, SpecificationError
-from sosmith.model.polynomial import EQUATION_5A
+from sosmith.model.polynomial import EQUATION_5A, Polynomial
 
 INVOCATION = Invocation("calibrate", columns=100)
 run, good, refused = INVOCATION.run, INVOCATION.good, INVOCATION.refused
@@ -284,6 +286,29 @@ def test_exports_feed_a_specification_and_give_the_same_polynomial() -> None:
     made = design_core(load(Path("spec.toml")), core="calibration")
     assert made.quantized.polynomial is not None
     assert [[float(a) for a in row] for row in made.quantized.polynomial.coefficients] == coefficients
+
+
+def test_an_export_with_room_is_the_curve_to_design_hardware_with() -> None:
+    good("add", "a.csv", "--sensor", "left", *DAY, *PAPER)
+    own = Polynomial.from_numbers(
+        tomllib.loads(good("export", "--sensor", "left").stdout)["calibration"]["coefficients"]
+    )
+    text = good("export", "--sensor", "left", "--room", "1").stdout
+    ports = ((Fraction(0), Fraction(10)), (Fraction(0), Fraction(128)))
+    expected, far = with_day_room(own, ports, Fraction(1))
+    assert tomllib.loads(text) == {
+        "calibration": {"coefficients": [[float(a) for a in row] for row in expected.coefficients]}
+    }
+    first, second, *_ = text.splitlines()
+    assert first == (
+        f"# To design hardware with, not to measure with: off by up to {float(far):.3g} mm until a set is loaded."
+    )
+    assert second == "# Every curve within 1 mm of sensor left, version 1 of 2024-03-01, fits."
+
+
+def test_room_is_for_coefficients() -> None:
+    good("add", "a.csv", *DAY, *PAPER)
+    refused("--format must be toml with --room, not csv", "export", "--room", "1", "--format", "csv")
 
 
 def test_an_older_version_can_be_exported() -> None:

@@ -11,6 +11,7 @@ from benchmarks import day_table
 from benchmarks.day_table_page import WAYS, largest, page
 from benchmarks.interpolated_table import Table, derivative, misses, rows_of, smallest, value
 
+from sosmith.gen.reload.reload import ROOM
 from sosmith.model.errors import ShortfallError
 from sosmith.model.port import Port
 
@@ -60,6 +61,15 @@ def test_the_verdict_is_what_the_figures_say(record: dict[str, Any]) -> None:
         assert words < min(
             largest(record, name, way, lambda row: row["reload_words"]) for way in ("linear", "quadratic")
         )
+
+
+def test_hardware_with_room_takes_the_curves_of_all_sensors(record: dict[str, Any]) -> None:
+    none, *rooms = record["rooms"]
+    assert [row["room"] for row in rooms] == [float(room) for room in day_table.ROOMS if room is not None]
+    assert {row["sets"] for row in record["rooms"]} == {day_table.SENSORS**2}
+    assert none["refused"] > none["sets"] / 2
+    assert all(reason.endswith(f"; {ROOM}") for reason in none["reasons"])
+    assert [row["refused"] for row in rooms] == [0, 0]
 
 
 def test_the_tables_of_the_first_curve_are_those_of_the_record(record: dict[str, Any], tmp_path: Any) -> None:

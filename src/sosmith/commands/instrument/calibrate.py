@@ -295,18 +295,32 @@ def history_command(store: Path, sensor: str, verify: bool, as_json: bool) -> No
     show_default=True,
     help="toml: the table [calibration] of a specification; csv: the measurements, for its key calibration.data.",
 )
+@click.option(
+    "--room",
+    type=click.FloatRange(min=0.0, min_open=True),
+    help="toml: coefficients to design hardware with, in which every curve within this many mm fits.",
+)
 @output_option("File to write.  [default: stdout]", stdout=True)
-def export_command(store: Path, sensor: str, number: int | None, file_format: str, output: Path | None) -> None:
+def export_command(
+    store: Path, sensor: str, number: int | None, file_format: str, room: float | None, output: Path | None
+) -> None:
     """Write the coefficients or the measurements of a version.
 
     The format toml is the table [calibration] of a specification, with the covariance of its coefficients; csv the
     measurements that it was fitted to. Either file reads back to exactly the same coefficients. A core with
     reload = true can load the new coefficients at run time; see `sosmith reload`.
 
+    In the architecture parallel, coefficients have as many bits as those that it is designed with take, and one more.
+    With --room these are wide enough for every curve that is so near over the ranges of the sensor, which must be those
+    of the ports. They are to design hardware with, not to measure with.
+
     \b
         sosmith calibrate export --sensor left -o left.toml
         sosmith calibrate export --sensor left --version 1 --format csv -o left.csv
+        sosmith calibrate export --sensor left --room 1 -o hardware.toml
     """
+    if room is not None and file_format != "toml":
+        raise SpecificationError(f"--format must be toml with --room, not {file_format}")
     from sosmith.interface.instrument.calibration_store import CalibrationStore
 
     kept = CalibrationStore(store)
@@ -314,7 +328,7 @@ def export_command(store: Path, sensor: str, number: int | None, file_format: st
         version = kept.version(sensor, number).number
         if file_format == "toml":
             step("fitting again")
-            text, left_out = kept.specification(sensor, version)
+            text, left_out = kept.specification(sensor, version, room)
             if left_out:
                 note(f"the uncertainty is left out: {left_out}")
         else:

@@ -18,6 +18,7 @@ from sosmith.instrument.calibration.calibration_report import (
     addition_json,
     advice_json,
     calibration_json,
+    design_table,
     measurements_csv,
     morning_json,
     source_json,
@@ -521,10 +522,12 @@ class CalibrationStore:
         with open_store(self.path) as store:
             return find_version(store, sensor, number)
 
-    def specification(self, sensor: str, number: int | None = None) -> tuple[str, str]:
-        """Return the table ``[calibration]`` of a version as TOML, and why its uncertainty is left out, if it is."""
+    def specification(self, sensor: str, number: int | None = None, room: float | None = None) -> tuple[str, str]:
+        """Return ``[calibration]`` as TOML, of hardware with `room` in mm if given; why its uncertainty is left out."""
         with open_store(self.path) as store:
-            version = find_version(store, sensor, number)
+            version, ranges = find_version(store, sensor, number), store.ranges(sensor)
+            if room is not None and ranges is not None:
+                return design_table(sensor, version, ranges[1:], room), ""
             try:
                 return specification_table(sensor, version, calibration_of(store, sensor, version.number)), ""
             except ShortfallError as error:
