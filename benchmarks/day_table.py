@@ -55,6 +55,9 @@ ALLOWED = {"1 LSB": None, "as on the bench": Fraction(str(MAX_ERROR)), "half a t
 ROOMS = (None, Fraction(1, 2), Fraction(1))
 """Room in mm that hardware for other curves is designed with."""
 
+SHORT_FILTER = hardware.filter_by_order(2, 0.5)
+"""A filter behind the calibration, where room for other curves is costed with one."""
+
 BOARD = "ulx3s_25f"
 """Its FPGA is that of explorations, and has block RAMs of 18 kbit and multipliers of 18 bits."""
 
@@ -75,10 +78,10 @@ def curves() -> Iterator[Polynomial]:
         yield polynomial
 
 
-def specification(polynomial: Polynomial, folder: Path) -> Specification:
-    """Return the specification of hardware that is reloadable, with a curve."""
+def specification(polynomial: Polynomial, folder: Path, behind: str = PAPER_FILTER) -> Specification:
+    """Return the specification of hardware that is reloadable, with a curve, and a filter behind it."""
     table = hardware.calibration_table(polynomial)
-    return load(hardware.specification(folder, "day", RATE, table, PAPER_FILTER, reload=True, max_error=MAX_ERROR))
+    return load(hardware.specification(folder, "day", RATE, table, behind, reload=True, max_error=MAX_ERROR))
 
 
 def block_rams(depth: int, width: int) -> int:
@@ -166,16 +169,22 @@ def one_curve(polynomial: Polynomial, folder: Path) -> list[dict[str, Any]]:
     return found
 
 
-def with_room(polynomials: list[Polynomial], folder: Path, room: Fraction | None) -> dict[str, Any]:
-    """Return what parallel hardware for each curve costs, and how many sets of the other curves it refuses."""
+def with_room(
+    polynomials: list[Polynomial], folder: Path, room: Fraction | None, *, filtered: bool = False
+) -> dict[str, Any]:
+    """Return what parallel hardware for each curve costs, and how many sets of the other curves it refuses.
+
+    With `filtered` it is that for the first curve only, with a filter behind it.
+    """
     luts, blocks, refused, reasons = list[int](), list[int](), 0, set[str]()
-    for own in polynomials:
+    made = polynomials[:1] if filtered else polynomials
+    for own in made:
         spec = specification(own, folder)
         ports = [(port.zero, port.zero + port.lsb * 2**port.bits) for port in spec.inputs]
         designed = own if room is None else with_day_room(own, ports, room)[0]
-        spec = specification(designed, folder)
+        spec = specification(designed, folder, SHORT_FILTER if filtered else PAPER_FILTER)
         spec = replace(spec, hardware=replace(spec.hardware, architecture="parallel"))
-        core = design_core(spec, core="calibration", board=find_board(BOARD))
+        core = design_core(spec, core="instrument" if filtered else "calibration", board=find_board(BOARD))
         estimate = estimated(core.architecture, find_board(BOARD))
         assert estimate is not None, "the board's family is estimated"
         luts.append(estimate.luts)
@@ -188,9 +197,10 @@ def with_room(polynomials: list[Polynomial], folder: Path, room: Fraction | None
                 reasons.add(re.sub(r"-?\d+", "N", str(error)))
     return {
         "room": None if room is None else float(room),
+        "filtered": filtered,
         "luts": sorted(luts),
         "blocks": sorted(blocks),
-        "sets": len(polynomials) ** 2,
+        "sets": len(made) * len(polynomials),
         "refused": refused,
         "reasons": sorted(reasons),
     }
@@ -206,7 +216,11 @@ def measured() -> dict[str, Any]:
             found.append(one_curve(polynomial, Path(folder)))
         spec = specification(polynomials[0], Path(folder))
         step("room", 0, len(ROOMS))
-        rooms = [with_room(polynomials, Path(folder), room) for room in ROOMS]
+        rooms = [
+            with_room(polynomials, Path(folder), room, filtered=filtered)
+            for filtered in (False, True)
+            for room in ROOMS
+        ]
     lsb = spec.output.lsb
     allowed = {name: float(lsb if given is None else given) for name, given in ALLOWED.items()}
     return {

@@ -182,10 +182,13 @@ def _room(found: dict[str, Any]) -> list[str]:
         one more. Curves of days and sensors that are hardly apart differ much in their coefficients. `calibrate export
         --room` writes a curve to design with in whose coefficients every curve within so many mm over the ports fits,
         proven by Markov's inequality for coefficients. Here each curve's own hardware, by itself, is given the sets of
-        all curves; *refused* are those that do not fit.
+        all curves; *refused* are those that do not fit. With a
+        filter behind it, the hardware is that of the first curve; the words of the filter grow, too, since ranges are
+        those that the coefficients give by interval arithmetic.
     """
     rows = [
         [
+            "a Butterworth filter of order 2" if row["filtered"] else "-",
             "-" if row["room"] is None else f"{row['room']:g}",
             f"{row['refused']} of {row['sets']}",
             f"{median_low(row['luts']):,} ({max(row['luts']):,})",
@@ -193,5 +196,5 @@ def _room(found: dict[str, Any]) -> list[str]:
         ]
         for row in found["rooms"]
     ]
-    header = "room, mm | refused | LUT4 | multiplier blocks"
+    header = "behind it | room, mm | refused | LUT4 | multiplier blocks"
     return ["## Room for the curves of other days", "", *_wrapped(text), *_table(header, rows)]

@@ -11,10 +11,12 @@ from tests.gen.designs import EXAMPLES
 
 from sosmith.gen.calibration.day_room import chebyshev, with_day_room
 from sosmith.gen.core import CoreDesign, design_core
-from sosmith.gen.reload.reload import ROOM, OtherSet, check_swap, other_set
+from sosmith.gen.reload.reload import ROOM, OtherSet, check_swap, other_set, parallel_bank
 from sosmith.gen.specification.specification import CalibrationSpec, load
+from sosmith.model.dataflow.graph import Op
 from sosmith.model.errors import ShortfallError
 from sosmith.model.polynomial import Polynomial
+from sosmith.model.reload.constants import constants, packed, values_of
 
 ORDER = 6
 RANGES = ((Fraction(0), Fraction(10)), (Fraction(0), Fraction(128)))
@@ -84,6 +86,23 @@ def test_that_of_another_sensor_fits_with_room_and_is_refused_without() -> None:
     message = rf"^the set must fit the hardware: row_power1\.c\d\d must fit \d+ bits, not -?\d+; {ROOM}$"
     with pytest.raises(ShortfallError, match=message):
         loaded(None, OTHER_DAY)
+
+
+def test_hardware_that_limits_its_output_takes_a_curve_that_stays_within_its_range() -> None:
+    gentle = Polynomial.from_numbers([["1.16", "-0.0036"], ["0.3672", "0.0006618"], ["0.05812"]])
+    spec = hardware(None).spec
+    curve, _ = with_day_room(gentle, RANGES, Fraction(1))
+    calibration = CalibrationSpec(coefficients=curve.coefficients, data=None)
+    design = design_core(replace(spec, calibration=calibration), core="calibration")
+    swap = check_swap(design, None, other_set(design, polynomial=gentle, max_error=Fraction(1, 100)))
+    made = swap.new_set.quantized.datapath
+    limited, plain = design.datapath.stages[-1].graph, made.stages[-1].graph
+    assert limited.nodes[-1].op is Op.CLAMP
+    assert plain.nodes[-1].op is not Op.CLAMP
+    ((_, low, high),) = plain.output_ranges
+    assert limited.nodes[-1].low <= low < high <= limited.nodes[-1].high
+    values = values_of(made, constants(design.datapath))
+    assert parallel_bank(design, swap.new_set) == packed(values, constants(design.datapath))
 
 
 def test_what_is_far_beyond_the_room_is_refused() -> None:
