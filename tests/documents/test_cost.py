@@ -150,6 +150,17 @@ def test_figures_of_an_earlier_version_are_told() -> None:
         assert (line in told) is earlier
 
 
+def test_what_was_not_placed_with_every_seed_is_named() -> None:
+    record = json.loads(cost_cores.RECORD.read_text(encoding="utf-8"))
+    figures, line = record["cores"]["audio_lowpass folded 1"]["targets"]["ecp5"], "audio_lowpass folded on ECP5"
+    assert not any(line in each for each in cost_cores.with_fewer_seeds(record))
+    del figures["fmax"][0]
+    assert (
+        "\naudio_lowpass folded on ECP5 LFE5U-25F, speed 6: placing did not end with every seed.\n"
+        in (cost_page.document(record)["docs/cost.md"])
+    )
+
+
 def test_a_goal_can_be_missed() -> None:
     record = json.loads(cost_cores.RECORD.read_text(encoding="utf-8"))
     figures = record["cores"]["flange_wear_locomotive folded 64"]["targets"]["up5k"]
