@@ -248,7 +248,7 @@ def test_a_swap_in_the_parallel_architecture_has_one_bit_of_room() -> None:
     far = other_set(hardware, ideal=moved(hardware, "0.5"), max_error=wide)
     with pytest.raises(
         ShortfallError,
-        match=r"^the swap must fit the hardware: section1\.v1 must stay in -(\d+)\.\.\d+, not -\d+\.\.\d+; " + ADVICE,
+        match=r"^the swap must fit the hardware: section2\.v1 must stay in -(\d+)\.\.\d+, not -\d+\.\.\d+; " + ADVICE,
     ):
         check_swap(hardware, own, far)
     assert check_swap(hardware, None, far).samples == 0
