@@ -164,7 +164,8 @@ memories in the plan of the hardware as synthesis makes them, each times a facto
 FPGA: the bits of each sum that are used, products that several multiplier blocks make, memories in slices, of block RAM
 or of LUT4 by what Yosys weighs them with. Factors are fitted to synthesis with Yosys of what seeds up to {FITTED_UP_TO}
 draw{of_cores}, and drawn to those of an earlier version of the hardware, as few draws tell of each. Errors are those on
-what later seeds draw, which was looked at neither by the fit nor while quantities were chosen.
+what later seeds draw, which was looked at neither by the fit nor while quantities were chosen, but for how many
+multiplier blocks the draws 402 and 405 take.
 {drawn}
 
 Drawn are filters of all families, kinds and realizations, orders 1 to 4, some calibrated, with up to 32 channels,
