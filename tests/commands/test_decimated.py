@@ -26,7 +26,7 @@ def test_the_design_tells_of_the_calibration(path: str) -> None:
     clocks, result = ahead.cycles_per_sample, made.architecture.cycles_per_result
     table = Invocation("design", columns=200).good(path, "--details").stdout
     rows = {line.strip().split("   ")[0]: " ".join(line.split()) for line in table.splitlines() if line.strip()}
-    assert rows["into the decimator"].endswith(" in 14 bits, within 1.37 µm; not limited")
+    assert rows["into the decimator"].endswith(" in 14 bits, within 1.62 µm; not limited")
     assert rows["calibration before the decimator"].endswith(
         f"folded: the smallest that keeps up; takes {clocks} of 120,000 clocks a sample"
     )
