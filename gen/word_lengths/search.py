@@ -41,7 +41,10 @@ _FEW = 16
 """Coefficients up to which neighbours are tried two at a time."""
 
 _WORTH = 2.0**-10
-"""Share of the error that a step which costs nothing must save."""
+"""Share of the error that a step which costs nothing must save, and the error in output LSBs that is left as it is.
+
+Without the latter, a quantizer whose bits take no logic would be given bits without end.
+"""
 
 _UNNOTICED = 2.0**-10
 """Error at the output, in LSBs, with which products begin to drop bits."""
@@ -278,7 +281,10 @@ class Search:
         size = self.size(choice) + more
         while True:
             self._base = self._based(choice.formats)
-            least = (1 - _WORTH) * self.error(choice)
+            error = self.error(choice)
+            if error <= _WORTH:
+                return choice
+            least = (1 - _WORTH) * error
             others = [*(neighbours or self._neighbours)(choice)]
             errors = [self.error(other) for other in others]
             better = (at for at in np.argsort(errors, kind="stable").tolist() if errors[at] < least)
