@@ -104,9 +104,11 @@ def test_programs_have_an_objective_of_their_own(spec: Specification, architectu
     start = f"{made.quantized.realization}: {counted}, {words} words of memory, an accumulator of {bits} bits (df"
     assert made.reasons["realization"].startswith(start)
     assert made.reasons["realization"].endswith("; not to be folded: normal, lattice_wdf)")
-    # The word lengths of the smallest parallel core make a longer program.
+    # The word lengths of the smallest parallel core make no shorter program. Bits that take no clock lower the error.
     small = design_core(spec, realization=made.quantized.realization)
-    assert length(replace(made, architecture=replace(made.architecture, datapath=small.datapath))) > length(made)
+    other = replace(made, architecture=replace(made.architecture, datapath=small.datapath))
+    assert length(other)[:2] >= length(made)[:2]
+    assert made.quantized.bound < small.quantized.bound
 
 
 def test_each_architecture_tried_is_designed_for_itself(spec: Specification) -> None:
