@@ -170,8 +170,8 @@ def _service(rows: list[dict[str, Any]]) -> list[str]:
         "The last three columns are of the same readings by the integers of the hardware, with each set proven and",
         f"loaded: accuracy, share inside, and the largest difference in points. Sets refused: {refused}.",
         "",
-        "Without targets, intervals of the filter hold more than they say: they allow for the drift of the type, and the",
-        "sensors of the bench do not age. What is shared no number of days averages away.",
+        "Without targets, intervals of the filter hold more than they say: they allow for the drift of the type, and",
+        "the sensors of the bench do not age. What is shared no number of days averages away.",
         "",
     ]
 
