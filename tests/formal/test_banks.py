@@ -34,8 +34,8 @@ class WritesFreeBanks(Proof):
 class AnyPort(reload.ReloadPort):
     """A reload port that swaps and writes whenever it likes, within what `WritesFreeBanks` proves of the real one."""
 
-    def __init__(self, depth: int, *, bits: int, design: int, protected: bool) -> None:
-        super().__init__(depth, bits=bits, design=design, protected=protected)
+    def __init__(self, depth: int, *, bits: int, design: int, protected: bool, lock: bool) -> None:
+        super().__init__(depth, bits=bits, design=design, protected=protected, lock=lock)
         self.swaps, self.writes = Signal(), Signal()
 
     def elaborate(self, platform: object) -> Module:

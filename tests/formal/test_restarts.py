@@ -23,8 +23,8 @@ from sosmith.model.dataflow.folding import program
 class AnySwap(reload.ReloadPort):
     """A reload port that asks for a swap whenever it likes, and waits until it may, as the real one does."""
 
-    def __init__(self, depth: int, *, bits: int = 32, design: int, protected: bool) -> None:
-        super().__init__(max(depth, 1), bits=bits, design=design, protected=protected)
+    def __init__(self, depth: int, *, bits: int = 32, design: int, protected: bool, lock: bool) -> None:
+        super().__init__(max(depth, 1), bits=bits, design=design, protected=protected, lock=lock)
         self.asks = Signal()
 
     def elaborate(self, platform: object) -> Module:
