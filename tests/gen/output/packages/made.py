@@ -20,8 +20,13 @@ RELOADABLE: dict[str, Any] = {
     "output": {"bits": 12, "range": [0.0, 5.0], "unit": "V"},
     "hardware": {"realization": "df1_ef1", "architecture": "folded", "clock": 1e6, "reload": True, "protect": "detect"},
 }
-WIDE: dict[str, Any] = {**FILTER, "name": "wide", "hardware": {**FILTER["hardware"], "samples_per_clock": 8}}
-"""Eight samples in a beat of 128 bits."""
+WIDE: dict[str, Any] = {
+    **FILTER,
+    "name": "wide",
+    "filter": {**FILTER["filter"], "cutoff": 110.0},
+    "hardware": {**FILTER["hardware"], "samples_per_clock": 8},
+}
+"""Eight samples in a beat of 128 bits; the samples of its bench fill no whole number of beats."""
 SPARSE: dict[str, Any] = {
     **FILTER,
     "name": "sparse",
