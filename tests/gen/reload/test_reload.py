@@ -244,11 +244,11 @@ def test_a_realization_that_changes_its_coefficients_is_refused(monkeypatch: pyt
 def test_a_swap_in_the_parallel_architecture_has_one_bit_of_room() -> None:
     hardware = hardware_in("parallel")
     own, wide = own_set(hardware), 4 * hardware.spec.max_error
-    assert check_swap(hardware, own, other_set(hardware, ideal=moved(hardware, "0.8"), max_error=wide)).use < 1
+    assert check_swap(hardware, own, other_set(hardware, ideal=moved(hardware, "0.85"), max_error=wide)).use < 1
     far = other_set(hardware, ideal=moved(hardware, "0.5"), max_error=wide)
     with pytest.raises(
         ShortfallError,
-        match=r"^the swap must fit the hardware: section2\.v1 must stay in -(\d+)\.\.\d+, not -\d+\.\.\d+; " + ADVICE,
+        match=r"^the swap must fit the hardware: section1\.v1 must stay in -(\d+)\.\.\d+, not -\d+\.\.\d+; " + ADVICE,
     ):
         check_swap(hardware, own, far)
     assert check_swap(hardware, None, far).samples == 0
