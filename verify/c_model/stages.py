@@ -133,7 +133,9 @@ class _Body:
         self._cursor.expect("const")
         kind = self._cursor.take("|".join(HELD))
         name = self._cursor.take(_NAME)
-        stage, index, exponent = (int(part or 0) for part in re.fullmatch(_NAME, name).groups())  # type: ignore[union-attr]
+        parts = re.fullmatch(_NAME, name, re.ASCII)
+        assert parts is not None, "the cursor takes nothing else"
+        stage, index, exponent = (int(part or 0) for part in parts.groups())
         require(
             stage == self._index and index < len(self._stage.nodes) and name not in self._names,
             f"{name} must be a node of {self._stage.name}, and declared once",

@@ -292,6 +292,7 @@ def other_polynomial(tree: Any) -> None:
     ("text", "edit", "name"),
     [
         (SETTLING, sooner, "flagged"),
+        (SETTLING, counted_sooner, "settled"),
         (DECIMATED, less_decimation, "error_in_parts"),
         (BOTH, less_before, "ahead_is_calibrated"),
         (BOTH, other_polynomial, "ahead_is_calibrated"),
