@@ -256,23 +256,16 @@ def sooner(tree: Any) -> None:
     tree["claims"]["settling"] -= 1
 
 
-def counted_sooner(tree: Any) -> None:
-    """Count and claim that half as many samples are flagged."""
-    samples = tree["claims"]["settling"] // 2
-    nodes = tree["stages"][-1]["nodes"]
-    next(node for node in nodes if node.get("name") == "samples").update(parameter=samples, low=samples, high=samples)
-    tree["claims"]["settling"] = samples
-
-
 def narrower(tree: Any) -> None:
     """Let the words of the decimator be too short."""
     tree["decimation"]["width"] -= 1
 
 
 def less_decimation(tree: Any) -> None:
-    """Claim one unit less for the rounding behind the decimator."""
+    """Claim one unit less for the rounding of the filter behind the decimator."""
     less_bound(tree)
-    tree["claims"]["budget"]["decimation"] = str(Fraction(tree["claims"]["budget"]["decimation"]) - GRID)
+    budget = tree["claims"]["budget"]
+    budget["filter rounding"] = str(Fraction(budget["filter rounding"]) - GRID)
 
 
 def less_before(tree: Any) -> None:
@@ -292,7 +285,6 @@ def other_polynomial(tree: Any) -> None:
     ("text", "edit", "name"),
     [
         (SETTLING, sooner, "flagged"),
-        (SETTLING, counted_sooner, "settled"),
         (DECIMATED, less_decimation, "error_in_parts"),
         (BOTH, less_before, "ahead_is_calibrated"),
         (BOTH, other_polynomial, "ahead_is_calibrated"),
