@@ -20,7 +20,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from itertools import combinations
+from itertools import combinations, pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -121,6 +121,7 @@ class Search:
         self._base: _Base | None = None
         self._ranges: dict[tuple[object, ...], dict[str, tuple[int, int]]] = {}
         self._known: dict[tuple[object, ...], tuple[float, Range, dict[str, int]]] = {}
+        self._saved: dict[tuple[object, ...], list[float]] = {}
 
     @property
     def work(self) -> int:
@@ -248,9 +249,12 @@ class Search:
         """
         best: tuple[Choice, float] | None = None
         steps = self._steps(choice, calibration=calibration) if self._objective.floors_products else ()
+        most = len(choice.formats) * max(_STEPS)
         for candidate in steps:
             other, error, smallest = candidate, self.error(candidate), size if best is None else best[1]
-            for _ in range(len(choice.formats) * max(_STEPS)):
+            if error - self._most_saved(candidate, most) > allowed:
+                continue
+            for _ in range(most):
                 if error <= allowed or self.size(other) >= smallest:
                     break
                 longer = [(each, self.error(each), self.size(each)) for each in self._longer(other)]
@@ -264,11 +268,33 @@ class Search:
     def _longer(self, choice: Choice) -> Iterator[Choice]:
         """Yield choices where one section keeps one bit more, of its products or of another quantizer."""
         for k, form in enumerate(choice.formats):
-            products = self._estimates[k].products
-            places = [(name,) for name in form.fracs if name not in products]
-            for names in (*places, tuple(name for name in products if name in form.fracs)):
+            for names in self._places(k, form):
                 kept = {**form.fracs, **{name: form.fracs[name] + 1 for name in names}}
                 yield choice.with_format(k, replace(form, fracs=kept))
+
+    def _places(self, k: int, form: SectionFormat) -> list[tuple[str, ...]]:
+        """Return what keeps a bit more at once in section k: a quantizer, or all that products have."""
+        products = self._estimates[k].products
+        return [*((name,) for name in form.fracs if name not in products), tuple(n for n in products if n in form.fracs)]
+
+    def _most_saved(self, choice: Choice, bits: int) -> float:
+        """Return how much the error falls if the best places keep so many bits more in all, whatever their size."""
+        saved = [each for k, form in enumerate(choice.formats) for each in self._saved_by_bits(k, form, bits)]
+        return sum(sorted(saved, reverse=True)[:bits])
+
+    def _saved_by_bits(self, k: int, form: SectionFormat, bits: int) -> list[float]:
+        """Return by how much the error falls with each further bit at each place of section k."""
+        key = (k, bits, tuple(form.fracs.items()))
+        if key not in self._saved:
+            rounding, saved = self._estimates[k].rounding, []
+            for names in self._places(k, form):
+                errors = [
+                    rounding({**form.fracs, **{name: form.fracs[name] + more for name in names}})
+                    for more in range(bits + 1)
+                ]
+                saved += [before - after for before, after in pairwise(errors)]
+            self._saved[key] = saved
+        return self._saved[key]
 
     def with_closer_coefficients(self, choice: Choice) -> Choice:
         """Return the same formats with coefficients whose error is smaller, of no more bits."""

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -25,14 +26,27 @@ VOLTAGES = {2.2: 2.0, 4.6: 5.0, 8.1: 8.0}
 """What the sensor reads at each target."""
 
 
+@pytest.fixture(scope="module")
+def design() -> sosmith.Design:
+    return sosmith.design(GAUGE)
+
+
+@pytest.fixture(scope="module")
+def folder(design: sosmith.Design, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with the files of the board, beside a store of a sensor."""
+    made = tmp_path_factory.mktemp("targets")
+    write_csv(made / "a.csv", readings(60))
+    added = call("add", str(made / "a.csv"), "--store", str(made / "calibration.db"), "--date", "2024-03-01")
+    assert added.exit_code == 0
+    design.generate(made / "build" / "targets")
+    return made
+
+
 @pytest.fixture
-def device(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> GaugingDevice:
-    """Return a board whose files are in the folder, beside a store of a sensor."""
+def device(design: sosmith.Design, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> GaugingDevice:
+    """Return the board, in a copy of its folder."""
+    shutil.copytree(folder, tmp_path, dirs_exist_ok=True)
     monkeypatch.chdir(tmp_path)
-    write_csv(Path("a.csv"), readings(60))
-    assert call("add", "a.csv", "--date", "2024-03-01").exit_code == 0
-    design = sosmith.design(GAUGE)
-    design.generate(tmp_path / "build" / "targets")
     made = GaugingDevice(design, time.monotonic, lambda t: made.voltage)
     made._measured = int(time.monotonic() * 1000)
     made.voltage, made.temperature = 2.0, 25.0  # type: ignore[attr-defined]
