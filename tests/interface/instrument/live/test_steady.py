@@ -71,6 +71,26 @@ def test_results_of_the_target_before_do_not_count() -> None:
     assert steady.read(0.1, 0.002).value == pytest.approx(clearance(5.0), abs=0.002)
 
 
+def test_a_board_that_measures_faster_than_it_is_read_is_read() -> None:
+    """Whenever it is asked, there are new results."""
+
+    class Passing(Time):
+        def monotonic(self) -> float:
+            self.now += 0.03
+            return self.now
+
+    asked = 0
+
+    def voltage(t: float) -> float:
+        nonlocal asked
+        asked += 1
+        assert asked < 5000
+        return 5.0
+
+    steady, _ = reader(voltage, Passing())
+    assert steady.read(0.1, 0.002).value == pytest.approx(clearance(5.0), abs=0.002)
+
+
 def test_noise_is_no_motion() -> None:
     clock, rng = Time(), np.random.default_rng(1)
     steady, _ = reader(lambda t: 5.0 + rng.normal(0, 0.1), clock)
