@@ -36,6 +36,7 @@ def test_estimates_are_near_and_nothing_is_below_the_least(objective: Objective,
     assert 0 < objective.least([stage.graph for stage in datapath.stages]) < size
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("name", ALL)
 def test_each_objective_is_met_best_by_what_was_made_for_it(name: str) -> None:
     parallel, folded = parallel_design(name).datapath, example_design(name).datapath

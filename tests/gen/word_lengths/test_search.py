@@ -125,6 +125,7 @@ def test_the_largest_error_is_that_of_the_worst_input(ends: tuple[float, float],
     assert largest_magnitude(response, [ends]) == max(0, *tops, *-bottoms)
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("realization", ["df1", "df1_ef1", "df1_ef2"])
 def test_bits_dropped_from_an_operand_of_inputs_alone_are_not_free(realization: str) -> None:
     """In a band-pass of direct form I, b0 multiplies a difference of two inputs, whose bits are worth something."""
@@ -166,6 +167,7 @@ def test_there_is_no_start_beyond_the_most_bits() -> None:
 # What the search ends with.
 
 
+@pytest.mark.sweep(6)
 @pytest.mark.parametrize("realization", CASCADES)
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_trimming_saves(name: str, realization: str) -> None:
@@ -264,6 +266,7 @@ def test_the_gain_at_zero_frequency_stays_exactly_one(order: int, cutoff: float,
         assert sum(model.transfer) == sum(model.denominator)
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("realization", CASCADES)
 def test_the_same_words_are_found_again(realization: str) -> None:
     first, second = (filter_plan("bandpass", 2, 0.1, realization).trimmed() for _ in range(2))
