@@ -183,7 +183,10 @@ class Evaluation:
             if bits is not None and bits != value:
                 return self._extended(bits, width)
         word = self._extended(value, max(low + width, own))
-        return self._cut(self._shortened(word, max(low + width, own), False), low)
+        short = self._shortened(word, max(low + width, own), False)
+        if low and short is word and low + width < own:
+            short = self._shortened(word, low + width, False)  # what is above these bits may be anything
+        return self._cut(short, low)
 
     def _cut(self, word: Form, low: int) -> Form:
         return self._forms.floor(shifted(word, -low)) if low else word
