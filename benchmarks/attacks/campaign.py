@@ -78,9 +78,17 @@ def attacked(kind: str, wrong_texts: int, wrong_certificates: int) -> Outcome:
     with tempfile.TemporaryDirectory() as folder:
         core = made(kind, Path(folder) / "core")
         outcome = Outcome()
+        _judge_the_right(core, outcome)
         _attack_texts(core, wrong_texts, Path(folder), outcome)
         _attack_certificates(core, wrong_certificates, outcome)
         return outcome
+
+
+def _judge_the_right(core: Core, outcome: Outcome) -> None:
+    """Count it as a finding where a core's own files are refused: all that is wrong would be, too."""
+    verdict = outcome.timed(core.kind, lambda: _file_verdict(core, core.certificate.read_text(encoding="utf-8")))
+    if verdict != "accepted":
+        outcome.findings.append(f"{core.kind}: its own files are refused: {verdict}")
 
 
 # Texts.

@@ -25,7 +25,9 @@ calibration.coefficients = [[0.125, 0.25], [0.5]]
 output = { bits = 5, range = [0.0, 1.0], unit = "mm", max_error = 0.1 }
 """
 _ZERO = 'hardware.start = "zero"\n'
+_LOCK = "hardware.reload = true\nhardware.reload_lock = true\n"
 _PLAIN = 'filter = { family = "butterworth", kind = "lowpass", order = 1, cutoff = 20.0 }\n'
+_TAPS = "filter = { taps = [0.25, 0.5, 0.25], decimate = 2 }\n"
 _SLOW = 'filter = { family = "butterworth", kind = "lowpass", order = 1, cutoff = 2.0, decimate = 4 }\n'
 
 
@@ -45,15 +47,23 @@ SPECIFICATIONS = {
     "parallel, 3 channels": "channels = 3\n" + _WORDS + _PLAIN + _hardware("parallel"),
     "parallel, 20 channels": "channels = 20\n" + _WORDS + _PLAIN + _ZERO + _hardware("parallel"),
     "parallel, decimated": _WORDS + _SLOW + _hardware("parallel"),
+    "parallel, a calibration before a decimator": _INSTRUMENT + _SLOW + _hardware("parallel"),
     "folded": _WORDS + _PLAIN + _hardware("folded"),
     "folded, 3 channels": "channels = 3\n" + _WORDS + _PLAIN + _hardware("folded"),
+    "folded, a calibration before it": _INSTRUMENT + _PLAIN + _hardware("folded"),
+    "folded, FIR that decimates": _WORDS + _TAPS + _hardware("folded"),
+    "folded, 2 channels of FIR that decimates": "channels = 2\n" + _WORDS + _TAPS + _hardware("folded"),
+    "folded, decimated": _WORDS + _SLOW + _hardware("folded"),
     "serial": _WORDS + _PLAIN + _hardware("serial"),
     "parallel, protected": _WORDS + _PLAIN + _hardware("parallel", 'hardware.protect = "correct"\n'),
     "parallel, loadable": _WORDS + _PLAIN + _hardware("parallel", "hardware.reload = true\n"),
     "folded, loadable": _WORDS + _PLAIN + _hardware("folded", "hardware.reload = true\n"),
+    "parallel, lockable": _WORDS + _PLAIN + _hardware("parallel", _LOCK),
+    "folded, lockable": _WORDS + _PLAIN + _hardware("folded", _LOCK),
     "online": _WORDS + _PLAIN + _ZERO + _hardware("online"),
 }
-"""Specifications by what their cores are; of the last four, `verify` says that their hardware is not proven."""
+"""Specifications by what their cores are; of the last six, and of "folded, decimated", `verify` says that
+their hardware is not proven, or a part of it."""
 
 CLOCKS = {"parallel": 240, "folded": 800, "serial": 1600, "online": 1600}
 """Clocks of a simulation, by the first word."""

@@ -63,6 +63,21 @@ _BENCH = """module bench(input wire clk);
     dest <= noise[62:55] % CHANNELS;
   end
 """
+_PORT = """
+    .s_axil_awaddr({noise[20:18], 2'd0}), .s_axil_awprot(3'd0), .s_axil_awvalid(noise[17]), .s_axil_awready(takenNN[0]),
+    .s_axil_wdata(noise[16] ? 32'd1 : {noise[15:8], noise[31:8]}), .s_axil_wstrb(noise[7] ? 4'd15 : noise[6:3]),
+    .s_axil_wvalid(noise[38]), .s_axil_wready(takenNN[1]), .s_axil_bresp(takenNN[3:2]), .s_axil_bvalid(takenNN[4]),
+    .s_axil_bready(noise[39]), .s_axil_araddr({noise[37:35], 2'd0}), .s_axil_arprot(3'd0), .s_axil_arvalid(noise[34]),
+    .s_axil_arready(takenNN[5]), .s_axil_rdata(readNN), .s_axil_rresp(takenNN[7:6]), .s_axil_rvalid(takenNN[8]),
+    .s_axil_rready(noise[33]),
+"""
+_ANSWERS = """
+  wire [8:0] takenNN;
+  wire [31:0] readNN;
+"""
+_REGISTERS = (
+    "{takenNN[5:4], takenNN[1:0], takenNN[8] ? {takenNN[7:6], readNN} : 34'd0, takenNN[4] ? takenNN[3:2] : 2'd0}"
+)
 _WATCHED = """
   wire [OUT:0] dataNN, maskedNN;
   wire [7:0] destNN;
@@ -112,10 +127,11 @@ def named(text: str, number: int) -> str:
 
 
 def _bench(top: Module, count: int, channels: int, clocks: int) -> str:
-    more = "".join(
-        f".{name}({0 if kind == 'input' else ''}), " for name, kind in top.ports.items() if name.startswith("s_axil_")
-    )
-    watched = _WATCHED
+    watched, more = _WATCHED, ""
+    if "s_axil_awaddr" in top.ports:
+        watched = watched.replace("+ {readyNN", f"+ {_REGISTERS} + {{readyNN")
+        watched = _ANSWERS + watched
+        more = _PORT
     if "s_axis_tdest" in top.ports:
         more += ".s_axis_tdest(dest), .m_axis_tdest(destNN),"
     else:

@@ -205,18 +205,18 @@ class StagePlan:
 
     def _width(self, whole: Sum, scale: int) -> int:
         """Return the bits that hold each term of a sum and all on the way to it, in any order."""
-        ends = [term_range(self, each, value, scale) for each, value in whole.terms.items()]
+        ends = [part for each, value in whole.terms.items() for part in term_ranges(self, each, value, scale)]
         constant = whole.constant << scale
         low = sum(min(each.low, 0) for each in ends) + min(constant, 0)
         high = sum(max(each.high, 0) for each in ends) + max(constant, 0)
         return signed_width(low, high)
 
 
-def term_range(plan: StagePlan, signal: Signal, factor: int, scale: int) -> Span:
-    """Return the range of a signal times a factor in a sum that is kept times ``2**scale``."""
-    node = plan.node(signal)
-    ends = (node.low * factor << scale, node.high * factor << scale)
-    return Span(min(ends), max(ends))
+def term_ranges(plan: StagePlan, signal: Signal, factor: int, scale: int) -> list[Span]:
+    """Return the ranges of the products that a signal times a factor is added by, in a sum kept times ``2**scale``."""
+    values = plan.values(signal)
+    parts = halves((factor << scale) >> plan.scale(signal))
+    return [Span(*sorted((values.low * part, values.high * part))) for part in parts]
 
 
 def halves(factor: int) -> list[int]:

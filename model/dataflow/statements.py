@@ -15,7 +15,7 @@ from typing import NamedTuple
 from sosmith.model.dataflow.c_types import TYPES, Range, Span, bits_of, literal
 from sosmith.model.dataflow.graph import Graph, Node, Op
 from sosmith.model.dataflow.signals import Floor, Signal, StageSums, Sum, live_nodes, signals_of
-from sosmith.model.dataflow.stage_plan import StagePlan, halves, term_range
+from sosmith.model.dataflow.stage_plan import StagePlan, halves, term_ranges
 
 
 class StageText(NamedTuple):
@@ -182,7 +182,7 @@ class _Writer:
         plan, scale = self._plan, self._plan.scale(signal)
         constant = whole.constant << scale
         terms = [(each, (factor << scale) >> plan.scale(each)) for each, factor in whole.terms.items()]
-        spans = [term_range(plan, each, factor, scale) for each, factor in whole.terms.items()]
+        spans = [part for each, factor in whole.terms.items() for part in term_ranges(plan, each, factor, scale)]
         kind = bits_of(plan.values(signal), *_on_the_way([*spans, Span(constant, constant)]))
         ordered = sorted(terms, key=lambda term: (-bits_of(plan.values(term[0])), term[1] < 0))
         text = self._grouped(ordered) if kind == min(TYPES) else ""

@@ -262,7 +262,7 @@ def _number(path: Path, line: int, column: str, cell: str, readers: Mapping[str,
         try:
             return readers[column](text)
         except ValueError as error:
-            raise SpecificationError(f"{where}: {column} must be {error}, not {text!r}") from None
+            raise SpecificationError(f"{where}: {column} must be {error}, not {shortened(text)}") from None
     if not NUMBER.fullmatch(text) or float(text) in {math.inf, -math.inf}:
         raise SpecificationError(f"{where}: {column} must be a finite number, not {shortened(text)}")
     raise SpecificationError(f"{where}: {column} must be from -{LARGEST:g} to {LARGEST:g}, not {shortened(text)}")

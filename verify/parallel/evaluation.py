@@ -65,7 +65,7 @@ class Evaluation:
     cuts : set of str
         Nets whose value is asked for like that of a register.
     fields : callable
-        Gives bits of an input from one on, so many, where that is simpler than to cut them out; otherwise None.
+        Gives bits of a net from one on, so many, where they are known by themselves; otherwise None.
     """
 
     def __init__(
@@ -147,6 +147,9 @@ class Evaluation:
         return yes[0], self._chosen(select, yes[1], no[1])
 
     def _net(self, name: str, low: int, width: int) -> Form:
+        part = self._fields(name, low, width)
+        if part is not None:
+            return part
         if name in self._netlist.inlets and width < self._netlist.widths[name]:
             whole = self.net(name)
             if self._forms.is_variable(whole):
@@ -156,8 +159,7 @@ class Evaluation:
             known = name in self._cuts or name in self._netlist.registers or self._netlist.ports.get(name) == "input"
             none = "bits of x must not be used" if name.startswith("?") else f"{name} must be driven to be used"
             require(known, none)
-            part = self._fields(name, low, width)
-            return self._cut(self._content(name), low) if part is None else part
+            return self._cut(self._content(name), low)
         total: Form = {}
         done = low
         for driver in drivers:
@@ -183,7 +185,10 @@ class Evaluation:
             if bits is not None and bits != value:
                 return self._extended(bits, width)
         word = self._extended(value, max(low + width, own))
-        return self._cut(self._shortened(word, max(low + width, own), False), low)
+        short = self._shortened(word, max(low + width, own), False)
+        if low and short is word and low + width < own:
+            short = self._shortened(word, low + width, False)  # what is above these bits may be anything
+        return self._cut(short, low)
 
     def _cut(self, word: Form, low: int) -> Form:
         return self._forms.floor(shifted(word, -low)) if low else word

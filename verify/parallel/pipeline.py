@@ -17,6 +17,7 @@ it belongs to a sample before or behind, by as many as there are in between::
 
 What a state is about to take over, the net with its name and ``_next``, is the code of the operand for the sample at
 the state's own position. Seen from a position before, while that sample moves on, it belongs to the sample before.
+So do bits of another net that the state takes over as they are, where there is no such net.
 
 A register that belongs to another position without a known number of samples in between holds nothing that is known,
 unless its node lasts: then samples in between do not count.
@@ -44,7 +45,7 @@ from sosmith.verify.parallel.netlist import Netlist
 from sosmith.verify.parallel.state_memories import State, StateMemories
 from sosmith.verify.parallel.turn_memories import Counter, TurnMemories
 from sosmith.verify.program.normal_form import Form, constant, plus
-from sosmith.verify.reader.syntax import Statement
+from sosmith.verify.reader.syntax import Bits, Choice, Statement
 
 DATA = "s_axis_tdata"
 
@@ -84,6 +85,23 @@ def _fields(graph: GraphCodes, certificate: Certificate, width: int, input_flags
         offset += 1
     require(width == offset, f"the port {DATA} must have {offset} bits, not {width}")
     return fields
+
+
+class _Part(NamedTuple):
+    """Bits of a net."""
+
+    name: str
+    low: int
+    width: int
+
+
+def _parts_loaded(statements: Sequence[Statement], netlist: Netlist) -> Iterator[_Part]:
+    """Yield what statements load that is a part of a net as it is."""
+    for statement in statements:
+        if isinstance(statement, Choice):
+            yield from _parts_loaded((*statement.yes, *statement.no), netlist)
+        elif isinstance(statement.value, Bits):
+            yield _Part(statement.value.name, statement.value.low, netlist.width(statement.value))
 
 
 class Pipeline:
@@ -131,6 +149,7 @@ class Pipeline:
         self._open: list[str] = []
         self._followed: set[str] = set()
         self.states: dict[str, State] = {}
+        self._loads: dict[str, _Part] = {}
         self.memories: StateMemories | None = None
         self._counters: dict[str, Counter] = {}
         entrance = control.entrance
@@ -144,7 +163,10 @@ class Pipeline:
         for node in graph.delays:
             name = netlist.holder(graph.state_name(node))
             if name is not None:
-                self.states[name] = State(node, self.position_by_control(name, netlist.registers[name].statements))
+                statements = netlist.registers[name].statements
+                self.states[name] = State(node, self.position_by_control(name, statements))
+                for part in _parts_loaded(statements, netlist):
+                    self._loads[name] = part
         if graph.turned:
             turns = TurnMemories(self, netlist, control, graph, self._dependence)
             self.memories, self._counters = turns, turns.counters
@@ -175,7 +197,9 @@ class Pipeline:
             return unknown if state is None else state
 
         def fields(name: str, low: int, width: int) -> Form | None:
-            return self._field(low, width) if name == DATA and position == self._source else None
+            if name == DATA:
+                return self._field(low, width) if position == self._source else None
+            return self._part_taken_over(_Part(name, low, width), position, case)
 
         return self.logic(content, word, fields=fields, others=self._following_at(position).keys())
 
@@ -211,6 +235,15 @@ class Pipeline:
             for name, state in self.states.items()
             if f"{name}_next" in self._netlist.drivers and position < state.behind
         }
+
+    def _part_taken_over(self, part: _Part, position: int, case: Case) -> Form | None:
+        """Return a part of a net that a state is about to take over as it is, for a sample before the state."""
+        for name, state in self.states.items():
+            if self._loads.get(name) == part and part.name not in self.states and position < state.behind:
+                following = self._following(state, position, case)
+                self._followed |= set() if following is None else {f"{name}_next"}
+                return following
+        return None
 
     def constant_word(self, name: str) -> Form:
         """Return the word of a memory that never changes, for the channel of a sample."""
@@ -418,13 +451,14 @@ class Pipeline:
             (source,) = self._graph.nodes[state.node].operands
             wanted = self._graph.seen(source, self._graph.nodes[state.node].stage)
             net, full, valid = f"{name}_next", self._control.full, self._control.valid[state.behind]
+            part = _Part(net, 0, self._netlist.widths[net]) if net in self._netlist.drivers else self._loads[name]
             fixed = {RESET: 1, full: 0, valid: 1}
-            for _, word in cases(fixed, partial(self._net_at, net, state.behind)):
-                right = self.same(word, wanted, self._netlist.widths[net])
+            for _, word in cases(fixed, partial(self._part_at, part, state.behind)):
+                right = self.same(word, wanted, part.width)
                 require(right, f"{net} must be {self._graph.nodes[source].label}, not another value")
 
-    def _net_at(self, name: str, position: int, case: Case) -> Form:
-        return self.at(position, case).net(name)
+    def _part_at(self, part: _Part, position: int, case: Case) -> Form:
+        return self.at(position, case).net(*part)
 
     def _check_state(self, name: str) -> None:
         state, register = self.states[name], self._netlist.registers[name]

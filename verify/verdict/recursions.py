@@ -93,9 +93,9 @@ class Recursion:
         return [[fraction(self.transfer.matrix[i][j]) for j in self.loop] for i in self.loop]
 
     def _holds(self, root: int) -> bool:
-        """Whether all states in a loop hold earlier values of one node, or sums of them."""
-        states = self.transfer.states
-        return bool(self.loop) and all(self._is_sum_of(self.transfer.undelayed(states[k])[0], root) for k in self.loop)
+        """Whether a state in a loop holds earlier values of a node, and all the others do or hold sums of them."""
+        kept = {self.transfer.undelayed(self.transfer.states[k])[0] for k in self.loop}
+        return root in kept and all(self._is_sum_of(index, root) for index in kept)
 
     def _is_sum_of(self, index: int, root: int) -> bool:
         """Whether a node adds up nothing but a node and its earlier values."""

@@ -20,6 +20,7 @@ from sosmith.gen.specification.coefficients.content import Complex, ZerosAndPole
 from sosmith.model.errors import SpecificationError
 from sosmith.model.suggestion import did_you_mean
 from sosmith.model.tables.toml_file import read_toml
+from sosmith.model.tables.toml_tables import shown
 
 _MAX_BYTES = 1 << 16
 _KEYS = ("zeros", "poles", "gain", "method", "prewarp")
@@ -78,8 +79,8 @@ def _place(path: Path, where: str, value: Any) -> Complex:
 
 def _number(path: Path, where: str, value: Any) -> Fraction:
     if isinstance(value, bool) or not isinstance(value, int | Decimal):
-        raise SpecificationError(f"{path}: {where} must be a number, not {value!r}")
+        raise SpecificationError(f"{path}: {where} must be a number, not {shown(value)}")
     exact = value if isinstance(value, Decimal) else Decimal(value)
     if not exact.is_finite() or (exact and abs(exact.adjusted()) > _MAX_EXPONENT):
-        raise SpecificationError(f"{path}: {where} must be a finite number within reason, not {value}")
+        raise SpecificationError(f"{path}: {where} must be a finite number within reason, not {shown(value)}")
     return Fraction(value)

@@ -64,6 +64,17 @@ def test_refusals(tmp_path: Path, content: bytes, message: str) -> None:
         read_csv_table(path, ["a", "b", "c"], required=["a"])
 
 
+def test_a_long_cell_is_quoted_in_part_by_the_reader_of_its_column(tmp_path: Path) -> None:
+    def reader(text: str) -> float:
+        raise ValueError("a date")
+
+    path = tmp_path / "t.csv"
+    path.write_text(f"a\n{'9' * 400}\n")
+    message = f"^{re.escape(str(path))}, line 2: a must be a date, not '9{{56}}' \\.\\.\\.$"
+    with pytest.raises(SpecificationError, match=message):
+        read_csv_table(path, ["a"], readers={"a": reader})
+
+
 def test_missing_file_and_folder(tmp_path: Path) -> None:
     for path, reason in ((tmp_path / "none.csv", "no such file or directory"), (tmp_path, "is a directory")):
         message = f"{path} must be a readable CSV file ({reason})"

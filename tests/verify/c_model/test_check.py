@@ -32,9 +32,12 @@ TEXTS = {
     "steady": STEADY,
     "delta": STEADY.replace("bits = 8", "bits = 24"),
     "cascade": STEADY.replace("bits = 8", "bits = 16").replace("order = 2", "order = 5"),
+    "split": STEADY.replace("bits = 8", "bits = 24").replace(
+        "order = 2, cutoff = 20.0", "order = 4, cutoff = 10.41667"
+    ),
     "wide": WIDE.replace("bits = 12", "bits = 32").replace("bits = 24", "bits = 32").replace("0.0005", '"faithful"'),
 }
-REALIZATIONS = {"delta": "delta", "wide": "df1_ef2"}
+REALIZATIONS = {"delta": "delta", "split": "df1", "wide": "df1_ef2"}
 
 
 class Model(NamedTuple):
@@ -79,6 +82,9 @@ def test_what_is_written_is_proven(name: str, model: Callable[[str], Model]) -> 
     assert found.nodes > 20
     if name == "wide":
         assert "__int128" in model(name).source
+    if name == "split":  # a product in two parts, which add up to more than it on the way
+        assert re.search(r"n1_\d+s\d+ = ", model(name).source)
+        assert not re.search(r"n2_\d+s\d+ = ", model(name).source)
     if name == "cascade":
         assert {"product", "state->s0", "w->n1_3"} <= set(re.findall(r"product|(?:state|w)->\w+", model(name).source))
         assert re.search(r"= \(int32_t\)\(n2_\d+s\d+ >> 32\);", model(name).source)

@@ -4,12 +4,22 @@ import re
 
 import pytest
 from tests.gen.block_specifications import designed
-from tests.verify.parallel.cores import ODD, Made, made, small
+from tests.verify.parallel.cores import ODD, Made, made, small, specified
 from tests.verify.parallel.rejections import NODE, rejection, sweep
 from tests.verify.small_specifications import INSTRUMENT, PLAIN, STEADY, STEADY_INSTRUMENT, WIDE
 
+from sosmith.gen.core import design_core
 from sosmith.gen.realizations.registry import REALIZATIONS
 from sosmith.hdl.plan.parallel_clocks import block_latency_cycles
+
+HIGH = """
+name = "high"
+sample_rate = 1.0e6
+input.x = { bits = 11, range = [0.0, 4.0] }
+filter = { family = "butterworth", kind = "highpass", order = 6, cutoff = 9331.34210448237 }
+output = { bits = 9, range = [0.0, 4.0], unit = "V", max_error = "faithful" }
+hardware = { realization = "df1_ef2", samples_per_clock = 2, clock = 500.0e6, start = "zero" }
+"""
 
 
 def with_output(bits: int) -> str:
@@ -37,6 +47,13 @@ def test_starts_and_a_calibration(spec: str) -> None:
 
 def test_an_output_with_more_bits_than_the_input() -> None:
     accept(small(WIDE, "df1", lanes=2))
+
+
+def test_a_product_of_what_the_lane_before_takes_the_upper_bits_of() -> None:
+    """The sum whose upper bits are y is computed to the bits that its range needs, not to those of all its operands."""
+    core = made(design_core(specified(HIGH)), lanes=2)
+    assert re.search(r"assign \{ \w+\[\d+:\d+\], v_0\[23:8\], \w+ \} = \$signed\(add_27\) \+ ", core.text)
+    accept(core)
 
 
 @pytest.mark.sweep(1)

@@ -74,6 +74,17 @@ def test_a_text_that_a_tool_sees_otherwise_would_be_found(
     ]
 
 
+def test_a_core_whose_own_files_are_refused_would_be_found(tmp_path: Path) -> None:
+    refused = made("parallel, lockable", tmp_path)
+    outcome = Outcome()
+    campaign._judge_the_right(refused, outcome)
+    assert outcome.findings == []
+    (tmp_path / f"{NAME}.c").write_text("")
+    campaign._judge_the_right(refused, outcome)
+    (said,) = outcome.findings
+    assert said.startswith("parallel, lockable: its own files are refused: ")
+
+
 def test_a_traceback_would_be_found() -> None:
     def broken() -> str:
         raise ZeroDivisionError("by 0")

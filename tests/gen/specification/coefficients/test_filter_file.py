@@ -409,6 +409,10 @@ def test_a_prototype_without_a_filter_is_refused(text: str, message: str, tmp_pa
         ),
         ("gain = 1\n", "poles must be given, not left out"),
         ('poles = ["1"]\ngain = 1\n', "poles[0] must be a number, not '1'"),
+        (
+            f"poles = [-{'9' * 4000}.0]\ngain = 1\n",
+            f"poles[0] must be a finite number within reason, not -{'9' * 55} ...",
+        ),
         ('poles = [-1]\ngain = 1\nmethod = "x"\n', "method must be bilinear or impulse_invariant, not 'x'"),
     ],
 )
