@@ -303,7 +303,7 @@ def _decided(task: _Task, entry: Entry) -> tuple[Rows, ExactRow, int]:
     sections = sections_of(task.certificate.ideal.sections)
     size = max(abs(last.low), abs(last.high)).bit_length()
     for extra in _MORE_BITS:
-        bits = 64 + 20 + size - last.frac + extra
+        bits = 64 + 20 + size - last.frac + extra + task.cascade.bits_lost(index)
         rows = task.cascade.rows(index, task.last, bits)
         near = 84 + size - last.frac + extra
         more = max(near + 8 - (rows.whole.bit_length() - bits), 0)

@@ -62,6 +62,23 @@ output = { bits = 8, range = [0.0, 16.0], unit = "mm", max_error = "faithful" }
 """A calibration before a decimator before a filter."""
 
 
+BAND_STOP = """
+name = "band_stop"
+sample_rate = 1.0
+input.x = { bits = 4, signed = true, range = [-1.0, 1.0] }
+output = { bits = 17, signed = true, range = [-1.0, 1.0], unit = "", max_error = "faithful" }
+hardware = { start = "zero", realization = "lattice_wdf" }
+
+[filter]
+family = "chebyshev2"
+kind = "bandstop"
+order = 5
+cutoff = [0.089008, 0.168014]
+stopband_loss = 50.0
+"""
+"""A section of order 2 behind two of order 4, whose denominators have twice as many bits."""
+
+
 def designed(text: str) -> Certificate:
     """Return the certificate of a specification."""
     made = design_core(from_text(text, Path("small.toml")))
