@@ -122,7 +122,7 @@ Definition forms := Eval vm_compute in fill core sources written [] (firstn {sel
         return Rows(row, rest, 1 << bits + split(at.under)[0], plan)
 
     def bits_lost(self, section: int) -> int:
-        """By how many bits the largest first coefficient up to a section exceeds its own: so much coarser do rows get."""
+        """By how many bits the largest first coefficient up to a section exceeds its own: what rows lose on the way."""
         first = [split(one.under)[0] for one in self.sections[: section + 1]]
         return max(first) - first[-1]
 

@@ -26,6 +26,7 @@ THEORIES = (
     "Graph",
     "Ranges",
     "Linear",
+    "Rows",
     "Cascade",
     "Settling",
     "Start",

@@ -147,6 +147,44 @@ Proof.
   rewrite Z0, mult_IZR. ring.
 Qed.
 
+(* A product c Q, coefficient by coefficient and with no list in between: lists of long integers are what takes time. Sums
+   of its coefficients are then found without the product. `past` are the coefficients of Q so far, the last one first. *)
+Fixpoint products (c past Q : list Z) : list Z :=
+  match Q with [] => owed (tl c) past | q :: Q' => weighted c (q :: past) :: products c (q :: past) Q' end.
+Definition product (c Q : list Z) : list Z := products c [] Q.
+Fixpoint norm_of_products (c past Q : list Z) : Z :=
+  match Q with [] => norm1 (owed (tl c) past) | q :: Q' => Z.abs (weighted c (q :: past)) + norm_of_products c (q :: past) Q' end.
+Fixpoint signs_of_products (c past Q : list Z) (p n : Z) : Z * Z :=
+  match Q with
+  | [] => by_sign (owed (tl c) past) p n
+  | q :: Q' =>
+      let v := weighted c (q :: past) in
+      if 0 <=? v then signs_of_products c (q :: past) Q' (p + v) n else signs_of_products c (q :: past) Q' p (n + v)
+  end.
+
+Lemma owed_now a past u k : taps (owed a past) u k = (IZR (weighted a past) * u k + taps (owed (tl a) past) u (k - 1))%R.
+Proof. destruct a as [|x a]; [simpl; ring|reflexivity]. Qed.
+Lemma owed_nothing a u : forall k, taps (owed a []) u k = 0%R.
+Proof. induction a as [|x a IH]; intros k; cbn [owed taps]; [reflexivity|]. rewrite IH. destruct a; simpl; ring. Qed.
+Lemma taps_products c : forall Q past u k, taps (products c past Q) u k = (taps (owed (tl c) past) u k + taps Q (taps c u) k)%R.
+Proof.
+  induction Q as [|q Q IH]; intros past u k; cbn [products taps]; [ring|].
+  rewrite IH, owed_next, (taps_first c), (owed_now (tl c)).
+  assert (W : (IZR (weighted c (q :: past)) = IZR (hd 0%Z c) * IZR q + IZR (weighted (tl c) past))%R).
+  { destruct c as [|x c]; [simpl; ring|]. cbn [weighted hd tl]. rewrite plus_IZR, mult_IZR. ring. }
+  rewrite W. ring.
+Qed.
+Lemma taps_product c Q u k : taps (product c Q) u k = taps Q (taps c u) k.
+Proof. unfold product. rewrite taps_products, owed_nothing. ring. Qed.
+Lemma conv_product c Q u n : conv (product c Q) u n = conv Q (conv c u) n.
+Proof.
+  rewrite <- !taps_conv, taps_product. apply taps_ext. intros j _. symmetry. apply from_zero_conv.
+Qed.
+Lemma norm_of_products_is c : forall Q past, norm_of_products c past Q = norm1 (products c past Q).
+Proof. induction Q as [|q Q IH]; intros past; cbn [norm_of_products products norm1]; [reflexivity|]. rewrite IH. reflexivity. Qed.
+Lemma signs_of_products_is c : forall Q past p n, signs_of_products c past Q p n = by_sign (products c past Q) p n.
+Proof. induction Q as [|q Q IH]; intros past p n; cbn [signs_of_products products by_sign]; [reflexivity|]. rewrite !IH. reflexivity. Qed.
+
 (* A recursion whose coefficients are replaced by others that are nearly in proportion: s D = c D' + .., s B = c B' + .. *)
 Definition drift (s c : Z) (l l' : list Z) : list Z := add (scale s l) (scale (- c) l').
 Lemma drift_spec s c l l' u t : (IZR s * taps l u t = IZR c * taps l' u t + taps (drift s c l l') u t)%R.
