@@ -23,15 +23,15 @@ Proof.
 Qed.
 
 Fixpoint norms (N : list (list Z)) (Q : list Z) : Z :=
-  match N with [] => 0 | c :: N' => norm_of_products c [] Q + norms N' Q end.
+  match N with [] => 0 | c :: N' => norm_of_product c Q + norms N' Q end.
 Lemma norms_pos N Q : 0 <= norms N Q.
-Proof. induction N as [|c N IH]; cbn [norms]; [lia|]. rewrite norm_of_products_is. pose proof (norm1_pos (products c [] Q)). lia. Qed.
+Proof. induction N as [|c N IH]; cbn [norms]; [lia|]. rewrite norm_of_product_is. pose proof (norm1_pos (product c Q)). lia. Qed.
 Lemma together_norms Q (M : R) : (0 <= M)%R -> forall N u t,
   Forall (fun x : signal => forall k, (Rabs (x k) <= M)%R) u -> (Rabs (taps Q (together N u) t) <= IZR (norms N Q) * M)%R.
 Proof.
   intros HM. induction N as [|c N IH]; intros u t H.
   - rewrite taps_silent by reflexivity. rewrite Rabs_R0. simpl. lra.
-  - cbn [norms]. rewrite norm_of_products_is, plus_IZR, Rmult_plus_distr_r. fold (product c Q). destruct u as [|x u].
+  - cbn [norms]. rewrite norm_of_product_is, plus_IZR, Rmult_plus_distr_r. destruct u as [|x u].
     + rewrite taps_silent by reflexivity. rewrite Rabs_R0. pose proof (norm1_pos (product c Q)). pose proof (norms_pos N Q).
       assert (0 <= IZR (norm1 (product c Q)) * M)%R by (apply Rmult_le_pos; [apply IZR_le; lia|lra]).
       assert (0 <= IZR (norms N Q) * M)%R by (apply Rmult_le_pos; [apply IZR_le; lia|lra]). lra.

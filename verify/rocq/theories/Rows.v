@@ -61,7 +61,7 @@ Qed.
 
 (* How large the row and its opposite can get, for values of the sources in ranges that contain 0. *)
 Definition sums (l : list (list Z * list Z)) : Z * Z :=
-  match l with [(c, Q)] => signs_of_products c [] Q 0 0 | _ => by_sign (expanded l) 0 0 end.
+  match l with [(c, Q)] => signs_of_product c Q | _ => by_sign (expanded l) 0 0 end.
 Definition opposite (s : Z * Z) : Z * Z := (- snd s, - fst s).
 Fixpoint dot (s b : list (Z * Z)) : Z :=
   match s, b with p :: s', x :: b' => fst p * snd x + snd p * fst x + dot s' b' | _, _ => 0 end.
@@ -71,7 +71,7 @@ Proof. destruct l; reflexivity. Qed.
 Lemma sums_is l : sums l = by_sign (expanded l) 0 0.
 Proof.
   destruct l as [|[c Q] [|p l]]; try reflexivity. cbn [sums expanded fold_right fst snd].
-  rewrite signs_of_products_is, add_nothing. reflexivity.
+  rewrite signs_of_product_is, add_nothing. reflexivity.
 Qed.
 Lemma total_dot r : forall u b n, forallb has_zero b = true -> Forall2 within u b ->
   (total (rows r) u n <= IZR (dot (map sums r) b))%R /\ (- total (rows r) u n <= IZR (dot (map opposite (map sums r)) b))%R.
