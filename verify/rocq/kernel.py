@@ -33,6 +33,7 @@ THEORIES = (
     "Calibration",
     "Exact",
     "Bound",
+    "Downsampling",
 )
 """The general theories, in the order in which they are compiled."""
 

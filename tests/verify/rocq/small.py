@@ -50,6 +50,16 @@ hardware = { realization = "df1" }
 """
 """A filter behind a decimator."""
 
+DOWNSAMPLED = """
+name = "downsampled"
+sample_rate = 1.0
+input.x = { bits = 8, signed = true, range = [-1.0, 1.0] }
+filter = { taps = [0.05, 0.2, 0.37, 0.2, 0.05], decimate = 2 }
+output = { bits = 8, range = [-1.0, 1.0], unit = "", max_error = "faithful" }
+hardware = { architecture = "folded" }
+"""
+"""An FIR filter of which every second result leaves."""
+
 BOTH = """
 name = "calibrated"
 sample_rate = 100.0
