@@ -181,7 +181,7 @@ def _see_accepted(kernel: Kernel) -> None:
 def design_counts(folder: Path, count: int, seconds: int, *, resume: bool) -> list[str]:
     """Have random designs checked; record the verdicts by name, and return those that were not accepted."""
     verdicts: dict[str, str] = _recorded().get("designs", {}).get("verdicts", {}) if resume else {}
-    for draw, made in draws(count, len(verdicts)):
+    for draw, made in draws(count, tuple(verdicts)):
         kernel = Kernel(folder, seconds)
         try:
             written = theorems(made)
