@@ -3,9 +3,9 @@
 Of small certificates numbers are edited one by one, at random, and those edits are taken that our verifier rejects:
 Rocq must reject them too, or there must be no theorem. Random designs of all families, kinds and realizations must be
 accepted (`benchmarks.rocq_designs`), each within `--seconds` of processor time. `--edits` and `--random` say how many;
-`--resume` goes on where it was stopped. Seeds are fixed, and of what is not asked for, with 0,
-the record stays. The counts go to benchmarks/rocq.json and into the table of docs/assurance.md. Status 1 if an edit is
-accepted or a design is not. Needs coqc and coqtop.
+`--resume` goes on where it was stopped. `--examples` takes the time of two examples. Seeds are fixed, and of what is
+not asked for, with 0, the record stays. The counts go to benchmarks/rocq.json and into the table of docs/assurance.md.
+Status 1 if an edit is accepted or a design is not. Needs coqc and coqtop.
 """
 
 from __future__ import annotations
@@ -36,7 +36,9 @@ from sosmith.verify.rocq.kernel import ACCEPTED, LIBRARY, THEORIES, mark
 
 RECORD = Path(__file__).with_suffix(".json")
 DOCUMENT = Path(__file__).resolve().parent.parent / "docs" / "assurance.md"
+EXAMPLES_FOLDER = DOCUMENT.parent.parent / "examples"
 PART = re.compile("(?<=<!-- rocq -->\n).*(?=<!-- end of rocq -->)", re.DOTALL)
+EXAMPLES = ("audio_lowpass", "flange_wear_locomotive")
 EDITS, DESIGNS, SECONDS = 500, 20, 600
 _ORDERS = (1, 2, 3)
 """Those of the filters whose certificates are edited, one after another."""
@@ -51,6 +53,10 @@ _ROWS = {
     "designs": {
         "tried": "random designs",
         "accepted": "of these, accepted by the kernel of Rocq, each with its error bound",
+    },
+    "examples": {
+        name: f"seconds of processor time of `sosmith verify --rocq` for {name}, the theories included"
+        for name in EXAMPLES
     },
 }
 
@@ -175,7 +181,7 @@ def _see_accepted(kernel: Kernel) -> None:
 def design_counts(folder: Path, count: int, seconds: int, *, resume: bool) -> list[str]:
     """Have random designs checked; record the verdicts by name, and return those that were not accepted."""
     verdicts: dict[str, str] = _recorded().get("designs", {}).get("verdicts", {}) if resume else {}
-    for draw, made in draws(count, len(verdicts)):
+    for draw, made in draws(count, tuple(verdicts)):
         kernel = Kernel(folder, seconds)
         try:
             written = theorems(made)
@@ -195,6 +201,22 @@ def design_counts(folder: Path, count: int, seconds: int, *, resume: bool) -> li
 def _designs(verdicts: dict[str, str]) -> dict[str, Any]:
     accepted = sum(verdict == "accepted" for verdict in verdicts.values())
     return {"tried": len(verdicts), "accepted": accepted, "verdicts": verdicts}
+
+
+def example_times(folder: Path) -> None:
+    """Record the processor time that `sosmith verify --rocq` takes for the examples, on one core, in s."""
+    code = "import sys; from sosmith.cli import main; sys.exit(main())"
+    times = {}
+    for name in EXAMPLES:
+        spec = EXAMPLES_FOLDER / f"{name}.toml"
+        subprocess.run([sys.executable, "-c", code, "generate", str(spec), "-o", str(folder)], check=True)
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        line = [sys.executable, "-c", code, "verify", str(folder / f"{name}.certificate.json"), "--rocq", "--partial"]
+        subprocess.run(line, check=True, stdout=subprocess.DEVNULL)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        times[name] = round(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+        print(f"{name}: {times[name]} s", file=sys.stderr, flush=True)
+    _record({"examples": times})
 
 
 def _recorded() -> dict[str, dict[str, Any]]:
@@ -217,6 +239,7 @@ def main() -> None:
     parser.add_argument("--random", type=int, default=DESIGNS, help="number of random designs")
     parser.add_argument("--resume", action="store_true", help="go on behind what the record has")
     parser.add_argument("--seconds", type=int, default=SECONDS, help="processor time for a design")
+    parser.add_argument("--examples", action="store_true", help="take the time of two examples")
     chosen = parser.parse_args()
     wrong: list[str] = []
     with TemporaryDirectory() as name:
@@ -225,6 +248,8 @@ def main() -> None:
             wrong += edit_counts(Kernel(folder), chosen.edits, resume=chosen.resume)
         if chosen.random:
             wrong += design_counts(folder, chosen.random, chosen.seconds, resume=chosen.resume)
+        if chosen.examples:
+            example_times(folder)
     print("\n".join(wrong))
     print(table(_recorded()), end="")
     sys.exit(bool(wrong))

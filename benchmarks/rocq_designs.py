@@ -11,7 +11,7 @@ from __future__ import annotations
 import random
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -172,10 +172,10 @@ def slowest_pole(certificate: Certificate) -> float:
     return max((float(abs(pole)) for each in poles for pole in each), default=0.0)
 
 
-def draws(count: int, first: int = 0) -> Iterator[tuple[Draw, Certificate]]:
+def draws(count: int, done: Collection[str] = ()) -> Iterator[tuple[Draw, Certificate]]:
     """Draw designs that can be met: the variants in turn, then families, kinds and starts that had few turns yet.
 
-    Those before number `first` are drawn as well, so that the later ones are the same, and left out.
+    Those whose names are in `done` are drawn as well, so that the others are the same, and left out.
     """
     had, variants = Counter[str](), tuple(VARIANTS)
     for index in range(count):
@@ -187,6 +187,6 @@ def draws(count: int, first: int = 0) -> Iterator[tuple[Draw, Certificate]]:
             made = designed(draw)
             if made is not None:
                 had.update((draw.family, draw.kind, draw.start))
-                if index >= first:
+                if draw.name not in done:
                     yield draw, made
                 break

@@ -25,6 +25,7 @@ from sosmith.model.dataflow.graph import Graph, Node, Op
 from sosmith.model.reference.golden import exact_chain
 
 _WIDEST = 62
+"""Bits of a word up to which numpy's integers are used; beyond it Python's, which are slower."""
 
 TRIED = 512
 """Codes that are tried for each sample."""
@@ -74,9 +75,9 @@ class _Walk:
         self._quantized = quantized = design.quantized
         if design.datapath.decimator is not None or quantized.filter is None:
             raise ValueError("the core must filter every sample")
-        if max(node.width for stage in design.datapath.stages for node in stage.graph.nodes) > _WIDEST:
-            raise ValueError(f"the core's words must have at most {_WIDEST} bits")
         self._stages = design.datapath.stages
+        wide = max(node.width for stage in self._stages for node in stage.graph.nodes) > _WIDEST
+        self._kind = object if wide else np.int64
         first = len(self._stages) - len(quantized.sections) - 1
         self._entry = first
         length = min(decay_length(quantized.quantized_sos), MOST)
@@ -166,7 +167,7 @@ class _Walk:
 
     def _step(self, codes: Ints, states: Sequence[npt.NDArray[np.object_]]) -> list[list[Ints]]:
         """Values of all nodes of all stages for each code, at the same states."""
-        wires = [codes[:, k] for k in range(codes.shape[1])]
+        wires = [codes[:, k].astype(self._kind) for k in range(codes.shape[1])]
         values = []
         for stage, state in zip(self._stages, states, strict=True):
             values.append(_evaluated(stage.graph, wires, state))
@@ -199,16 +200,16 @@ def _evaluated(graph: Graph, wires: Sequence[Ints], state: npt.NDArray[np.object
         if node.op is Op.INPUT:
             values.append(next(supply))
         elif node.op is Op.DELAY:
-            values.append(np.full(count, next(memory), dtype=np.int64))
+            values.append(np.full(count, next(memory), dtype=wires[0].dtype))
         else:
-            values.append(_value(graph, node, [values[i] for i in node.operands], count))
+            values.append(_value(graph, node, [values[i] for i in node.operands], wires[0]))
     return values
 
 
-def _value(graph: Graph, node: Node, operands: Sequence[Ints], count: int) -> Ints:
+def _value(graph: Graph, node: Node, operands: Sequence[Ints], like: Ints) -> Ints:
     fracs = [graph.nodes[i].frac for i in node.operands]
     if node.op is Op.CONSTANT:
-        return np.full(count, node.parameter, dtype=np.int64)
+        return np.full_like(like, node.parameter)
     if node.op in {Op.ADD, Op.SUBTRACT}:
         a, b = (value << (node.frac - frac) for value, frac in zip(operands, fracs, strict=True))
         return a + b if node.op is Op.ADD else a - b

@@ -10,6 +10,8 @@
                     ^                                       ^ aclk
     clk, rst -------+---------------------------------------+
 
+A core with a lock, fed over the line, has a `LockKeeper` between its registers and the link.
+
 With converters, a front-end feeds the core, and the link fetches what it keeps::
 
                  +------+  o_result, ..   +-----------+  s_axis_*, aresetn   +------+
@@ -35,6 +37,7 @@ from amaranth.hdl import Module
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from sosmith.hdl.boards.lock_keeper import LockKeeper
 from sosmith.hdl.bus.command_engine import Face, core_side
 from sosmith.hdl.bus.link import LEDS, Link
 from sosmith.hdl.converters.front_end import FrontEnd
@@ -119,10 +122,11 @@ class BoardTop(wiring.Component):
             self.leds.eq(link.leds),
             core.aclk.eq(self.clk),
         ]
-        self.join(m, core, link, core_side(self.face))
         if self.schedule is None:
             m.d.comb += core.aresetn.eq(link.aresetn)
+            self.join(m, core, link, self._feeding(m, core, link))
             return m
+        self.join(m, core, link, core_side(self.face))
         m.submodules.front_end = front = FrontEnd(self.schedule, result_bytes=self.face.result_bytes)
         m.d.comb += [
             front.clk.eq(self.clk),
@@ -133,6 +137,24 @@ class BoardTop(wiring.Component):
         self.join(m, front, link, core_side(self.face))
         self.join(m, core, front, core_side(replace(self.face, readings=0, address_bits=0)))
         return m
+
+    def _feeding(self, m: Module, core: wiring.Component, link: Link) -> dict[str, In | Out]:
+        """Return what a link joins to the core that it feeds, but what goes through a `LockKeeper`."""
+        members = core_side(self.face)
+        if not getattr(core, "lock", False):
+            return members
+        m.submodules.keeper = keeper = LockKeeper(self.face.address_bits)
+        m.d.comb += [
+            keeper.clk.eq(self.clk),
+            keeper.rst.eq(self.rst),
+            keeper.i_target.eq(link.s_axil_awaddr),
+            core.s_axil_awaddr.eq(keeper.o_target),
+            keeper.i_answered.eq(core.s_axil_bvalid & link.s_axil_bready),
+            keeper.i_response.eq(core.s_axil_bresp),
+            keeper.i_data.eq(core.s_axil_rdata),
+            link.s_axil_rdata.eq(keeper.o_data),
+        ]
+        return {name: member for name, member in members.items() if name not in {"s_axil_awaddr", "s_axil_rdata"}}
 
     def join(
         self, m: Module, inner: wiring.Component, outer: wiring.Component, members: Mapping[str, In | Out]

@@ -9,7 +9,8 @@ from fractions import Fraction
 
 from flint import fmpz_poly
 
-from sosmith.verify.certificate_file import Certificate, Operation
+from sosmith.verify.certificate_file import Certificate, DownsamplingEntry, Operation
+from sosmith.verify.graph import require
 from sosmith.verify.rocq.cascade import Cascade, Row, Rows
 from sosmith.verify.rocq.claims import Claim
 from sosmith.verify.rocq.entry import Entry, decimated_entry, direct_entry, real
@@ -110,6 +111,10 @@ def bound_claims(
     if counter is not None:
         words = f"from sample {counter.samples} on, the same and half a code, whatever the inputs were before the start"
         yield Claim("settled", words, _settled(task, entry, counter))
+    if certificate.downsampling is not None:
+        every = certificate.downsampling.factor
+        words = f"so is each result that leaves, one for {every} samples, of the exact filter from its first sample on"
+        yield Claim("results_are_bounded", words, _results(task, entry, certificate.downsampling))
     error, unit = certificate.max_error, f" {certificate.output.unit}".rstrip()
     yield Claim("error_is_allowed", f"the bound is at most {float(error):.9g}{unit}", _allowed(certificate))
     gain = certificate.claims.peak_gain
@@ -217,18 +222,18 @@ def _first_input(task: _Task, codes: str) -> str:
     )
 
 
-def _difference(task: _Task, codes: str, at: str) -> str:
+def _difference(task: _Task, codes: str, at: str, exactly: str) -> str:
     port = task.certificate.output
     code = f"IZR (code core {codes} {task.out} {at})"
-    return f"{code} - limited (IZR {number(port.lowest)}) (IZR {number(port.highest)}) {_exactly(task)}"
+    return f"{code} - limited (IZR {number(port.lowest)}) (IZR {number(port.highest)}) {exactly}"
 
 
 def _bound(task: _Task, entry: Entry) -> str:
     bound = task.certificate.claims.bound
-    head, _ = _statement(task, entry)
+    head, exactly = _statement(task, entry)
     return f"""\
 Theorem error_is_bounded : {head}
-  (Rabs ({_difference(task, entry.codes, "n")})
+  (Rabs ({_difference(task, entry.codes, "n", exactly)})
     <= IZR {number(bound.numerator)} / IZR {bound.denominator})%R.
 Proof.
   intros x X y Y n. destruct (error_in_parts x X y Y n) as [e [P E]].
@@ -245,7 +250,7 @@ def _settled(task: _Task, entry: Entry, counter: Counter) -> str:
     return f"""\
 Theorem settled : forall z, inputs_within {entry.ports} z ->
   forall m y, exact_filter exact_sections (from_zero {entry.late}) y -> forall n, {samples} <= Z.of_nat n ->
-  (Rabs ({_difference(task, codes, "(m + n)")})
+  (Rabs ({_difference(task, codes, "(m + n)", _exactly(task))})
     <= IZR {number(bound.numerator)} / IZR {bound.denominator} + 1 / 2)%R.
 Proof.
   intros z X m y Y n N.
@@ -257,6 +262,25 @@ Proof.
     (fun j => calibrated_input z X (m + j)%nat) y Y n
     ltac:(destruct m; [exact I|unfold details; cbn [settling_]; lia])) as [e [t [P [T [_ E]]]]].
   {_tidied(task)}rewrite <- bound_is_sum_of_parts. exact (within_late claimed _ _ _ _ _ _ P T E).
+Qed.
+"""
+
+
+def _results(task: _Task, entry: Entry, kept: DownsamplingEntry) -> str:
+    """Write the theorem on the results of a filter that decimates, which fills its window with its first sample."""
+    require(task.start is None, "a filter of which every R-th result leaves must start from zero")
+    bound, codes = task.certificate.claims.bound, f"(filled {kept.filled} {entry.codes})"
+    exactly = _exactly(task).replace("(Z.of_nat n)", f"(Z.of_nat ({kept.factor} * n))")
+    difference = _difference(task, codes, f"({kept.filled} + {kept.factor} * n)", exactly)
+    return f"""\
+Theorem results_are_bounded : forall x, inputs_within {entry.ports} x ->
+  forall y, exact_filter exact_sections (from_first {entry.exact}) y -> forall n : nat,
+  (Rabs ({difference})
+    <= IZR {number(bound.numerator)} / IZR {bound.denominator})%R.
+Proof.
+  intros x X y Y n.
+  destruct (filled_results exact_sections {kept.filled} {entry.exact} y ({kept.factor} * n) eq_refl Y) as [z [Z E]].
+  rewrite <- E. exact (error_is_bounded {codes} (filled_within {kept.filled} {entry.ports} x X) z Z _).
 Qed.
 """
 
@@ -303,7 +327,7 @@ def _decided(task: _Task, entry: Entry) -> tuple[Rows, ExactRow, int]:
     sections = sections_of(task.certificate.ideal.sections)
     size = max(abs(last.low), abs(last.high)).bit_length()
     for extra in _MORE_BITS:
-        bits = 64 + 20 + size - last.frac + extra
+        bits = 64 + 20 + size - last.frac + extra + task.cascade.bits_lost(index)
         rows = task.cascade.rows(index, task.last, bits)
         near = 84 + size - last.frac + extra
         more = max(near + 8 - (rows.whole.bit_length() - bits), 0)

@@ -121,6 +121,11 @@ Definition forms := Eval vm_compute in fill core sources written [] (firstn {sel
         plan = f"Plan {first.samples} (2 ^ {bits}) [{'; '.join(steps)}]"
         return Rows(row, rest, 1 << bits + split(at.under)[0], plan)
 
+    def bits_lost(self, section: int) -> int:
+        """By how many bits the largest first coefficient up to a section exceeds its own: what rows lose on the way."""
+        first = [split(one.under)[0] for one in self.sections[: section + 1]]
+        return max(first) - first[-1]
+
     def _computes(self, node: int, section: int) -> int:
         """Return the section before another one that computes a node; the one just before it if none does."""
         return next((at for at in range(section) if node in self.sections[at].forms), section - 1)

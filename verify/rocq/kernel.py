@@ -26,12 +26,14 @@ THEORIES = (
     "Graph",
     "Ranges",
     "Linear",
+    "Rows",
     "Cascade",
     "Settling",
     "Start",
     "Calibration",
     "Exact",
     "Bound",
+    "Downsampling",
 )
 """The general theories, in the order in which they are compiled."""
 

@@ -217,7 +217,7 @@ Qed.
 def _section(name: str, before: str, windows: Windows, index: int, through: int, counter: Counter | None) -> str:
     cascade = windows.cascade
     section = cascade.sections[index]
-    plans = "; ".join(f"({target}%nat, {_decided(windows, index, target).plan})" for target in section.targets)
+    plans = "; ".join(f"({target}%nat, {decided(windows, index, target).plan})" for target in section.targets)
     given, counts = f"map fst plans_{index}", ""
     if counter is not None:
         given = f"{counter.next}%nat :: {given}"
@@ -251,10 +251,10 @@ Qed.
 """
 
 
-def _decided(windows: Windows, index: int, target: int) -> Rows:
+def decided(windows: Windows, index: int, target: int) -> Rows:
     """Return a plan that proves the range of a target, or that with the highest precision."""
     entry = windows.cascade.graph.node(target)
-    size = max(abs(entry.low), abs(entry.high)).bit_length()
+    size = max(abs(entry.low), abs(entry.high)).bit_length() + windows.cascade.bits_lost(index)
     for fewer in _FEWER_BITS:
         made = windows.cascade.rows(index, target, max(size + 16 - fewer, 8))
         if _fits(windows, made, (entry.low, entry.high)):

@@ -50,6 +50,16 @@ hardware = { realization = "df1" }
 """
 """A filter behind a decimator."""
 
+DOWNSAMPLED = """
+name = "downsampled"
+sample_rate = 1.0
+input.x = { bits = 8, signed = true, range = [-1.0, 1.0] }
+filter = { taps = [0.05, 0.2, 0.37, 0.2, 0.05], decimate = 2 }
+output = { bits = 8, range = [-1.0, 1.0], unit = "", max_error = "faithful" }
+hardware = { architecture = "folded" }
+"""
+"""An FIR filter of which every second result leaves."""
+
 BOTH = """
 name = "calibrated"
 sample_rate = 100.0
@@ -60,6 +70,23 @@ filter = { family = "butterworth", kind = "lowpass", order = 1, cutoff = 4.0, de
 output = { bits = 8, range = [0.0, 16.0], unit = "mm", max_error = "faithful" }
 """
 """A calibration before a decimator before a filter."""
+
+
+BAND_STOP = """
+name = "band_stop"
+sample_rate = 1.0
+input.x = { bits = 4, signed = true, range = [-1.0, 1.0] }
+output = { bits = 17, signed = true, range = [-1.0, 1.0], unit = "", max_error = "faithful" }
+hardware = { start = "zero", realization = "lattice_wdf" }
+
+[filter]
+family = "chebyshev2"
+kind = "bandstop"
+order = 5
+cutoff = [0.089008, 0.168014]
+stopband_loss = 50.0
+"""
+"""A section of order 2 behind two of order 4, whose denominators have twice as many bits."""
 
 
 def designed(text: str) -> Certificate:

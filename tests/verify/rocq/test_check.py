@@ -14,6 +14,7 @@ from tests.gen.word_lengths.filters import butterworth, plain
 from tests.verify.rocq.small import (
     BOTH,
     DECIMATED,
+    DOWNSAMPLED,
     GRID,
     SETTLING,
     calibrated,
@@ -249,6 +250,26 @@ def test_a_start_from_zero_and_a_decimator(text: str, tmp_path: Path) -> None:
     names = {claim.name for claim in theorems(made).claims}
     assert names >= ({"flagged", "settled"} if text == SETTLING else {"decimated_within", "calibrated_input"})
     assert checked(made, tmp_path) <= STANDARD
+
+
+@needs_coqc
+def test_results_of_an_fir_filter_that_decimates(tmp_path: Path) -> None:
+    made = designed(DOWNSAMPLED)
+    assert made.downsampling is not None
+    written = {claim.name: claim.text for claim in theorems(made).claims}["results_are_bounded"]
+    assert f"code core (filled {made.downsampling.filled} x)" in written
+    assert f"({made.downsampling.filled} + 2 * n)" in written
+    assert "(from_first (fun n => calibrated (x n))) y" in written
+    assert checked(made, tmp_path) <= STANDARD
+
+
+@needs_coqc
+@pytest.mark.slow
+def test_a_window_that_is_not_filled_is_refused(tmp_path: Path) -> None:
+    tree = json.loads(certificate_text(designed(DOWNSAMPLED)))
+    tree["downsampling"]["filled"] -= 1
+    with pytest.raises(RejectedError, match=r"^Rocq must accept results_are_bounded \("):
+        checked(Certificate.model_validate(tree), tmp_path)
 
 
 def sooner(tree: Any) -> None:

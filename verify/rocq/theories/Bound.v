@@ -5,7 +5,7 @@
    the other roundings; to that come what the calibration adds, the first sample, and the last rounding. Behind the samples
    that are flagged as settling the same holds whatever was before, but for the tails of the responses. *)
 Require Import Bool ZArith Reals List Lia Lra. Import ListNotations.
-From Sosmith Require Import Definitions Streams Responses Graph Ranges Linear Gains Cascade Settling Exact.
+From Sosmith Require Import Definitions Streams Responses Graph Ranges Linear Rows Gains Cascade Settling Exact.
 Open Scope Z_scope.
 
 Lemma min_near h a b : (Rabs (Rmin h a - Rmin h b) <= Rabs (a - b))%R.
@@ -124,12 +124,12 @@ Proof.
   replace (IZR unit * (IZR value / IZR unit))%R with (IZR value) by (field; lra). exact H.
 Qed.
 
-Definition either (g : graph) (S : list source) (W : windows) (row : list (list Z)) : Z :=
-  Z.max (most_of g S W row) (most_of g S W (scale_rows (-1) row)).
+Definition either (g : graph) (S : list source) (W : windows) (r : row) : Z :=
+  let (up, down) := most_of g S W r in Z.max up down.
 (* The parts as numbers, in units of 1 / (2^F steps_of f K) but for the last one, which is in units of 1 / (2 2^F off_q). *)
 Record values := Values { input_ : Z; coefficients_ : Z; roundings_ : Z; start_ : Z; output_ : Z; unit_ : Z; unit_out : Z; late_ : Z }.
-Definition late_of (g : graph) (S : list source) (W : windows) (d : parts_) (row : list (list Z)) : Z :=
-  match settling_ d with Some n => late_sum (Datatypes.S (N.to_nat n)) row (map (reach g) (used S row)) | None => 0 end.
+Definition late_of (g : graph) (S : list source) (W : windows) (d : parts_) (r : row) : Z :=
+  match settling_ d with Some n => late_sum (Datatypes.S (N.to_nat n)) r (map (reach g) (used S r)) | None => 0 end.
 Definition parts_of (g : graph) (S : list source) (forms : list (option form)) (k : nat) (W : windows) (d : parts_)
     (sections : list (list Z * list Z)) (lo hi off_p off_q : Z) : option values :=
   match rounding_node g (out d) lo hi with
@@ -142,8 +142,8 @@ Definition parts_of (g : graph) (S : list source) (forms : list (option form)) (
       | Some (alpha, beta, gamma), Some (E, Re) =>
         let F := frac_of g b in
         let f := frac_of g (taken d) in
-        let both := add_rows (scale_rows (steps_of f * (2 ^ more d * alpha)) row)
-          (place (entry d) (scale (- (2 ^ F * units_of f)) E)) in
+        let both := join (times_row (steps_of f * (2 ^ more d * alpha)) row)
+          (place (entry d) [([- (2 ^ F * units_of f)], E)]) in
         let entering := place (entry d) (nth (entry d) both []) in
         let others := without (entry d) both in
         let from_first := if steady d
@@ -177,7 +177,7 @@ Definition parts_hold (v : option values) (c : budget) : bool :=
   | None => false
   end.
 
-Lemma all_within g x S row : (forall n i, (i < length g)%nat -> in_range g x i n) -> ordered g = true ->
+Lemma all_within {A} g x S (row : list A) : (forall n i, (i < length g)%nat -> in_range g x i n) -> ordered g = true ->
   forallb (known_source g (length g)) (used S row) = true -> Forall2 within (map (drive g x) (used S row)) (map (reach g) (used S row)).
 Proof.
   intros K G H. rewrite forallb_forall in H. induction (used S row) as [|s l IH]; constructor.
@@ -186,15 +186,16 @@ Proof.
 Qed.
 Lemma most_of_shifted g x S l m n : (forall n i, (i < length g)%nat -> in_range g x i n) -> ordered g = true ->
   forallb (known_source g (length g)) (used S l) = true ->
-  (total l (map (shifted m) (map (drive g x) S)) n <= IZR (most l (map (reach_in g None false) (used S l)) (map (reach_in g None true) (used S l))))%R.
+  (total (rows l) (map (shifted m) (map (drive g x) S)) n <= IZR (fst (most_of g S None l)))%R
+  /\ (- total (rows l) (map (shifted m) (map (drive g x) S)) n <= IZR (snd (most_of g S None l)))%R.
 Proof.
-  intros K G H. rewrite (total_short l _ (length l)) by reflexivity. rewrite !firstn_map. fold (used S l).
+  intros K G H. rewrite (total_short (rows l) _ (length l)) by (unfold rows; rewrite map_length; reflexivity).
+  rewrite !firstn_map. fold (used S l). apply most_spec.
   assert (A : Forall2 within (map (shifted m) (map (drive g x) (used S l))) (map (reach g) (used S l)))
     by (apply within_shifted, all_within; assumption).
-  pose proof (total_tops l _ _ n A) as T. apply Rle_trans with (1 := T). apply IZR_le.
-  eapply Z.le_trans; [apply prefix_largest|].
   assert (R0 : forall b, map (reach_in g None b) (used S l) = map (reach g) (used S l)) by (intros b; apply map_ext; intros [i|i k|i k]; reflexivity).
-  unfold most. rewrite !R0. destruct (same_ranges _ _); lia.
+  rewrite !R0. exists 0%R. exists (map (shifted m) (map (drive g x) (used S l))). exists (map (shifted m) (map (drive g x) (used S l))).
+  split; [lra|]. split; [exact A|]. split; [exact A|]. intros. ring.
 Qed.
 
 (* The code is that of the exact filter and five errors, limited. Of the first m samples, which the exact filter did not see,
@@ -222,7 +223,7 @@ Proof.
   destruct (affine g (last_ d) (held_ d) 100 b) as [[[alpha beta] gamma]|] eqn:Eaf; [|discriminate].
   destruct (exact_row sections (exact d) (least_ d * fine d) K) as [[Ex Re]|] eqn:Eex; [|discriminate].
   set (F := frac_of g b) in *. set (f := frac_of g (taken d)) in *.
-  set (both := add_rows (scale_rows (steps_of f * (2 ^ more d * alpha)) row) (place (entry d) (scale (- (2 ^ F * units_of f)) Ex))) in *.
+  set (both := join (times_row (steps_of f * (2 ^ more d * alpha)) row) (place (entry d) [([- (2 ^ F * units_of f)], Ex)])) in *.
   set (entering := place (entry d) (nth (entry d) both [])) in *. set (others := without (entry d) both) in *.
   set (beta' := match held_ d with Some _ => beta | None => 0 end) in *.
   set (from_first := if steady d then Z.abs (steps_of f * K * beta' - 2 ^ F * units_of f * sum Ex) * size g (taken d) else 0) in *.
@@ -249,15 +250,15 @@ Proof.
   destruct (rows_spec g x S forms k (length g) G C E Known (last_ d) (plan_ d) row R K1 (m + n) X11 Erow
     (fun m' _ => Known m' (last_ d) ltac:(pose proof (closed_length k g C); lia))) as [e1 [B1 H0]].
   fold u0 in H0. set (v := trace g x (last_ d) (m + n)%nat) in *.
-  set (late := (total row u0 (m + n) - total row u n)%R).
-  assert (H1 : (IZR K1 * v = total row u n + (e1 + late))%R) by (unfold late; lra).
+  set (late := (total (rows row) u0 (m + n) - total (rows row) u n)%R).
+  assert (H1 : (IZR K1 * v = total (rows row) u n + (e1 + late))%R) by (unfold late; lra).
   assert (Now : m = O -> late = 0%R) by (intros M0; unfold late; rewrite (Zero M0), M0; simpl; ring).
   assert (Bl : (Rabs late <= IZR (late_of g S W d row))%R).
   { unfold late_of. destruct (settling_ d) as [ns|] eqn:En.
     - apply andb_prop in Settles. destruct Settles as [_ Settles]. destruct m as [|m'].
       + rewrite (Now eq_refl), Rabs_R0. apply IZR_le. clear. generalize (map (reach g) (used S row)). induction row as [|l N IH]; intros [|b r]; cbn [late_sum]; try lia.
-        specialize (IH r). pose proof (norm1_pos (skipn (Datatypes.S (N.to_nat ns)) l)). assert (0 <= mag b) by (unfold mag; lia). nia.
-      + unfold late, u. rewrite (total_short row u0 (length row)), (total_short row (map _ u0) (length row)) by reflexivity.
+        specialize (IH r). pose proof (norm1_pos (skipn (Datatypes.S (N.to_nat ns)) (expanded l))). assert (0 <= mag b) by (unfold mag; lia). nia.
+      + unfold late, u. rewrite (total_short (rows row) u0 (length row)), (total_short (rows row) (map _ u0) (length row)) by (unfold rows; rewrite map_length; reflexivity).
         rewrite firstn_map. apply total_shifted; [|exact Late]. unfold u0, used. rewrite firstn_map. apply all_within; assumption.
     - destruct m as [|m']; [|contradiction]. rewrite (Now eq_refl), Rabs_R0. lra. }
   set (mm := 2 ^ more d) in *. assert (M0 : 0 < mm) by (apply Z.pow_pos_nonneg; lia).
@@ -296,20 +297,21 @@ Proof.
   assert (Hb : (IZR (code g x b (m + n)) = IZR alpha * v + IZR beta' * IZR w0 + IZR gamma)%R).
   { rewrite (affine_spec g x (last_ d) (held_ d) (m + n) G 100 b alpha beta gamma ltac:(lia) Eaf), !plus_IZR, !mult_IZR.
     unfold v, trace, beta', code_if. destruct (held_ d) as [j|]; [rewrite Held; reflexivity|ring]. }
-  assert (Hboth : (total both u n = ff * (IZR mm * IZR alpha) * total row u n - FF * uu * conv Ex (fun j => wcode j - IZR w0)%R n)%R).
-  { unfold both. rewrite total_add_rows, total_scale_rows, total_place, conv_scale, !mult_IZR, opp_IZR, ?mult_IZR.
-    rewrite (conv_ext Ex (nth (entry d) u (fun _ => 0%R)) (fun j => wcode j - IZR w0)%R) by (intros; apply Entered). fold FF. fold ff. fold uu. ring. }
-  assert (Apart : total both u n = (total others u n + total entering u n)%R).
-  { unfold others, entering. rewrite (total_without (entry d) both), total_place. ring. }
-  assert (Either : forall l, forallb (known_source g (length g)) (used S l) = true -> (Rabs (total l u n) <= IZR (either g S W l))%R).
-  { intros l Hl. assert (Most : forall l', used S l' = used S l -> (total l' u n <= IZR (most_of g S W l'))%R).
-    { intros l' Hu. destruct MW as [MZ|WN].
-      - rewrite (Zero MZ). apply (most_of_spec g x S (length g) W G Known Wh). rewrite Hu. exact Hl.
-      - unfold most_of. rewrite WN. apply most_of_shifted; [exact Known|exact G|rewrite Hu; exact Hl]. }
-    pose proof (Most l eq_refl) as U1. pose proof (Most (scale_rows (-1) l) (used_scaled S (-1) l)) as U2.
-    rewrite total_scale_rows in U2.
-    assert (M1 : (IZR (most_of g S W l) <= IZR (either g S W l))%R) by (apply IZR_le; unfold either; lia).
-    assert (M2 : (IZR (most_of g S W (scale_rows (-1) l)) <= IZR (either g S W l))%R) by (apply IZR_le; unfold either; lia).
+  assert (Hboth : (total (rows both) u n = ff * (IZR mm * IZR alpha) * total (rows row) u n - FF * uu * conv Ex (fun j => wcode j - IZR w0)%R n)%R).
+  { unfold both. rewrite total_join, total_times_row, rows_place, total_place, conv_expanded_one, !mult_IZR.
+    rewrite (conv_ext Ex _ (fun j => - (FF * uu) * (wcode j - IZR w0))%R); [rewrite conv_multiple; fold FF ff uu; ring|].
+    intros j _. cbn [conv]. rewrite Entered, opp_IZR, mult_IZR. fold FF uu. destruct j; ring. }
+  assert (Apart : total (rows both) u n = (total (rows others) u n + total (rows entering) u n)%R).
+  { unfold others, entering. rewrite rows_without, rows_place, <- rows_nth, (total_without (entry d) (rows both)), total_place. ring. }
+  assert (Either : forall l, forallb (known_source g (length g)) (used S l) = true -> (Rabs (total (rows l) u n) <= IZR (either g S W l))%R).
+  { intros l Hl.
+    assert (Most : (total (rows l) u n <= IZR (fst (most_of g S W l)))%R /\ (- total (rows l) u n <= IZR (snd (most_of g S W l)))%R).
+    { destruct MW as [MZ|WN].
+      - rewrite (Zero MZ). apply (most_of_spec g x S (length g) W G Known Wh). exact Hl.
+      - rewrite WN. apply most_of_shifted; assumption. }
+    unfold either. destruct (most_of g S W l) as [up down]. cbn [fst snd] in Most. destruct Most as [U1 U2].
+    assert (M1 : (IZR up <= IZR (Z.max up down))%R) by (apply IZR_le; lia).
+    assert (M2 : (IZR down <= IZR (Z.max up down))%R) by (apply IZR_le; lia).
     apply Rabs_le. lra. }
   set (e4 := ((ff * IZR K * IZR beta' - FF * uu * IZR (sum Ex)) * IZR w0)%R).
   assert (B4 : (Rabs e4 <= IZR from_first)%R).
@@ -319,19 +321,19 @@ Proof.
     - rewrite Rmult_0_r, Rabs_R0. lra. }
   set (s := (IZR (code g x b (m + n)) / FF)%R).
   assert (Main : (FF * ff * IZR K * (s - IZR gamma / FF - y (Z.of_nat n))
-      = total both u n + e4 + ff * (IZR mm * IZR alpha) * (e1 + late) - FF * ff * (e3 + e2))%R).
+      = total (rows both) u n + e4 + ff * (IZR mm * IZR alpha) * (e1 + late) - FF * ff * (e3 + e2))%R).
   { unfold s. rewrite Hb. unfold e4. rewrite Hboth.
     replace (FF * ff * IZR K * ((IZR alpha * v + IZR beta' * IZR w0 + IZR gamma) / FF - IZR gamma / FF - y (Z.of_nat n)))%R
       with (ff * IZR alpha * (IZR K * v) + ff * IZR K * IZR beta' * IZR w0 - FF * ff * (IZR K * y (Z.of_nat n)))%R by (field; lra).
-    assert (Hv : (IZR K * v = IZR mm * (total row u n + (e1 + late)))%R) by (rewrite <- H1; unfold K; rewrite mult_IZR; ring).
+    assert (Hv : (IZR K * v = IZR mm * (total (rows row) u n + (e1 + late)))%R) by (rewrite <- H1; unfold K; rewrite mult_IZR; ring).
     rewrite Hv, H2, H3. field. lra. }
   assert (R0 : (0 <= IZR R)%R) by (apply Rle_trans with (Rabs e1); [apply Rabs_pos|exact B1]).
   assert (Unit : IZR unit = (FF * ff * IZR K)%R) by (unfold unit; rewrite !mult_IZR; reflexivity).
   assert (unit0 : 0 < unit) by (unfold unit; apply Z.mul_pos_pos; [apply Z.mul_pos_pos; apply Z.pow_pos_nonneg; lia|exact Kp]).
   assert (Unit0 : (0 < IZR unit)%R) by (apply IZR_lt; exact unit0).
   assert (oq0 : (0 < IZR off_q)%R) by (apply IZR_lt; lia). assert (Pos : (0 < FF * ff)%R) by (apply Rmult_lt_0_compat; assumption).
-  set (ea := (- (FF * ff * e3) / IZR unit)%R). set (eb := ((total entering u n - FF * ff * e2) / IZR unit)%R).
-  set (er := ((total others u n + ff * (IZR mm * IZR alpha) * e1) / IZR unit)%R). set (es := (e4 / IZR unit)%R).
+  set (ea := (- (FF * ff * e3) / IZR unit)%R). set (eb := ((total (rows entering) u n - FF * ff * e2) / IZR unit)%R).
+  set (er := ((total (rows others) u n + ff * (IZR mm * IZR alpha) * e1) / IZR unit)%R). set (es := (e4 / IZR unit)%R).
   set (et := (ff * (IZR mm * IZR alpha) * late / IZR unit)%R).
   assert (Split : (s - IZR gamma / FF - y (Z.of_nat n) = ea + eb + er + es + et)%R).
   { apply Rmult_eq_reg_l with (IZR unit); [|lra]. rewrite Unit at 1. rewrite Main, Apart. unfold ea, eb, er, es, et. field. lra. }
@@ -340,12 +342,12 @@ Proof.
     rewrite Rabs_Ropp, Rabs_mult, (Rabs_pos_eq (FF * ff)), !mult_IZR by lra. fold FF. fold ff. apply Rmult_le_compat_l; [lra|exact B3]. }
   assert (Bb : (Rabs eb <= real (of_coefficients bud))%R).
   { apply (part_small eb _ unit _ unit0) with (2 := P2).
-    replace (IZR unit * eb)%R with (total entering u n - FF * ff * e2)%R by (unfold eb; field; lra).
+    replace (IZR unit * eb)%R with (total (rows entering) u n - FF * ff * e2)%R by (unfold eb; field; lra).
     rewrite plus_IZR, !mult_IZR. fold FF. fold ff. unfold Rminus. eapply Rle_trans; [apply Rabs_triang|]. rewrite Rabs_Ropp.
     apply Rplus_le_compat; [apply Either; exact X9|]. rewrite Rabs_mult, (Rabs_pos_eq (FF * ff)) by lra. apply Rmult_le_compat_l; [lra|exact B2]. }
   assert (Br : (Rabs er <= real (of_roundings bud))%R).
   { apply (part_small er _ unit _ unit0) with (2 := P3).
-    replace (IZR unit * er)%R with (total others u n + ff * (IZR mm * IZR alpha) * e1)%R by (unfold er; field; lra).
+    replace (IZR unit * er)%R with (total (rows others) u n + ff * (IZR mm * IZR alpha) * e1)%R by (unfold er; field; lra).
     rewrite plus_IZR, !mult_IZR, abs_IZR. fold ff. fold mm. eapply Rle_trans; [apply Rabs_triang|].
     apply Rplus_le_compat; [apply Either; exact X8|]. rewrite !Rabs_mult, (Rabs_pos_eq ff), (Rabs_pos_eq (IZR mm)) by lra.
     apply Rmult_le_compat_l; [|exact B1]. apply Rmult_le_pos; [lra|apply Rmult_le_pos; [lra|apply Rabs_pos]]. }

@@ -6,15 +6,9 @@
    a polynomial Q' with Q' D' = Q N + r' is found by division. Each residual acts on codes whose range is known from
    before: so e is known, and in the end only what enters the first section and the roundings are left. *)
 Require Import Bool ZArith Reals List Lia Lra. Import ListNotations.
-From Sosmith Require Import Definitions Streams Responses Graph Ranges Linear.
+From Sosmith Require Import Definitions Streams Responses Graph Ranges Linear Rows.
 Open Scope Z_scope.
 
-Lemma conv_comm a b u n : conv a (conv b u) n = conv b (conv a u) n.
-Proof.
-  rewrite <- !taps_conv.
-  rewrite (taps_ext a _ (taps b (from_zero u))) by (intros; apply from_zero_conv).
-  rewrite (taps_ext b _ (taps a (from_zero u))) by (intros; apply from_zero_conv). apply taps_swap.
-Qed.
 Lemma conv_divided samples k a P Q r u n : 0 <= k -> divide samples k a P = (Q, r) ->
   exists e, (forall M, 0 <= M -> (forall m, Rabs (u m) <= M) -> Rabs e <= IZR r * M)%R
     /\ conv P u n = (conv Q (conv (monic k a) u) n + e)%R.
@@ -24,22 +18,6 @@ Proof.
     apply Rmult_le_compat_r; [exact HM|apply IZR_le; exact N].
   - rewrite <- !taps_conv, (taps_ext Q _ (taps (monic k a) (from_zero u))) by (intros; apply from_zero_conv).
     rewrite H. ring.
-Qed.
-
-Definition times_each (N : list (list Z)) (Q : list Z) : list (list Z) := map (fun c => mul c Q) N.
-Lemma total_times N Q : forall u n, total (times_each N Q) u n = conv Q (total N u) n.
-Proof.
-  intros u n. rewrite conv_total. revert u. unfold times_each. induction N as [|c N IH]; intros [|x u]; cbn [map total]; try reflexivity.
-  rewrite IH, !conv_mul, conv_comm. reflexivity.
-Qed.
-
-Fixpoint without (s : nat) (row : list (list Z)) : list (list Z) :=
-  match row, s with [], _ => [] | _ :: row', O => [] :: row' | c :: row', S s' => c :: without s' row' end.
-Lemma total_without s : forall row u n,
-  total row u n = (total (without s row) u n + conv (nth s row []) (nth s u (fun _ => 0%R)) n)%R.
-Proof.
-  induction s as [|s IH]; intros [|c row] [|x u] n; cbn [without total nth conv]; rewrite ?conv_zero; try ring.
-  rewrite (IH row u n). ring.
 Qed.
 
 (* A denominator that begins with a power of two. *)
@@ -59,7 +37,7 @@ Definition size (g : graph) (i : nat) : Z := Z.max (Z.abs (low (nth i g blank)))
 
 (* Moves what acts on source s, the input of a section, to the section before. *)
 Definition eliminate (g : graph) (S : list source) (forms : list (option form)) (k known : nat)
-    (now : list (list Z) * Z) (step : nat * N) : option (list (list Z) * Z) :=
+    (now : row * Z) (step : nat * N) : option (row * Z) :=
   match nth (fst step) S (Rounding 0 0) with
   | Of i =>
       match op (nth i g blank) with
@@ -68,9 +46,9 @@ Definition eliminate (g : graph) (S : list source) (forms : list (option form)) 
           | Some f =>
               match split (under f) with
               | Some (b, den) =>
-                  let (Q, r) := divide (snd step) b den (nth (fst step) (fst now) []) in
+                  let (Q, r) := divide (snd step) b den (expanded (nth (fst step) (fst now) [])) in
                   if Nat.ltb a k && Nat.ltb i known
-                  then Some (add_rows (without (fst step) (fst now)) (times_each (over f) Q), snd now + r * size g i)
+                  then Some (join (without (fst step) (fst now)) (of_form (over f) Q), snd now + r * size g i)
                   else None
               | None => None
               end
@@ -81,7 +59,7 @@ Definition eliminate (g : graph) (S : list source) (forms : list (option form)) 
   | _ => None
   end.
 Fixpoint eliminated (g : graph) (S : list source) (forms : list (option form)) (k known : nat)
-    (now : list (list Z) * Z) (steps : list (nat * N)) : option (list (list Z) * Z) :=
+    (now : row * Z) (steps : list (nat * N)) : option (row * Z) :=
   match steps with
   | [] => Some now
   | one :: others => match eliminate g S forms k known now one with
@@ -108,34 +86,49 @@ Definition mixed (u : list sequence) (b1 b2 : list (Z * Z)) : Prop :=
   exists (lam : R) (v w : list sequence), (0 <= lam <= 1)%R /\ Forall2 within v b1 /\ Forall2 within w b2
     /\ forall N n, total N u n = ((1 - lam) * total N v n + lam * total N w n)%R.
 
-Fixpoint same_ranges (a b : list (Z * Z)) : bool :=
-  match a, b with
-  | [], [] => true
-  | p :: a', q :: b' => (fst p =? fst q) && (snd p =? snd q) && same_ranges a' b'
-  | _, _ => false
-  end.
-Lemma same_ranges_eq a : forall b, same_ranges a b = true -> a = b.
-Proof.
-  induction a as [|[p q] a IH]; intros [|[p' q'] b] H; cbn [same_ranges fst snd] in H; try discriminate; [reflexivity|].
-  apply andb_prop in H. destruct H as [H H3]. apply andb_prop in H. destruct H as [H1 H2].
-  apply Z.eqb_eq in H1. apply Z.eqb_eq in H2. rewrite H1, H2, (IH b H3). reflexivity.
-Qed.
-Definition most (row : list (list Z)) (b1 b2 : list (Z * Z)) : Z :=
-  let m := largest (all_tops row b1) in if same_ranges b1 b2 then m else Z.max m (largest (all_tops row b2)).
+(* The largest value of the row, and of its opposite. *)
+Definition most_merged (r : row) (b1 b2 : list (Z * Z)) : Z * Z :=
+  if forallb has_zero b1 && forallb has_zero b2 then
+    let s := map sums r in
+    let t := map opposite s in
+    (Z.max (dot s b1) (dot s b2), Z.max (dot t b1) (dot t b2))
+  else
+    let up := rows r in
+    let down := scale_rows (-1) up in
+    (Z.max (largest (all_tops up b1)) (largest (all_tops up b2)), Z.max (largest (all_tops down b1)) (largest (all_tops down b2))).
+Definition most (r : row) (b1 b2 : list (Z * Z)) : Z * Z :=
+  if Nat.eqb (length b1) (length b2) then let (sp, q) := merged r b1 b2 in let (s, p) := sp in most_merged s p q
+  else most_merged r b1 b2.
 
-Lemma most_spec row u b1 b2 n : mixed u b1 b2 -> (total row u n <= IZR (most row b1 b2))%R.
+Lemma mixture lam a b p q : (0 <= lam <= 1)%R -> (a <= IZR p)%R -> (b <= IZR q)%R -> ((1 - lam) * a + lam * b <= IZR (Z.max p q))%R.
+Proof.
+  intros L A B. assert (P : (IZR p <= IZR (Z.max p q))%R) by (apply IZR_le; lia). assert (Q : (IZR q <= IZR (Z.max p q))%R) by (apply IZR_le; lia).
+  apply Rle_trans with ((1 - lam) * IZR (Z.max p q) + lam * IZR (Z.max p q))%R; [|lra].
+  apply Rplus_le_compat; apply Rmult_le_compat_l; lra.
+Qed.
+Lemma total_largest r u b n : Forall2 within u b -> (total r u n <= IZR (largest (all_tops r b)))%R.
+Proof. intros H. eapply Rle_trans; [apply total_tops; exact H|]. apply IZR_le, prefix_largest. Qed.
+Lemma most_merged_spec r v w b1 b2 lam n : (0 <= lam <= 1)%R -> Forall2 within v b1 -> Forall2 within w b2 ->
+  ((1 - lam) * total (rows r) v n + lam * total (rows r) w n <= IZR (fst (most_merged r b1 b2)))%R
+  /\ ((1 - lam) * - total (rows r) v n + lam * - total (rows r) w n <= IZR (snd (most_merged r b1 b2)))%R.
+Proof.
+  intros L V W. unfold most_merged. destruct (forallb has_zero b1 && forallb has_zero b2) eqn:Z0; cbn [fst snd].
+  - apply andb_prop in Z0. destruct Z0 as [Z1 Z2]. destruct (total_dot r v b1 n Z1 V). destruct (total_dot r w b2 n Z2 W).
+    split; apply mixture; assumption.
+  - assert (N : forall u, (- total (rows r) u n = total (scale_rows (-1) (rows r)) u n)%R) by (intros u'; rewrite total_scale_rows; ring).
+    rewrite !N. split; apply mixture; try exact L; apply total_largest; assumption.
+Qed.
+Lemma most_spec r u b1 b2 n : mixed u b1 b2 ->
+  (total (rows r) u n <= IZR (fst (most r b1 b2)))%R /\ (- total (rows r) u n <= IZR (snd (most r b1 b2)))%R.
 Proof.
   intros [lam [v [w [L [V [W H]]]]]]. rewrite H.
-  pose proof (total_tops row v b1 n V) as A. pose proof (total_tops row w b2 n W) as B.
-  assert (A' : (total row v n <= IZR (largest (all_tops row b1)))%R)
-    by (eapply Rle_trans; [exact A|]; apply IZR_le, prefix_largest).
-  assert (B' : (total row w n <= IZR (largest (all_tops row b2)))%R)
-    by (eapply Rle_trans; [exact B|]; apply IZR_le, prefix_largest).
-  assert (M : largest (all_tops row b1) <= most row b1 b2 /\ largest (all_tops row b2) <= most row b1 b2).
-  { unfold most. destruct (same_ranges b1 b2) eqn:Es; [rewrite <- (same_ranges_eq _ _ Es); lia|lia]. }
-  destruct M as [M1 M2]. apply IZR_le in M1. apply IZR_le in M2.
-  apply Rle_trans with ((1 - lam) * IZR (most row b1 b2) + lam * IZR (most row b1 b2))%R; [|lra].
-  apply Rplus_le_compat; apply Rmult_le_compat_l; lra.
+  replace (- ((1 - lam) * total (rows r) v n + lam * total (rows r) w n))%R
+    with ((1 - lam) * - total (rows r) v n + lam * - total (rows r) w n)%R by ring.
+  unfold most. destruct (Nat.eqb (length b1) (length b2)) eqn:Len; [|apply most_merged_spec; assumption].
+  apply Nat.eqb_eq in Len. destruct (merged r b1 b2) as [[s p] q] eqn:E.
+  destruct (merged_spec r b1 b2 s p q Len E) as [A B]. destruct (A v V) as [v' [V' Hv]]. destruct (B w W) as [w' [W' Hw]].
+  replace (total (rows r) v n) with (total (rows s) v' n) by (rewrite Hv; ring).
+  replace (total (rows r) w n) with (total (rows s) w' n) by (rewrite Hw; ring). apply most_merged_spec; assumption.
 Qed.
 
 Lemma total_short row : forall u c n, (length row <= c)%nat -> total row u n = total row (firstn c u) n.
@@ -162,14 +155,14 @@ Lemma size_pos i : 0 <= size g i.
 Proof. unfold size. lia. Qed.
 
 Lemma eliminate_spec now step next n : eliminate g S forms k known now step = Some next ->
-  exists e, (Rabs e <= IZR (snd next - snd now))%R /\ total (fst now) u n = (total (fst next) u n + e)%R.
+  exists e, (Rabs e <= IZR (snd next - snd now))%R /\ total (rows (fst now)) u n = (total (rows (fst next)) u n + e)%R.
 Proof.
   unfold eliminate. destruct step as [s L]. cbn [fst snd].
   destruct (nth s S (Rounding 0 0)) as [i|i b|i b] eqn:Es; try discriminate.
   destruct (op (nth i g blank)) as [| | | | | | | | | | | |a|] eqn:Eo; try discriminate.
   destruct (nth a forms None) as [f|] eqn:Ef; [|discriminate].
   destruct (split (under f)) as [[b den]|] eqn:Ed; [|discriminate].
-  destruct (divide L b den (nth s (fst now) [])) as [Q r] eqn:Eq.
+  destruct (divide L b den (expanded (nth s (fst now) []))) as [Q r] eqn:Eq.
   destruct (Nat.ltb a k && Nat.ltb i known) eqn:Eb; [|discriminate].
   intros X. injection X as <-. cbn [fst snd].
   apply andb_prop in Eb. destruct Eb as [Ea Ei]. apply Nat.ltb_lt in Ea. apply Nat.ltb_lt in Ei.
@@ -183,18 +176,18 @@ Proof.
   { destruct (Nat.lt_ge_cases i (length g)) as [|O]; [assumption|]. rewrite nth_overflow in Eo by exact O. discriminate. }
   assert (T : forall m, trace g x i m = trace g x a m).
   { intros m. unfold trace. rewrite (code_spec g x G i m Gi). unfold compute. rewrite Eo. reflexivity. }
-  destruct (conv_divided L b den (nth s (fst now) []) Q r (trace g x i) n B0 Eq) as [e [Be He]].
+  destruct (conv_divided L b den (expanded (nth s (fst now) [])) Q r (trace g x i) n B0 Eq) as [e [Be He]].
   exists e. split.
   - replace (snd now + r * size g i - snd now) with (r * size g i) by lia. rewrite mult_IZR.
     apply Be; [apply IZR_le, size_pos|]. intros m. apply size_spec, Known, Ei.
-  - rewrite (total_without s (fst now)), U, He, total_add_rows, total_times.
+  - rewrite (total_without s (rows (fst now))), rows_nth, U, He, total_join, rows_without, total_of_form.
     rewrite (conv_ext Q (conv (monic b den) (trace g x i)) (total (over f) u)); [ring|].
     intros m _. rewrite <- Du. rewrite (conv_ext (under f) (trace g x i) (trace g x a)) by (intros; apply T).
     apply (forms_hold g x S forms k G C E m a Ea f Ef).
 Qed.
 
 Lemma eliminated_spec steps : forall now last n, eliminated g S forms k known now steps = Some last ->
-  exists e, (Rabs e <= IZR (snd last - snd now))%R /\ total (fst now) u n = (total (fst last) u n + e)%R.
+  exists e, (Rabs e <= IZR (snd last - snd now))%R /\ total (rows (fst now)) u n = (total (rows (fst last)) u n + e)%R.
 Proof.
   induction steps as [|one steps IH]; intros now last n; cbn [eliminated].
   - intros X. injection X as <-. exists 0%R. rewrite Rabs_R0, Z.sub_diag. split; [lra|ring].
@@ -206,13 +199,13 @@ Qed.
 
 (* The response from the sources to a node: its row, what is left of residuals, and K. *)
 Record plan := Plan { length_ : N; first : Z; steps : list (nat * N) }.
-Definition rows_of (t : nat) (p : plan) : option (list (list Z) * Z * Z) :=
+Definition rows_of (t : nat) (p : plan) : option (row * Z * Z) :=
   match nth t forms None with
   | Some f =>
       match split (under f) with
       | Some (b, den) =>
           let (Q, r) := impulse (length_ p) b den (first p) in
-          match eliminated g S forms k known (times_each (over f) Q, r * size g t) (steps p) with
+          match eliminated g S forms k known (of_form (over f) Q, r * size g t) (steps p) with
           | Some (row, R) => Some (row, R, first p * 2 ^ b)
           | None => None
           end
@@ -222,12 +215,12 @@ Definition rows_of (t : nat) (p : plan) : option (list (list Z) * Z * Z) :=
   end.
 Lemma rows_spec t p row R K n : (t < k)%nat -> rows_of t p = Some (row, R, K) ->
   (forall m, (m < n)%nat -> in_range g x t m) ->
-  exists e, (Rabs e <= IZR R)%R /\ (IZR K * trace g x t n = total row u n + e)%R.
+  exists e, (Rabs e <= IZR R)%R /\ (IZR K * trace g x t n = total (rows row) u n + e)%R.
 Proof.
   intros Ht. unfold rows_of. destruct (nth t forms None) as [f|] eqn:Ef; [|discriminate].
   destruct (split (under f)) as [[b den]|] eqn:Ed; [|discriminate].
   destruct (impulse (length_ p) b den (first p)) as [Q r] eqn:Eq.
-  destruct (eliminated g S forms k known (times_each (over f) Q, r * size g t) (steps p)) as [[row' R']|] eqn:El; [|discriminate].
+  destruct (eliminated g S forms k known (of_form (over f) Q, r * size g t) (steps p)) as [[row' R']|] eqn:El; [|discriminate].
   intros X. injection X as -> -> <-. intros Past.
   destruct (split_spec _ _ _ Ed) as [B0 Du].
   destruct (eliminated_spec _ _ _ n El) as [e [Be He]]. cbn [fst snd] in Be, He.
@@ -239,8 +232,8 @@ Proof.
       + unfold from_zero. rewrite after_before by exact N0. rewrite Rabs_R0. apply IZR_le, size_pos.
       + rewrite <- (Z2Nat.id j N0). unfold from_zero. rewrite after_at. apply size_spec, Past. lia.
     - apply Rmult_le_compat_r; [apply IZR_le, size_pos|apply IZR_le; exact Nr]. }
-  assert (F : total (times_each (over f) Q) u n = (IZR (first p * 2 ^ b)%Z * trace g x t n + e0)%R).
-  { rewrite total_times, <- taps_conv.
+  assert (F : total (rows (of_form (over f) Q)) u n = (IZR (first p * 2 ^ b)%Z * trace g x t n + e0)%R).
+  { rewrite total_of_form, <- taps_conv.
     rewrite (taps_ext Q _ (taps (monic b den) (from_zero (trace g x t)))).
     - rewrite Spec. unfold from_zero at 1. rewrite after_at. reflexivity.
     - intros j _. rewrite <- from_zero_conv. unfold from_zero, after. destruct (j <? 0); [reflexivity|].
@@ -251,10 +244,10 @@ Proof.
 Qed.
 
 (* The sources that a row uses, and their ranges. *)
-Definition used (row : list (list Z)) : list source := firstn (length row) S.
+Definition used {A} (row : list A) : list source := firstn (length row) S.
 Definition known_source (s : source) : bool :=
   match s with Of i => Ranges.known g known i | Rounding _ b | Truncation _ b => 0 <? b end.
-Definition most_of (row : list (list Z)) : Z := most row (map (reach_in g W false) (used row)) (map (reach_in g W true) (used row)).
+Definition most_of (row : row) : Z * Z := most row (map (reach_in g W false) (used row)) (map (reach_in g W true) (used row)).
 
 Lemma source_within s : known_source s = true -> within (drive g x s) (reach g s).
 Proof.
@@ -300,34 +293,31 @@ Proof.
       apply Plain. left. reflexivity. }
     split; [apply P2|]. split; [apply P2|]. intros. ring.
 Qed.
-Lemma most_of_spec row n : forallb known_source (used row) = true -> (total row u n <= IZR (most_of row))%R.
-Proof.
-  intros H. rewrite (total_short row u (length row) n (le_n _)). unfold u. rewrite firstn_map.
-  apply most_spec, mixed_sources, H.
-Qed.
+Lemma total_used r n : total (rows r) u n = total (rows r) (map (drive g x) (used r)) n.
+Proof. unfold u, used. rewrite <- firstn_map. apply total_short. unfold rows. rewrite map_length. apply le_n. Qed.
+Lemma most_of_spec r n : forallb known_source (used r) = true ->
+  (total (rows r) u n <= IZR (fst (most_of r)))%R /\ (- total (rows r) u n <= IZR (snd (most_of r)))%R.
+Proof. intros H. rewrite total_used. apply most_spec, mixed_sources, H. Qed.
 
 (* A target's codes stay in its node's range. *)
 Definition target_holds (p : plan) (t : nat) : bool :=
   match rows_of t p with
   | Some (row, R, K) =>
+      let (up, down) := most_of row in
       Nat.ltb t k && (0 <? K) && forallb known_source (used row)
-      && (most_of row + R <=? K * high (nth t g blank)) && (most_of (scale_rows (-1) row) + R <=? - (K * low (nth t g blank)))
+      && (up + R <=? K * high (nth t g blank)) && (down + R <=? - (K * low (nth t g blank)))
   | None => false
   end.
-Lemma used_scaled c row : used (scale_rows c row) = used row.
-Proof. unfold used, scale_rows. rewrite map_length. reflexivity. Qed.
-
 Theorem target_in_range p t : target_holds p t = true -> forall n, in_range g x t n.
 Proof.
-  unfold target_holds. destruct (rows_of t p) as [[[row R] K]|] eqn:Er; [|discriminate]. intros H.
+  unfold target_holds. destruct (rows_of t p) as [[[row R] K]|] eqn:Er; [|discriminate].
+  destruct (most_of row) as [up down] eqn:Em. intros H.
   apply andb_prop in H. destruct H as [H H5]. apply andb_prop in H. destruct H as [H H4].
   apply andb_prop in H. destruct H as [H H3]. apply andb_prop in H. destruct H as [H1 H2].
   apply Nat.ltb_lt in H1. apply Z.ltb_lt in H2. apply Z.leb_le in H4. apply Z.leb_le in H5.
   induction n as [n IH] using lt_wf_ind.
   destruct (rows_spec t p row R K n H1 Er IH) as [e [Be He]].
-  assert (U := most_of_spec row n H3).
-  assert (L := most_of_spec (scale_rows (-1) row) n). rewrite used_scaled in L. specialize (L H3).
-  rewrite total_scale_rows in L.
+  destruct (most_of_spec row n H3) as [U L]. rewrite Em in U, L. cbn [fst snd] in U, L.
   assert (A : (- IZR R <= e <= IZR R)%R).
   { pose proof (Rle_abs e). pose proof (Rle_abs (- e)). rewrite Rabs_Ropp in *. lra. }
   apply IZR_le in H4. apply IZR_le in H5. rewrite plus_IZR in H4, H5. rewrite opp_IZR in H5. rewrite mult_IZR in H4, H5.

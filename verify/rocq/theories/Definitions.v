@@ -128,3 +128,6 @@ Definition decimate (d : decimator) (u : nat -> Z) (n : nat) : Z :=
 Definition mean (count : nat) (u : signal) : signal := fun k => (taps (repeat 1%Z count) u k / IZR (Z.of_nat count))%R.
 Definition averaged (d : decimator) (u : nat -> R) (n : nat) : R :=
   Nat.iter (stages d) (mean (factor d)) (from_first u) (Z.of_nat (n * factor d)).
+
+(* 6. A filter of which every R-th result leaves: the first sample goes in so many times before it counts. *)
+Definition filled (count : nat) (x : nat -> nat -> Z) : nat -> nat -> Z := fun n => x (n - count)%nat.

@@ -20,7 +20,7 @@ Fixpoint exact_row (sections : list (list Z * list Z)) (parts : list part) (leas
           let far := norm1 (drift (times w) (share w) B (near_over p)) * least
                      + norm1 (drift (times w) (share w) A (near w)) * limit p in
           if (0 <? least) && (0 <=? limit p) && (0 <=? bits w) && (0 <? share w) && gain_holds A [B] (rough p) (limit p) least
-          then Some (mul (near_over p) Q, R + r * limit p + (norm1 Q * far) / share w + 1)
+          then Some (product (near_over p) Q, R + r * limit p + (norm1 Q * far) / share w + 1)
           else None
       | None => None
       end
@@ -61,15 +61,15 @@ Proof.
         apply Rplus_le_compat; [apply taps_bound; [lra|intros; apply Hx]|].
         rewrite Rabs_mult. replace (Rabs (-1)) with 1%R by (rewrite Rabs_left; lra). rewrite Rmult_1_l.
         apply taps_bound; [apply IZR_le; exact H2|intros; apply Hm]. }
-    assert (F : (taps E' m k = taps (mul (near_over p) Q) x k + f / IZR (share w) - taps rr m k)%R).
+    assert (F : (taps E' m k = taps (product (near_over p) Q) x k + f / IZR (share w) - taps rr m k)%R).
     { pose proof (Spec m k) as T.
       assert (T2 : (IZR (share w) * taps Q (taps (monic (bits w) (tail w)) m) k
-          = IZR (share w) * taps (mul (near_over p) Q) x k + f)%R).
-      { rewrite taps_mul, (taps_swap (near_over p) Q). rewrite <- !taps_multiple. unfold f. rewrite <- taps_plus. apply taps_ext.
+          = IZR (share w) * taps (product (near_over p) Q) x k + f)%R).
+      { rewrite taps_product. rewrite <- !taps_multiple. unfold f. rewrite <- taps_plus. apply taps_ext.
         intros j _. fold (near w).
         pose proof (drift_spec (times w) (share w) A (near w) m j) as D1. fold dA in D1.
         pose proof (drift_spec (times w) (share w) B (near_over p) x j) as D2. fold dB in D2. rewrite Eqm in D1. lra. }
-      assert (T3 : (IZR (share w) * taps E' m k = IZR (share w) * taps (mul (near_over p) Q) x k + f - IZR (share w) * taps rr m k)%R)
+      assert (T3 : (IZR (share w) * taps E' m k = IZR (share w) * taps (product (near_over p) Q) x k + f - IZR (share w) * taps rr m k)%R)
         by (rewrite <- T2, T; ring).
       apply Rmult_eq_reg_l with (IZR (share w)); [|lra]. rewrite T3. field. lra. }
     exists (e' + f / IZR (share w) - taps rr m k)%R. split; [|rewrite He', F; ring].

@@ -23,21 +23,21 @@ Proof.
 Qed.
 
 Fixpoint norms (N : list (list Z)) (Q : list Z) : Z :=
-  match N with [] => 0 | c :: N' => norm1 (mul c Q) + norms N' Q end.
+  match N with [] => 0 | c :: N' => norm_of_product c Q + norms N' Q end.
 Lemma norms_pos N Q : 0 <= norms N Q.
-Proof. induction N as [|c N IH]; simpl; [lia|]. pose proof (norm1_pos (mul c Q)). lia. Qed.
+Proof. induction N as [|c N IH]; cbn [norms]; [lia|]. rewrite norm_of_product_is. pose proof (norm1_pos (product c Q)). lia. Qed.
 Lemma together_norms Q (M : R) : (0 <= M)%R -> forall N u t,
   Forall (fun x : signal => forall k, (Rabs (x k) <= M)%R) u -> (Rabs (taps Q (together N u) t) <= IZR (norms N Q) * M)%R.
 Proof.
   intros HM. induction N as [|c N IH]; intros u t H.
   - rewrite taps_silent by reflexivity. rewrite Rabs_R0. simpl. lra.
-  - cbn [norms]. rewrite plus_IZR, Rmult_plus_distr_r. destruct u as [|x u].
-    + rewrite taps_silent by reflexivity. rewrite Rabs_R0. pose proof (norm1_pos (mul c Q)). pose proof (norms_pos N Q).
-      assert (0 <= IZR (norm1 (mul c Q)) * M)%R by (apply Rmult_le_pos; [apply IZR_le; lia|lra]).
+  - cbn [norms]. rewrite norm_of_product_is, plus_IZR, Rmult_plus_distr_r. destruct u as [|x u].
+    + rewrite taps_silent by reflexivity. rewrite Rabs_R0. pose proof (norm1_pos (product c Q)). pose proof (norms_pos N Q).
+      assert (0 <= IZR (norm1 (product c Q)) * M)%R by (apply Rmult_le_pos; [apply IZR_le; lia|lra]).
       assert (0 <= IZR (norms N Q) * M)%R by (apply Rmult_le_pos; [apply IZR_le; lia|lra]). lra.
     + inversion H; subst. cbn [together]. rewrite (taps_plus Q (taps c x)).
       eapply Rle_trans; [apply Rabs_triang|]. apply Rplus_le_compat; [|apply IH; assumption].
-      rewrite <- taps_mul. rewrite taps_mul, taps_swap, <- taps_mul. apply taps_bound; auto.
+      rewrite <- taps_product. apply taps_bound; auto.
 Qed.
 
 (* With how many samples of 1 / D', D' = [2^k; a1; ...], s D being nearly c D'; the first sample is `one`. *)

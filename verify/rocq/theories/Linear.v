@@ -58,7 +58,7 @@ Definition trace (g : graph) (x : nat -> nat -> Z) (i : nat) : sequence := fun n
 Fixpoint add_rows (A B : list (list Z)) : list (list Z) :=
   match A, B with [], _ => B | _, [] => A | a :: A', b :: B' => add a b :: add_rows A' B' end.
 Definition scale_rows (c : Z) (A : list (list Z)) := map (scale c) A.
-Fixpoint place (s : nat) (l : list Z) : list (list Z) := match s with O => [l] | S s' => [] :: place s' l end.
+Fixpoint place {A} (s : nat) (l : list A) : list (list A) := match s with O => [l] | S s' => [] :: place s' l end.
 Definition delayed (k : nat) (l : list Z) : list Z := repeat 0 k ++ l.
 Fixpoint same (a b : list Z) : bool :=
   match a, b with

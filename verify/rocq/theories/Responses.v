@@ -73,6 +73,52 @@ Proof.
   unfold from_zero, after. destruct (j <? 0); ring.
 Qed.
 
+(* Many products with one coefficient: from a table of its multiples, six bits of the other factor at a time. *)
+Inductive multiples := Multiple (v : Z) | Branch (last : Z) (even odd : multiples).
+Fixpoint multiples_of (k : nat) (v step : Z) : multiples :=
+  match k with O => Multiple v | S k' => Branch (v + step) (multiples_of k' v (2 * step)) (multiples_of k' (v + step) (2 * step)) end.
+Definition table (c : Z) : multiples := multiples_of 6 0 c.
+Definition times_64 (z : Z) : Z :=
+  match z with Z0 => 0 | Zpos p => Zpos p~0~0~0~0~0~0 | Zneg p => Zneg p~0~0~0~0~0~0 end.
+Fixpoint look_up (whole t : multiples) (p : positive) : Z :=
+  match t with
+  | Multiple _ => 0
+  | Branch last even odd =>
+      match p with
+      | xH => last
+      | xO q => match even with Multiple v => v + times_64 (look_up whole whole q) | _ => look_up whole even q end
+      | xI q => match odd with Multiple v => v + times_64 (look_up whole whole q) | _ => look_up whole odd q end
+      end
+  end.
+Definition times_by (t : multiples) (y : Z) : Z :=
+  match y with Z0 => 0 | Zpos p => look_up t t p | Zneg p => - look_up t t p end.
+
+Lemma times_64_spec z : times_64 z = 64 * z.
+Proof. destruct z; reflexivity. Qed.
+Lemma look_up_spec c : forall p k v step, (k < 6)%nat -> step * 2 ^ Z.of_nat k = 32 * c ->
+  look_up (table c) (multiples_of (S k) v step) p = v + step * Zpos p.
+Proof.
+  assert (Even : forall (k : nat) step, step * 2 ^ Z.of_nat (S k) = 32 * c -> 2 * step * 2 ^ Z.of_nat k = 32 * c)
+    by (intros k step H; rewrite <- H, Nat2Z.inj_succ, Z.pow_succ_r by lia; ring).
+  assert (Whole : 1 * c * 2 ^ Z.of_nat 5 = 32 * c) by (change (2 ^ Z.of_nat 5) with 32; ring).
+  induction p as [q IH|q IH|]; intros k v step K H.
+  - destruct k as [|k]; cbn [multiples_of look_up].
+    + fold (table c). unfold table at 2. rewrite (IH 5%nat 0 c) by (try lia; rewrite <- Whole; ring). rewrite times_64_spec.
+      change (2 ^ Z.of_nat 0) with 1 in H. rewrite (Pos2Z.inj_xI q). nia.
+    + specialize (IH k (v + step) (2 * step) ltac:(lia) (Even k step H)). cbn [multiples_of] in IH. rewrite IH, (Pos2Z.inj_xI q). ring.
+  - destruct k as [|k]; cbn [multiples_of look_up].
+    + fold (table c). unfold table at 2. rewrite (IH 5%nat 0 c) by (try lia; rewrite <- Whole; ring). rewrite times_64_spec.
+      change (2 ^ Z.of_nat 0) with 1 in H. rewrite (Pos2Z.inj_xO q). nia.
+    + specialize (IH k v (2 * step) ltac:(lia) (Even k step H)). cbn [multiples_of] in IH. rewrite IH, (Pos2Z.inj_xO q). ring.
+  - cbn [multiples_of look_up]. ring.
+Qed.
+Lemma times_by_spec c y : times_by (table c) y = c * y.
+Proof.
+  assert (P : forall p, look_up (table c) (table c) p = c * Zpos p).
+  { intros p. unfold table at 2. rewrite (look_up_spec c p 5 0 c); [ring|lia|]. change (2 ^ Z.of_nat 5) with 32. ring. }
+  destruct y as [|p|p]; cbn [times_by]; [ring|apply P|]. rewrite P, <- Pos2Z.opp_pos. ring.
+Qed.
+
 (* What the samples so far, the last one first, still owe to the coming ones. *)
 Fixpoint weighted (a past : list Z) : Z :=
   match a, past with x :: a', y :: past' => x * y + weighted a' past' | _, _ => 0 end.
@@ -84,6 +130,21 @@ Fixpoint response (samples : nat) (k : Z) (a past P : list Z) : list Z * Z :=
       let y := Z.shiftr (hd 0 P - weighted a past) k in
       let (Q, r) := response m k a (y :: past) (tl P) in (y :: Q, r + 2 ^ k)
   end.
+
+Fixpoint weighted_by (t : list multiples) (past : list Z) : Z :=
+  match t, past with x :: t', y :: past' => times_by x y + weighted_by t' past' | _, _ => 0 end.
+Lemma weighted_by_spec a : forall past, weighted_by (map table a) past = weighted a past.
+Proof. induction a as [|x a IH]; intros [|y past]; cbn [map weighted_by weighted]; try reflexivity. rewrite times_by_spec, IH. reflexivity. Qed.
+(* `response` with tables of a. *)
+Fixpoint response_by (t : list multiples) (samples : nat) (k : Z) (a past P : list Z) : list Z * Z :=
+  match samples with
+  | O => ([], norm1 (add (owed a past) (scale (-1) P)))
+  | S m =>
+      let y := Z.shiftr (hd 0 P - weighted_by t past) k in
+      let (Q, r) := response_by t m k a (y :: past) (tl P) in (y :: Q, r + 2 ^ k)
+  end.
+Lemma response_by_spec k a : forall samples past P, response_by (map table a) samples k a past P = response samples k a past P.
+Proof. induction samples as [|m IH]; intros past P; cbn [response_by response]; [reflexivity|]. rewrite weighted_by_spec, IH. reflexivity. Qed.
 
 Definition monic (k : Z) (a : list Z) : list Z := 2 ^ k :: a.
 Lemma owed_next a : forall y past u k, taps (owed a (y :: past)) u k = (IZR y * taps a u k + taps (owed (tl a) past) u k)%R.
@@ -122,14 +183,14 @@ Proof.
 Qed.
 
 (* P / D', and one / D' from `one` on, of which the first residual is 0. *)
-Definition divide (samples : N) (k : Z) (a P : list Z) : list Z * Z := response (N.to_nat samples) k a [] P.
+Definition divide (samples : N) (k : Z) (a P : list Z) : list Z * Z := response_by (map table a) (N.to_nat samples) k a [] P.
 Definition impulse (samples : N) (k : Z) (a : list Z) (one : Z) : list Z * Z :=
-  let (Q, r) := response (N.to_nat samples) k a [one] [] in (one :: Q, r).
+  let (Q, r) := response_by (map table a) (N.to_nat samples) k a [one] [] in (one :: Q, r).
 
 Lemma divide_spec samples k a P Q r : 0 <= k -> divide samples k a P = (Q, r) ->
   exists rr, norm1 rr <= r /\ forall u t, (taps Q (taps (monic k a) u) t = taps P u t + taps rr u t)%R.
 Proof.
-  intros K E. destruct (response_spec k a K _ _ _ _ _ E) as [rr [N H]]. exists rr. split; [exact N|]. intros u t. rewrite H.
+  unfold divide. rewrite response_by_spec. intros K E. destruct (response_spec k a K _ _ _ _ _ E) as [rr [N H]]. exists rr. split; [exact N|]. intros u t. rewrite H.
   assert (Z0 : taps (owed a []) u t = 0%R).
   { generalize t. clear. induction a as [|x a IH]; intros t; cbn [owed taps]; [reflexivity|].
     rewrite IH. destruct a; simpl; ring. }
@@ -139,12 +200,61 @@ Lemma impulse_spec samples k a one Q r : 0 <= k -> impulse samples k a one = (Q,
   exists rr, norm1 rr <= r /\ forall u t,
     (taps Q (taps (monic k a) u) t = IZR (one * 2 ^ k)%Z * u t + taps rr u (t - 1))%R.
 Proof.
-  intros K. unfold impulse. destruct (response (N.to_nat samples) k a [one] []) as [Q' r'] eqn:E'. intros E.
+  intros K. unfold impulse. rewrite response_by_spec. destruct (response (N.to_nat samples) k a [one] []) as [Q' r'] eqn:E'. intros E.
   injection E as <- <-. destruct (response_spec k a K _ _ _ _ _ E') as [rr [N H]]. exists rr. split; [exact N|].
   intros u t. cbn [taps]. rewrite H, owed_next. unfold monic. cbn [taps].
   assert (Z0 : forall b t', taps (owed b []) u t' = 0%R).
   { induction b as [|x b IH]; intros t'; cbn [owed taps]; [reflexivity|]. rewrite IH. destruct b; simpl; ring. }
   rewrite Z0, mult_IZR. ring.
+Qed.
+
+(* A product c Q, coefficient by coefficient and with no list in between: lists of long integers are what takes time. Sums
+   of its coefficients are then found without the product. `past` are the coefficients of Q so far, the last one first. *)
+Fixpoint products (t : list multiples) (c past Q : list Z) : list Z :=
+  match Q with [] => owed (tl c) past | q :: Q' => weighted_by t (q :: past) :: products t c (q :: past) Q' end.
+Definition product (c Q : list Z) : list Z := products (map table c) c [] Q.
+Fixpoint norm_of_products (t : list multiples) (c past Q : list Z) : Z :=
+  match Q with
+  | [] => norm1 (owed (tl c) past)
+  | q :: Q' => Z.abs (weighted_by t (q :: past)) + norm_of_products t c (q :: past) Q'
+  end.
+Definition norm_of_product (c Q : list Z) : Z := norm_of_products (map table c) c [] Q.
+Fixpoint signs_of_products (t : list multiples) (c past Q : list Z) (p n : Z) : Z * Z :=
+  match Q with
+  | [] => by_sign (owed (tl c) past) p n
+  | q :: Q' =>
+      let v := weighted_by t (q :: past) in
+      if 0 <=? v then signs_of_products t c (q :: past) Q' (p + v) n else signs_of_products t c (q :: past) Q' p (n + v)
+  end.
+Definition signs_of_product (c Q : list Z) : Z * Z := signs_of_products (map table c) c [] Q 0 0.
+
+Lemma owed_now a past u k : taps (owed a past) u k = (IZR (weighted a past) * u k + taps (owed (tl a) past) u (k - 1))%R.
+Proof. destruct a as [|x a]; [simpl; ring|reflexivity]. Qed.
+Lemma owed_nothing a u : forall k, taps (owed a []) u k = 0%R.
+Proof. induction a as [|x a IH]; intros k; cbn [owed taps]; [reflexivity|]. rewrite IH. destruct a; simpl; ring. Qed.
+Lemma taps_products c : forall Q past u k, taps (products (map table c) c past Q) u k = (taps (owed (tl c) past) u k + taps Q (taps c u) k)%R.
+Proof.
+  induction Q as [|q Q IH]; intros past u k; cbn [products taps]; [ring|].
+  rewrite weighted_by_spec, IH, owed_next, (taps_first c), (owed_now (tl c)).
+  assert (W : (IZR (weighted c (q :: past)) = IZR (hd 0%Z c) * IZR q + IZR (weighted (tl c) past))%R).
+  { destruct c as [|x c]; [simpl; ring|]. cbn [weighted hd tl]. rewrite plus_IZR, mult_IZR. ring. }
+  rewrite W. ring.
+Qed.
+Lemma taps_product c Q u k : taps (product c Q) u k = taps Q (taps c u) k.
+Proof. unfold product. rewrite taps_products, owed_nothing. ring. Qed.
+Lemma conv_product c Q u n : conv (product c Q) u n = conv Q (conv c u) n.
+Proof.
+  rewrite <- !taps_conv, taps_product. apply taps_ext. intros j _. symmetry. apply from_zero_conv.
+Qed.
+Lemma norm_of_product_is c Q : norm_of_product c Q = norm1 (product c Q).
+Proof.
+  unfold norm_of_product, product. generalize (@nil Z). induction Q as [|q Q IH]; intros past; cbn [norm_of_products products norm1]; [reflexivity|].
+  rewrite IH. reflexivity.
+Qed.
+Lemma signs_of_product_is c Q : signs_of_product c Q = by_sign (product c Q) 0 0.
+Proof.
+  unfold signs_of_product, product. generalize (@nil Z). generalize 0 at 1 3. generalize 0.
+  induction Q as [|q Q IH]; intros n p past; cbn [signs_of_products products by_sign]; [reflexivity|]. rewrite !IH. reflexivity.
 Qed.
 
 (* A recursion whose coefficients are replaced by others that are nearly in proportion: s D = c D' + .., s B = c B' + .. *)

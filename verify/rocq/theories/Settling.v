@@ -1,7 +1,7 @@
 (* A filter that starts from zero: the counter that flags its first samples, and how little of any other past is left behind
    them. What came before a sample acts on later codes by the tails of the responses alone. *)
 Require Import Bool ZArith Reals List Lia Lra. Import ListNotations.
-From Sosmith Require Import Definitions Streams Graph Ranges.
+From Sosmith Require Import Definitions Streams Responses Graph Ranges Linear Rows.
 Open Scope Z_scope.
 
 (* The nodes of the counter, by their places: counted is next one sample later, and
@@ -83,23 +83,23 @@ Proof.
   - apply IH. lia.
 Qed.
 Definition mag (b : Z * Z) : Z := Z.max (Z.abs (fst b)) (Z.abs (snd b)).
-Fixpoint late_sum (n : nat) (N : list (list Z)) (b : list (Z * Z)) : Z :=
-  match N, b with c :: N', x :: b' => norm1 (skipn n c) * mag x + late_sum n N' b' | _, _ => 0 end.
+Fixpoint late_sum (n : nat) (r : row) (b : list (Z * Z)) : Z :=
+  match r, b with l :: r', x :: b' => norm1 (skipn n (expanded l)) * mag x + late_sum n r' b' | _, _ => 0 end.
 Lemma within_mag u b : within u b -> forall n, (Rabs (u n) <= IZR (mag b))%R.
 Proof.
   intros H n. destruct (H n) as [L T]. unfold mag. apply Rabs_le. split.
   - apply Rle_trans with (2 := L). rewrite <- opp_IZR. apply IZR_le. lia.
   - apply Rle_trans with (1 := T). apply IZR_le. lia.
 Qed.
-Theorem total_shifted k : forall N u b m n, Forall2 within u b -> (k <= n)%nat ->
-  (Rabs (total N u (S m + n) - total N (map (shifted (S m)) u) n) <= IZR (late_sum (S k) N b))%R.
+Theorem total_shifted k : forall r u b m n, Forall2 within u b -> (k <= n)%nat ->
+  (Rabs (total (rows r) u (S m + n) - total (rows r) (map (shifted (S m)) u) n) <= IZR (late_sum (S k) r b))%R.
 Proof.
-  induction N as [|c N IH]; intros u b m n H K; [simpl; rewrite Rminus_0_r, Rabs_R0; lra|].
+  induction r as [|l r IH]; intros u b m n H K; [simpl; rewrite Rminus_0_r, Rabs_R0; lra|].
   destruct H as [|x y u b Hx H]; [simpl; rewrite Rminus_0_r, Rabs_R0; lra|].
-  cbn [total map late_sum]. rewrite conv_shifted, plus_IZR.
-  replace (conv c (shifted (S m) x) n + conv (skipn (S n) c) x m + total N u (S m + n)
-    - (conv c (shifted (S m) x) n + total N (map (shifted (S m)) u) n))%R
-    with (conv (skipn (S n) c) x m + (total N u (S m + n) - total N (map (shifted (S m)) u) n))%R by ring.
+  cbn [rows total map late_sum]. fold (rows r). set (c := expanded l). rewrite conv_shifted, plus_IZR.
+  replace (conv c (shifted (S m) x) n + conv (skipn (S n) c) x m + total (rows r) u (S m + n)
+    - (conv c (shifted (S m) x) n + total (rows r) (map (shifted (S m)) u) n))%R
+    with (conv (skipn (S n) c) x m + (total (rows r) u (S m + n) - total (rows r) (map (shifted (S m)) u) n))%R by ring.
   eapply Rle_trans; [apply Rabs_triang|]. apply Rplus_le_compat; [|apply IH; assumption].
   assert (M0 : 0 <= mag y) by (unfold mag; lia).
   apply Rle_trans with (IZR (norm1 (skipn (S n) c)) * IZR (mag y))%R.

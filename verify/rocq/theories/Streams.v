@@ -119,3 +119,43 @@ Proof.
   destruct H as [|x y u b Hx H]; simpl; [lra|].
   rewrite prefix_add, plus_IZR. apply Rplus_le_compat; [apply conv_tops, Hx|apply IH, H].
 Qed.
+
+(* The same at less cost where ranges contain 0: then the sum over all samples is the largest, and the coefficients of each
+   sign can be summed before they are multiplied. *)
+Fixpoint by_sign (l : list Z) (p n : Z) : Z * Z :=
+  match l with [] => (p, n) | c :: l' => if (0 <=? c)%Z then by_sign l' (p + c)%Z n else by_sign l' p (n + c)%Z end.
+Definition has_zero (b : Z * Z) : bool := ((fst b <=? 0) && (0 <=? snd b))%Z%bool.
+
+Lemma conv_by_sign l : forall u b p n m, has_zero b = true -> within u b ->
+  conv l u m + IZR (p * snd b + n * fst b) <= IZR (fst (by_sign l p n) * snd b + snd (by_sign l p n) * fst b).
+Proof.
+  induction l as [|c l IH]; intros u b p n m Z0 H; cbn [conv by_sign fst snd]; [lra|].
+  unfold has_zero in Z0. pose proof Z0 as Z1. apply Bool.andb_true_iff in Z1. rewrite !Z.leb_le in Z1. destruct Z1 as [L U].
+  pose proof (product_top c b (u m) (H m)) as T.
+  assert (Rest : forall p' n', match m with O => 0 | S m' => conv l u m' end + IZR (p' * snd b + n' * fst b)
+    <= IZR (fst (by_sign l p' n') * snd b + snd (by_sign l p' n') * fst b)).
+  { intros p' n'. destruct m as [|m']; [|apply IH; assumption].
+    specialize (IH (fun _ => 0) b p' n' O Z0). rewrite conv_zero in IH. apply IH.
+    intros k. split; [apply IZR_le|apply IZR_le]; assumption. }
+  destruct (Z.leb_spec 0 c) as [P|P]; eapply Rle_trans; try apply Rest.
+  - assert (IZR (Z.max (c * fst b) (c * snd b)) <= IZR (c * snd b)) by (apply IZR_le; nia).
+    replace ((p + c) * snd b + n * fst b)%Z with (c * snd b + (p * snd b + n * fst b))%Z by ring. rewrite (plus_IZR (c * snd b)). lra.
+  - assert (IZR (Z.max (c * fst b) (c * snd b)) <= IZR (c * fst b)) by (apply IZR_le; nia).
+    replace (p * snd b + (n + c) * fst b)%Z with (c * fst b + (p * snd b + n * fst b))%Z by ring. rewrite (plus_IZR (c * fst b)). lra.
+Qed.
+Lemma conv_signs l u b m : has_zero b = true -> within u b -> conv l u m <= IZR (fst (by_sign l 0 0) * snd b + snd (by_sign l 0 0) * fst b).
+Proof.
+  intros Z0 H. pose proof (conv_by_sign l u b 0 0 m Z0 H) as C. replace (0 * snd b + 0 * fst b)%Z with 0%Z in C by ring. lra.
+Qed.
+Lemma conv_signs_opposite l u b m : has_zero b = true -> within u b ->
+  - conv l u m <= IZR (- snd (by_sign l 0 0) * snd b + - fst (by_sign l 0 0) * fst b).
+Proof.
+  intros Z0 H. pose proof (conv_signs l (fun k => -1 * u k) (- snd b, - fst b)%Z m) as C. rewrite conv_multiple in C. cbn [fst snd] in C.
+  replace (- snd (by_sign l 0 0) * snd b + - fst (by_sign l 0 0) * fst b)%Z
+    with (fst (by_sign l 0 0) * - fst b + snd (by_sign l 0 0) * - snd b)%Z by ring.
+  assert (Z1 : has_zero (- snd b, - fst b)%Z = true)
+    by (unfold has_zero in *; cbn [fst snd]; apply Bool.andb_true_iff in Z0; rewrite !Z.leb_le in Z0; apply Bool.andb_true_iff; rewrite !Z.leb_le; lia).
+  assert (W : within (fun k => -1 * u k) (- snd b, - fst b)%Z)
+    by (intros k; cbn [fst snd]; rewrite !opp_IZR; specialize (H k); lra).
+  specialize (C Z1 W). lra.
+Qed.
