@@ -15,7 +15,7 @@ from sosmith.gen.specification.choices import CALIBRATION_INPUTS, FIR, FIR_FAMIL
 from sosmith.gen.specification.converters import ConverterSpec, converters, dac
 from sosmith.gen.specification.toml_text import toml_text
 from sosmith.gen.specification.uncertainty import CoefficientsSpec, UncertaintySpec
-from sosmith.gen.specification.values import UnfitError
+from sosmith.gen.specification.values import UnfitError, literal
 from sosmith.gen.specification.wear_limits import WearSpec
 from sosmith.model.converters.dac_writing import Writing
 from sosmith.model.errors import SpecificationError
@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 
 MAX_BYTES = 1 << 16
 """Maximum size of a specification in bytes; typical ones have one or two thousand."""
+
+STAGE = "stage"
+"""Key of the stages of a chain, whose specification is of another shape: `sosmith.gen.chain.specification`."""
 
 SECTIONS = "sections"
 """Default family, kind and method of a filter that is given by its sections."""
@@ -250,6 +253,13 @@ def from_tree(tree: dict[str, Any], path: Path) -> Specification:
     from sosmith.gen.specification.schema import parse
 
     try:
+        if STAGE in tree:
+            raise UnfitError(
+                "left out here, as a chain is for design, generate, simulate and verify alone",
+                literal(tree[STAGE]),
+                where=STAGE,
+                later=True,
+            )
         document = parse(tree)
         check(document)
         return _specification(path, tree, document)
@@ -273,7 +283,7 @@ def _specification(path: Path, tree: dict[str, Any], document: Document) -> Spec
     )
     return Specification(
         path=path,
-        source={key: _to_json(value) for key, value in tree.items()},
+        source={key: to_json(value) for key, value in tree.items()},
         text=toml_text(tree),
         name=document.name,
         sample_rate=document.sample_rate,
@@ -305,13 +315,13 @@ def _specification(path: Path, tree: dict[str, Any], document: Document) -> Spec
     )
 
 
-def _to_json(value: Any) -> Any:
-    """Return `value` in the types of JSON."""
+def to_json(value: Any) -> Any:
+    """Return a value of a specification in the types of JSON."""
     match value:
         case dict():
-            return {key: _to_json(item) for key, item in value.items()}
+            return {key: to_json(item) for key, item in value.items()}
         case list():
-            return [_to_json(item) for item in value]
+            return [to_json(item) for item in value]
         case Decimal():
             return float(value)
         case _:
