@@ -12,6 +12,9 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 
+import numpy as np
+import numpy.typing as npt
+
 from sosmith.gen.chain.response import Part, cic, factor_of, folding_gain, gain_into_passband, peak_gain
 from sosmith.gen.chain.specification import ChainSpec, StageSpec
 from sosmith.gen.core import CoreDesign, design_core, polynomial_of, response_of
@@ -136,9 +139,13 @@ class ChainDesign:
         -------
         int64 array, shape (results, channels)
         """
+        return self.compute_with_status(codes)[0]
+
+    def compute_with_status(self, codes: Codes) -> tuple[Codes, npt.NDArray[np.uint8]]:
+        """Compute the output codes and the flags of the last stage, both of the shape (results, channels)."""
         for stage in self.stages[:-1]:
             codes = stage.design.datapath.compute(codes)[:, :, None]
-        return self.stages[-1].design.datapath.compute(codes)
+        return self.stages[-1].design.datapath.compute_with_status(codes)
 
 
 def design_chain(

@@ -15,14 +15,12 @@ from typing import Any
 
 from sosmith.gen.specification.choices import AUTO, FIR_FAMILIES, MAX_TAPS
 from sosmith.gen.specification.combinations import check_chain
-from sosmith.gen.specification.specification import MAX_BYTES, STAGE, Specification, from_tree, to_json
+from sosmith.gen.specification.specification import STAGE, Specification, from_tree, parsed, text_of, to_json
 from sosmith.gen.specification.toml_text import toml_text
 from sosmith.gen.specification.values import UnfitError, choice, identifier, literal, number, together, whole
 from sosmith.model.errors import SpecificationError
-from sosmith.model.foreign_files import read_text
 from sosmith.model.port import Port
 from sosmith.model.suggestion import did_you_mean
-from sosmith.model.tables.toml_file import parse_toml
 
 MAX_STAGES = 8
 """Most stages of a chain."""
@@ -167,8 +165,8 @@ def load_chain(path: Path) -> ChainSpec:
     SpecificationError
         If it is none, or breaks a rule.
     """
-    text = read_text(path, what="the specification", max_bytes=MAX_BYTES)
-    return chain_from_tree(parse_toml(text, str(path), what="the specification", parse_float=Decimal), path, text)
+    text = text_of(path)
+    return chain_from_tree(parsed(text, path), path, text)
 
 
 def chain_from_tree(tree: Mapping[str, Any], path: Path, text: str | None = None) -> ChainSpec:

@@ -222,15 +222,37 @@ def load(path: Path) -> Specification:
         For all errors, in a sentence each: the file, the path of the key or the line, what was expected and what
         was found. Rules about several keys are checked once each key is right, and one of a subject is reported.
     """
-    return from_text(read_text(path, what="the specification", max_bytes=MAX_BYTES), path)
+    return from_text(text_of(path), path)
 
 
 def from_text(text: str, path: Path) -> Specification:
     """Check the specification with the TOML `text`; path and errors as for `from_tree`."""
+    return replace(from_tree(parsed(text, path), path), text=text)
+
+
+def parsed(text: str, path: Path) -> dict[str, Any]:
+    """Return the tree of the TOML `text`, with every float as `decimal.Decimal`.
+
+    Raises
+    ------
+    SpecificationError
+        If it is not TOML, or empty.
+    """
     tree = parse_toml(text, str(path), what="the specification", parse_float=Decimal)
     if not tree:
         raise SpecificationError(f"{path}: the specification must have keys, not be empty")
-    return replace(from_tree(tree, path), text=text)
+    return tree
+
+
+def text_of(path: Path) -> str:
+    """Return the text of a specification file.
+
+    Raises
+    ------
+    SpecificationError
+        If it cannot be read.
+    """
+    return read_text(path, what="the specification", max_bytes=MAX_BYTES)
 
 
 def from_tree(tree: dict[str, Any], path: Path) -> Specification:

@@ -1,0 +1,1 @@
+"""Designs of chains, and their uses: compute, generate, prove, simulate."""
