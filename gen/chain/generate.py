@@ -66,6 +66,7 @@ def chain_manifest(design: ChainDesign) -> dict[str, Any]:
         "core": "chain",
         "sosmith_version": __version__,
         "spec": design.spec.source,
+        "channels": design.spec.base.channels,
         "streams": {"s_axis": stream_entry(interface.inputs), "m_axis": stream_entry(interface.outputs)},
         "stages": [
             {
