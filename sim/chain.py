@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +12,10 @@ import numpy.typing as npt
 from sosmith.gen.chain.design import ChainDesign
 from sosmith.gen.chain.generate import generate_chain
 from sosmith.gen.chain.golden import golden_chain
+from sosmith.gen.chain.run import ChainRun
 from sosmith.gen.chain.top import chain_interface
 from sosmith.gen.output.vectors import whole_beats
-from sosmith.model.arrays import Codes, Values
+from sosmith.model.arrays import Codes
 from sosmith.model.text_files import write_files
 from sosmith.sim.cosimulate import cosimulate
 from sosmith.sim.simulation import alone_in
@@ -23,45 +23,6 @@ from sosmith.sim.simulator_bench import SimulatorBench
 from sosmith.sim.simulators import check_name
 
 Progress = Callable[[str, int, int], None]
-
-
-@dataclass(frozen=True, kw_only=True)
-class ChainRun:
-    """The results of one run of a chain.
-
-    Attributes
-    ----------
-    codes : int64 array, shape (samples, channels, inputs)
-        What went in.
-    received, expected : int64 array, shape (results, channels)
-        What came out, and what the integer models give.
-    mismatches : int
-        Results of which a code or a flag differs.
-    golden : float array, shape (results, channels)
-        The exact results in double precision, in the unit of the output.
-    cycles : int
-        Clocks from the end of reset to the last result.
-    simulator : str
-        Its name.
-    tools : dict of str to str
-        Versions by name.
-    seed : int
-        Of the handshakes.
-    cycles_per_second, wall_seconds : float
-        Speed, and how long all of it took.
-    """
-
-    codes: Codes
-    received: Codes
-    expected: Codes
-    mismatches: int
-    golden: Values
-    cycles: int
-    simulator: str
-    tools: dict[str, str]
-    seed: int
-    cycles_per_second: float
-    wall_seconds: float
 
 
 def simulate_chain(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from sosmith.gen.chain.design import ChainDesign, StageDesign
 from sosmith.model.arithmetic.recursive_filters import dc_gain, sosfilt
@@ -46,3 +47,27 @@ def _filtered(stage: StageDesign, values: Values) -> Values:
     results = sosfilt(sos, values - values[0], np.zeros((len(sos), sos.shape[1] // 2 - 1)))
     results = results + dc_gain(sos) * values[0]
     return results if decimator is not None else results[:: datapath.samples_per_result]
+
+
+def stage_gain(stage: StageDesign, frequency: Values) -> Values:
+    """Magnitude of a stage's gain for sines at the chain's input, in Hz: they reach it folded by the stages before."""
+    return np.abs(_complex(stage, frequency / float(stage.spec.rate)))
+
+
+def chain_gain(design: ChainDesign, frequency: Values) -> npt.NDArray[np.complex128]:
+    """Complex gain from sines at the input, in Hz, to what comes out of them, without any rounding."""
+    total = np.ones(frequency.shape, dtype=np.complex128)
+    for stage in design.stages:
+        total = total * _complex(stage, frequency / float(stage.spec.rate))
+    return total
+
+
+def _complex(stage: StageDesign, turns: Values) -> npt.NDArray[np.complex128]:
+    total, step = np.ones(turns.shape, dtype=np.complex128), 1
+    for part in stage.parts:
+        u = np.exp(-2j * np.pi * turns * step)
+        for numerator, denominator in part.sections:
+            over, under = (np.polynomial.polynomial.polyval(u, [float(c) for c in taps]) for taps in (numerator, denominator))
+            total = total * over / under
+        step *= part.factor
+    return total
