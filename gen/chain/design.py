@@ -148,9 +148,7 @@ class ChainDesign:
         return self.stages[-1].design.datapath.compute_with_status(codes)
 
 
-def design_chain(
-    spec: ChainSpec, *, board: Board | None = None, progress: Progress = lambda step: None
-) -> ChainDesign:
+def design_chain(spec: ChainSpec, *, board: Board | None = None, progress: Progress = lambda step: None) -> ChainDesign:
     """Design the stages of a chain, so that the whole keeps to the error that is allowed.
 
     Raises
@@ -279,9 +277,15 @@ class _Budget:
         steps[k] *= 2
         errors = [stage.bound for stage in chain.stages]
         errors[k] = _rounded(steps[k])
-        if sum((error * stage.gain for error, stage in zip(errors[:-1], chain.stages, strict=False)), Fraction(0)) >= room:
+        if (
+            sum((error * stage.gain for error, stage in zip(errors[:-1], chain.stages, strict=False)), Fraction(0))
+            >= room
+        ):
             return None
-        errors[:-1] = [max(_rounded_up(error), _rounded_up(step * Fraction(9, 16))) for error, step in zip(errors[:-1], steps, strict=False)]
+        errors[:-1] = [
+            max(_rounded_up(error), _rounded_up(step * Fraction(9, 16)))
+            for error, step in zip(errors[:-1], steps, strict=False)
+        ]
         try:
             return self._chain(_Shares(tuple(errors), tuple(steps)), [stage.parts for stage in chain.stages])
         except ShortfallError:
@@ -302,9 +306,7 @@ def _parts_of(design: CoreDesign) -> tuple[Part, ...]:
 def polynomial_reach(polynomial: Polynomial, inputs: Sequence[Port]) -> Fraction:
     """Bound the magnitude of a polynomial of all inputs in range, term by term."""
     v, t = (max(map(abs, _limits(port))) for port in inputs)
-    terms = (
-        abs(a) * v**i * t**j for i, row in enumerate(polynomial.coefficients) for j, a in enumerate(row)
-    )
+    terms = (abs(a) * v**i * t**j for i, row in enumerate(polynomial.coefficients) for j, a in enumerate(row))
     return sum(terms, Fraction(0))
 
 

@@ -39,14 +39,29 @@ def _stages(design: ChainDesign) -> Table:
                 plain_number(float(stage.gain)),
             )
         )
-    head = ("stage", "kind", "rate", "decimates by", "hardware", "multiplier blocks", "clocks a sample", "output", "error at most", "gain to the end")
+    head = (
+        "stage",
+        "kind",
+        "rate",
+        "decimates by",
+        "hardware",
+        "multiplier blocks",
+        "clocks a sample",
+        "output",
+        "error at most",
+        "gain to the end",
+    )
     return Table(f"Chain {design.name}", rows, head, numbers=(3, 5, 6))
 
 
 def _folding(design: ChainDesign, folding: Peak) -> Table:
     rate = design.spec.base.sample_rate
     rows = [
-        Fact("Samples for each result", str(design.factor), sentence=f"results at {frequency(float(rate / design.factor))}"),
+        Fact(
+            "Samples for each result",
+            str(design.factor),
+            sentence=f"results at {frequency(float(rate / design.factor))}",
+        ),
         Fact(
             f"Anything above {frequency(float(rate / (2 * design.factor)))}",
             _decibels(folding),

@@ -40,7 +40,9 @@ def _filtered(stage: StageDesign, values: Values) -> Values:
         return values
     decimator = datapath.decimator
     if decimator is not None:
-        taps = np.array(impulse_response(decimator.factor, decimator.stages)) / float(decimator.factor**decimator.stages)
+        taps = np.array(impulse_response(decimator.factor, decimator.stages)) / float(
+            decimator.factor**decimator.stages
+        )
         before = np.concatenate([np.full(len(taps) - 1, values[0]), values])
         values = np.convolve(before, taps, mode="valid")[:: decimator.factor]
     sos = quantized.filter.sos
@@ -67,7 +69,9 @@ def _complex(stage: StageDesign, turns: Values) -> npt.NDArray[np.complex128]:
     for part in stage.parts:
         u = np.exp(-2j * np.pi * turns * step)
         for numerator, denominator in part.sections:
-            over, under = (np.polynomial.polynomial.polyval(u, [float(c) for c in taps]) for taps in (numerator, denominator))
+            over, under = (
+                np.polynomial.polynomial.polyval(u, [float(c) for c in taps]) for taps in (numerator, denominator)
+            )
             total = total * over / under
         step *= part.factor
     return total

@@ -124,7 +124,13 @@ def report_table(summary: dict[str, Any]) -> Table:
     if summary["sqnr_db"] is not None:
         rows.append(Fact("Signal to error", decibels(summary["sqnr_db"])))
     rows += [Fact("Short", reason) for reason in summary["shortfalls"]]
-    rows.append(Fact("Clocks a sample", f"{summary['cycles_per_sample']:.3g}", sentence=f"{summary['simulator']}, with idle clocks"))
+    rows.append(
+        Fact(
+            "Clocks a sample",
+            f"{summary['cycles_per_sample']:.3g}",
+            sentence=f"{summary['simulator']}, with idle clocks",
+        )
+    )
     return Table(summary["name"], rows, styles={"Short": "red"}, passed=summary["passed"])
 
 
@@ -152,7 +158,9 @@ def _response_figure(design: ChainDesign) -> Figure:
         if design.folding is not None:
             edge = float(design.spec.base.sample_rate) / (2 * design.factor)
             axes.axvspan(edge, float(frequency[-1]), facecolor=COLOUR["limit"], alpha=0.12, lw=0)
-            axes.axhline(float(_level(np.array([float(design.folding.gain)]))[0]), color=COLOUR["limit"], lw=1.4, ls="--")
+            axes.axhline(
+                float(_level(np.array([float(design.folding.gain)]))[0]), color=COLOUR["limit"], lw=1.4, ls="--"
+            )
         axes.set_ylabel("gain in dB")
         axes.set_xlabel("frequency at the input")
         frequency_axis(axes, frequency)

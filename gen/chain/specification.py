@@ -249,7 +249,9 @@ def _stage(table: Mapping[str, Any], kind: str, k: int, rate: Fraction) -> Stage
     known = (*_COMMON, *_KEYS[kind])
     for key, value in table.items():
         if key == "interpolate":
-            raise UnfitError("left out, as stages only lower the rate", literal(value), where=f"{where}.{key}", later=True)
+            raise UnfitError(
+                "left out, as stages only lower the rate", literal(value), where=f"{where}.{key}", later=True
+            )
         if key not in known:
             raise UnfitError(
                 f"one of the keys {', '.join(known)} in a stage of the kind {kind}",

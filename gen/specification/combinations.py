@@ -249,10 +249,14 @@ CHAIN = Terms(
     "chain",
     {
         RELOAD: Refusal(Verdict.LATER, _OF_ONE_CORE),
-        PROTECT: Refusal(Verdict.LATER, "a fault is a flag of a stage's own results, which the next stage does not hand on"),
+        PROTECT: Refusal(
+            Verdict.LATER, "a fault is a flag of a stage's own results, which the next stage does not hand on"
+        ),
         SEVERAL: Refusal(Verdict.LATER, "a stage behind one that decimates has no beats of several samples"),
         LOOK_AHEAD: Refusal(Verdict.LATER, "a chain has no rule yet for which of its stages need it"),
-        ZERO: Refusal(Verdict.LATER, "the flag settling is of a stage's own results, which the next stage does not hand on"),
+        ZERO: Refusal(
+            Verdict.LATER, "the flag settling is of a stage's own results, which the next stage does not hand on"
+        ),
     },
 )
 """What a chain of stages takes: what its stages take by themselves, but for these options."""
@@ -364,7 +368,9 @@ def combinations() -> tuple[Combination, ...]:
     After them, what a single architecture does not take together.
     """
     with_architecture = [
-        _combination(terms.name, option, terms.lacks.get(option)) for terms in (*TERMS.values(), CHAIN) for option in OPTIONS
+        _combination(terms.name, option, terms.lacks.get(option))
+        for terms in (*TERMS.values(), CHAIN)
+        for option in OPTIONS
     ]
     of_options = [
         _combination(one.name, other, _APART.get((one, other)) or _APART.get((other, one)))

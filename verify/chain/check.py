@@ -107,7 +107,16 @@ def judge_chain(
         core = read_certificate(path)
         require(core.name == name, f"the core of stage {entry.name} must be {name}, not {core.name}")
         data = about_of(core).measurements
-        stated = None if text is None else Stated(about_of(core).specification, spec_folder, None if data is None else spec_folder / data.name, "calibration" if entry.kind == "polynomial" else "filter")
+        stated = (
+            None
+            if text is None
+            else Stated(
+                about_of(core).specification,
+                spec_folder,
+                None if data is None else spec_folder / data.name,
+                "calibration" if entry.kind == "polynomial" else "filter",
+            )
+        )
         try:
             stages[entry.name] = judge(
                 core,
@@ -166,13 +175,17 @@ def _check_joints(chain: ChainCertificate, cores: Sequence[Certificate]) -> list
         if item is None:
             raise RejectedError(f"the certificate of {what} must state what the item is")
         plain = not item.reload and not item.hold and item.samples == 1 and item.protect == "none"
-        require(plain and item.start == "steady", f"{what} must be without reload, hold, lanes, protection, from steady")
+        require(
+            plain and item.start == "steady", f"{what} must be without reload, hold, lanes, protection, from steady"
+        )
         require(item.channels == chain.channels, f"{what} must have {chain.channels} channels, not {item.channels}")
         require(
             (core.ideal.polynomial is not None) == (entry.kind == "polynomial"),
             f"{what} must have a polynomial if it is one, and no other",
         )
-        require(entry.kind != "polynomial" or (k == 0 and not core.ideal.sections), "a polynomial must be the first stage")
+        require(
+            entry.kind != "polynomial" or (k == 0 and not core.ideal.sections), "a polynomial must be the first stage"
+        )
         taken = chain.inputs if k == 0 else (_unnamed(cores[k - 1].output),)
         own = core.inputs if k == 0 else tuple(map(_unnamed, core.inputs))
         require(own == taken, f"{what} must take what is before it, {taken}, not {own}")
@@ -262,7 +275,8 @@ def _scope(
         chained["stages"] = ScopePart(State.PROVEN, "each stage is the one that the words of the chain ask for")
     if with_files:
         chained["top"] = ScopePart(
-            State.PROVEN, "it has instances of the cores and the wires between their streams; manifest and C model follow"
+            State.PROVEN,
+            "it has instances of the cores and the wires between their streams; manifest and C model follow",
         )
     return chained | scope
 

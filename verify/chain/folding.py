@@ -47,7 +47,9 @@ def check_folding(entry: FoldingEntry | None, parts: Sequence[Part]) -> None:
     with ctx.workprec(_PRECISION):
         gain = _Gain(parts)
         _check(gain, entry.anywhere, [(Fraction(1, 2 * factor), _HALF)], "the largest gain of what folds")
-        require((entry.edge is None) == (entry.passing is None), "a pass band must have both an edge and a gain into it")
+        require(
+            (entry.edge is None) == (entry.passing is None), "a pass band must have both an edge and a gain into it"
+        )
         if entry.edge is not None and entry.passing is not None:
             require(
                 0 < entry.edge <= Fraction(1, 2 * factor),

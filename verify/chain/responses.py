@@ -48,7 +48,9 @@ def parts_of(certificate: Certificate) -> tuple[Part, ...]:
 def _cic(factor: int, stages: int) -> Part:
     """A CIC filter, by the powers of its moving sum, in pieces that a section can have."""
     ones = tuple(Fraction(1, factor) for _ in range(factor))
-    return Part(tuple(SectionEntry.model_construct(numerator=ones, denominator=(Fraction(1),)) for _ in range(stages)), factor)
+    return Part(
+        tuple(SectionEntry.model_construct(numerator=ones, denominator=(Fraction(1),)) for _ in range(stages)), factor
+    )
 
 
 def factor_of(parts: Sequence[Part]) -> int:
@@ -73,7 +75,9 @@ def peak_gain(parts: Sequence[Part]) -> Fraction:
         size = _norm(one.samples) / (1 << one.bits)
         exact, wide = exact * size, wide * (size + one.error)
         apart = one.samples(fmpz_poly([0] * spread + [1])) if spread > 1 else one.samples
-        require(len(samples) + len(apart) <= _MOST_TAPS, f"the response of a chain must have at most {_MOST_TAPS} samples")
+        require(
+            len(samples) + len(apart) <= _MOST_TAPS, f"the response of a chain must have at most {_MOST_TAPS} samples"
+        )
         samples, scale = samples * apart, scale / (1 << one.bits)
     return _norm(samples) * scale + own * (wide - exact)
 
@@ -99,6 +103,3 @@ def reach_of(certificate: Certificate) -> Fraction:
 
 def _largest(port: PortEntry) -> Fraction:
     return max(abs(port.zero + port.lsb * code) for code in (port.lowest, port.highest))
-
-
-

@@ -29,8 +29,8 @@ from sosmith.model.errors import SpecificationError, falling_short
 
 if TYPE_CHECKING:
     from sosmith.interface.certificate import Progress
+    from sosmith.interface.chain.certificate import ChainCertificate
     from sosmith.interface.chain.report import ChainReport
-    from sosmith.verify.chain.chain_file import ChainCertificate
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,9 @@ class Chain(View):
     @cached_property
     def certificate(self) -> ChainCertificate:
         """The claims about the chain; `generate` writes it, and the stages' own, with the digests of all files."""
-        return chain_certificate(self.core)
+        from sosmith.interface.chain.certificate import ChainCertificate
+
+        return ChainCertificate(chain_certificate(self.core))
 
     def frequency_response(self, f: npt.ArrayLike) -> npt.NDArray[np.complex128]:
         """Return the complex gain from sines at the input to what comes out of them, folded or not.
@@ -157,9 +159,7 @@ class Chain(View):
         block = codes.reshape(len(codes), -1, codes.shape[-1])
         return golden_chain(self.core, block).reshape(-1, *codes.shape[1:-1])
 
-    def generate(
-        self, folder: str | PathLike[str], progress: Progress = lambda step, done, total: None
-    ) -> list[Path]:
+    def generate(self, folder: str | PathLike[str], progress: Progress = lambda step, done, total: None) -> list[Path]:
         """Write the files of all stages, the top that joins them, manifest, C model and certificate.
 
         Raises
@@ -223,7 +223,9 @@ class Chain(View):
 
     def as_dict(self) -> dict[str, Any]:
         """Return the `manifest`, and what folds."""
-        return self.manifest | {"folding": {name: {"gain": gain, "at": at} for name, (gain, at) in self.folding.items()}}
+        return self.manifest | {
+            "folding": {name: {"gain": gain, "at": at} for name, (gain, at) in self.folding.items()}
+        }
 
     @property
     def _first(self) -> Any:

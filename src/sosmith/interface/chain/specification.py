@@ -98,7 +98,10 @@ class ChainSpecification(View):
 
     def tables(self) -> list[Table]:
         """Return the stages: name, kind, rate and factor."""
-        rows = [(stage.name, f"{stage.kind}, {float(stage.rate):g} Hz, 1 of {stage.factor}") for stage in self.checked.stages]
+        rows = [
+            (stage.name, f"{stage.kind}, {float(stage.rate):g} Hz, 1 of {stage.factor}")
+            for stage in self.checked.stages
+        ]
         return [Table(f"Chain {self.name}", rows, ("stage", "what it is"))]
 
     def __repr__(self) -> str:
