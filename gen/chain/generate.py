@@ -1,4 +1,4 @@
-"""The files of a chain: those of each stage, and the top, the manifest, the C model and the certificate of the whole."""
+"""The files of a chain: those of each stage, and top, manifest, C model and certificate of the whole."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def chain_texts(design: ChainDesign, progress: Progress = lambda step: None) -> 
 
 
 def chain_manifest(design: ChainDesign) -> dict[str, Any]:
-    """What software needs to know of a chain: the content of ``<name>.json``."""
+    """Return what software needs to know of a chain: the content of ``<name>.json``."""
     interface = chain_interface(design)
     return {
         "name": design.name,

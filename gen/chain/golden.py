@@ -1,4 +1,4 @@
-"""What a chain should compute, in double precision: its stages' exact filters one behind the other, limited at the end."""
+"""What a chain should compute, in double precision: its stages' exact filters in a row, limited at the end."""
 
 from __future__ import annotations
 

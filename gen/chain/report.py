@@ -148,7 +148,7 @@ def _frequencies(design: ChainDesign) -> np.ndarray[Any, Any]:
 
 
 def _response_figure(design: ChainDesign) -> Figure:
-    """The gain of the whole from the input on, and where frequencies begin to fold."""
+    """Draw the gain of the whole from the input on, and where frequencies begin to fold."""
     frequency = _frequencies(design)
     level = _level(chain_gain(design, frequency))
 
@@ -179,7 +179,7 @@ def _response_figure(design: ChainDesign) -> Figure:
 
 
 def _stages_figure(design: ChainDesign) -> Figure:
-    """The gains of the stages, each over the frequencies at the chain's input."""
+    """Draw the gains of the stages, each over the frequencies at the chain's input."""
     frequency = _frequencies(design)
     filters = [stage for stage in design.stages if stage.parts]
 

@@ -7,8 +7,8 @@ R-th result leaves, R being the product of all their factors:
     |> H1(z) -> R1 -> H2(z) -> R2  =  H1(z) H2(z**R1) -> R1 R2
 
 A result is a sum of all taps of it, whatever its phase. So the sum of their magnitudes is how much of an error before
-the stages reaches the end at most. A sine of the frequency f comes out with its gain at f, at the frequency that f folds
-to.
+the stages reaches the end at most. A sine of the frequency f comes out with its gain at f, at the frequency that f
+folds to.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def cic(factor: int, stages: int) -> Part:
 
 
 def factor_of(parts: Sequence[Part]) -> int:
-    """Samples for each result."""
+    """Return the number of samples for each result."""
     product = 1
     for part in parts:
         product *= part.factor

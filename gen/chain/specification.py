@@ -201,11 +201,9 @@ def _format(port: Port) -> dict[str, Any]:
 
 
 def _checked(tree: dict[str, Any], path: Path, text: str | None) -> ChainSpec:
-    for key in tree:
+    for key, value in tree.items():
         if key not in _TOP:
-            raise UnfitError(
-                f"left out with [[stage]], which takes {', '.join(_TOP)}", literal(tree[key]), where=str(key)
-            )
+            raise UnfitError(f"left out with [[stage]], which takes {', '.join(_TOP)}", literal(value), where=str(key))
     stages = tree.get(STAGE)
     if not isinstance(stages, list) or not all(isinstance(stage, dict) for stage in stages):
         raise UnfitError("a list of tables [[stage]]", literal(stages), where=STAGE)

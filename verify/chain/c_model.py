@@ -30,21 +30,13 @@ def check_chain_model(source: str, header: str, chain: ChainCertificate, cores: 
     push = f"int {name}_push({name}_state *state, {samples}, int64_t *result, uint8_t *status)"
     reset = f"void {name}_reset({name}_state *state)"
     guard = f"{name.upper()}_H"
-    includes = [f'#include "{core.name}.h"' for core in cores]
-    cpp = ["#ifdef __cplusplus"]
-    _same(
-        header,
-        [f"#ifndef {guard}", f"#define {guard}", *includes, *cpp, 'extern "C" {', "#endif"]
-        + ["typedef struct {", *_fields(chain, cores), f"}} {name}_state; {reset}; {push};"]
-        + [*cpp, "}", "#endif", "#endif"],
-        f"{name}.h",
-    )
-    _same(
-        source,
-        [f'#include "{name}.h"', "#include <string.h>", f"{reset} {{ memset(state, 0, sizeof *state); }}"]
-        + [f"{push} {{", *_calls(chain, cores), "return 1; }"],
-        f"{name}.c",
-    )
+    cpp = "#ifdef __cplusplus"
+    state = f"{' '.join(('typedef struct {', *_fields(chain, cores)))} }} {name}_state; {reset}; {push};"
+    wanted = [f"#ifndef {guard}", f"#define {guard}", *(f'#include "{core.name}.h"' for core in cores)]
+    wanted += [cpp, 'extern "C" {', "#endif", state, cpp, "}", "#endif", "#endif"]
+    _same(header, wanted, f"{name}.h")
+    body = f"{reset} {{ memset(state, 0, sizeof *state); }} {push} {{ {' '.join(_calls(chain, cores))} return 1; }}"
+    _same(source, [f'#include "{name}.h"', "#include <string.h>", body], f"{name}.c")
 
 
 def _decimates(core: Certificate) -> bool:

@@ -46,7 +46,7 @@ def parts_of(certificate: Certificate) -> tuple[Part, ...]:
 
 @cache
 def _cic(factor: int, stages: int) -> Part:
-    """A CIC filter, by the powers of its moving sum, in pieces that a section can have."""
+    """Return a CIC filter, by the powers of its moving sum, in pieces that a section can have."""
     ones = tuple(Fraction(1, factor) for _ in range(factor))
     return Part(
         tuple(SectionEntry.model_construct(numerator=ones, denominator=(Fraction(1),)) for _ in range(stages)), factor
@@ -54,7 +54,7 @@ def _cic(factor: int, stages: int) -> Part:
 
 
 def factor_of(parts: Sequence[Part]) -> int:
-    """Samples for each result."""
+    """Return the number of samples for each result."""
     return reduce(mul, (part.factor for part in parts), 1)
 
 
