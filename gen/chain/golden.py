@@ -53,7 +53,7 @@ def _filtered(stage: StageDesign, values: Values) -> Values:
 
 def stage_gain(stage: StageDesign, frequency: Values) -> Values:
     """Magnitude of a stage's gain for sines at the chain's input, in Hz: they reach it folded by the stages before."""
-    return np.abs(_complex(stage, frequency / float(stage.spec.rate)))
+    return np.asarray(np.abs(_complex(stage, frequency / float(stage.spec.rate))), dtype=np.float64)
 
 
 def chain_gain(design: ChainDesign, frequency: Values) -> npt.NDArray[np.complex128]:

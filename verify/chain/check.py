@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 
 from sosmith.verify.bounds.l1_response import UndecidedError
@@ -120,7 +121,7 @@ def judge_chain(
         try:
             stages[entry.name] = judge(
                 core,
-                lambda step, done, total, at=entry.name: progress(f"{at}: {step}", done, total),
+                partial(_named, progress, entry.name),
                 stated=stated,
                 folder=folder if with_files else None,
                 content=own,
@@ -145,6 +146,10 @@ def judge_chain(
             progress("files", 0, 0)
             files += _check_files(chain, folder, cores, items, stages)
     return ChainJudgement(stages, chain.bound, budget, files, _scope(chain, stages, text is not None, with_files))
+
+
+def _named(progress: Progress, stage: str, step: str, done: int, total: int) -> None:
+    progress(f"{stage}: {step}", done, total)
 
 
 def _check_seal(chain: ChainCertificate, content: bytes) -> None:
@@ -175,9 +180,9 @@ def _check_joints(chain: ChainCertificate, cores: Sequence[Certificate]) -> list
         if item is None:
             raise RejectedError(f"the certificate of {what} must state what the item is")
         plain = not item.reload and not item.hold and item.samples == 1 and item.protect == "none"
-        require(
-            plain and item.start == "steady", f"{what} must be without reload, hold, lanes, protection, from steady"
-        )
+        require(plain, f"{what} must be without reload, hold, protection and several samples a clock")
+        steady = item.start == "steady" or entry.kind == "polynomial"
+        require(steady, f"{what} must start from the steady state of its first sample, not from {item.start}")
         require(item.channels == chain.channels, f"{what} must have {chain.channels} channels, not {item.channels}")
         require(
             (core.ideal.polynomial is not None) == (entry.kind == "polynomial"),
