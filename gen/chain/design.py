@@ -37,6 +37,9 @@ _DIGITS = 12
 _EARLY_SHARE = Fraction(1, 2)
 """Share that all stages but the last one take at first of what the rounding of the output leaves."""
 
+_LEAST = Fraction(9, 16)
+"""Least error that a stage is allowed, in LSBs of its output."""
+
 _INPUT = "x"
 _OUTPUT = "y"
 
@@ -282,10 +285,8 @@ class _Budget:
             >= room
         ):
             return None
-        errors[:-1] = [
-            max(_rounded_up(error), _rounded_up(step * Fraction(9, 16)))
-            for error, step in zip(errors[:-1], steps, strict=False)
-        ]
+        # An exact stage errs by nothing, and still asks for more than the half LSB that any rounding may take.
+        errors = [_rounded_up(max(error, step * _LEAST)) for error, step in zip(errors, steps, strict=True)]
         try:
             return self._chain(_Shares(tuple(errors), tuple(steps)), [stage.parts for stage in chain.stages])
         except ShortfallError:

@@ -50,7 +50,7 @@ def chain_texts(design: ChainDesign, progress: Progress = lambda step: None) -> 
         texts |= generated(stage.design, claims=proven)
     own = {
         f"{name}.sv": top_text(design),
-        f"{name}.json": to_json(chain_manifest(design)),
+        f"{name}.json": to_json(_manifest(design, claims)),
         f"{name}.c": chain_source(design),
         f"{name}.h": chain_header(design),
     }
@@ -60,6 +60,13 @@ def chain_texts(design: ChainDesign, progress: Progress = lambda step: None) -> 
 
 def chain_manifest(design: ChainDesign) -> dict[str, Any]:
     """Return what software needs to know of a chain: the content of ``<name>.json``."""
+    return _manifest(design, _claims(design))
+
+
+def _manifest(design: ChainDesign, claims: Sequence[Certificate]) -> dict[str, Any]:
+    """Return the manifest of a chain whose stages have these claims."""
+    errors = [proven.claims.bound * proven.output.lsb for proven in claims]
+    shares = [error * stage.gain for error, stage in zip(errors, design.stages, strict=True)]
     interface = chain_interface(design)
     return {
         "name": design.name,
@@ -75,14 +82,14 @@ def chain_manifest(design: ChainDesign) -> dict[str, Any]:
                 "core": stage.design.datapath.name,
                 "architecture": stage.design.architecture.name,
                 "decimate": stage.design.datapath.samples_per_result,
-                "error_bound": float(stage.bound),
+                "error_bound": float(error),
                 "gain_to_the_end": float(stage.gain),
             }
-            for stage in design.stages
+            for stage, error in zip(design.stages, errors, strict=True)
         ],
         "decimate": design.factor,
-        "error_bound": float(design.bound),
-        "error_parts": {stage.spec.name: float(stage.share) for stage in design.stages},
+        "error_bound": float(sum(shares, Fraction(0))),
+        "error_parts": {stage.spec.name: float(share) for stage, share in zip(design.stages, shares, strict=True)},
         "error_unit": design.spec.base.output.unit,
     }
 
