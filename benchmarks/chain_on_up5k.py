@@ -31,6 +31,7 @@ def placed(specification: Path, folder: Path) -> dict[str, object]:
     )
     script = f"read_verilog -sv {files} pins.sv; synth_ice40 -dsp -top pins -json {name}_net.json"
     _run("yosys", ["-q", "-p", script], folder)
+    arguments = ["--up5k", "--package", "sg48", "--seed", str(_SEED), "--freq", "24", "--json", f"{name}_net.json"]
     _run("nextpnr-ice40", [*arguments, "--report", "report.json", "--pcf-allow-unconstrained"], folder)
     report = json.loads((folder / "report.json").read_text(encoding="utf-8"))
     cells = {kind: (entry["used"], entry["available"]) for kind, entry in report["utilization"].items()}

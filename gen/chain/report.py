@@ -12,17 +12,16 @@ from matplotlib.figure import Figure as Canvas
 from sosmith.gen.chain.design import ChainDesign
 from sosmith.gen.chain.facts import chain_tables
 from sosmith.gen.chain.golden import chain_gain, stage_gain
+from sosmith.gen.chain.picture import frequencies, level
 from sosmith.gen.chain.run import ChainRun
 from sosmith.gen.facts.table import Fact, Table
 from sosmith.gen.quantity import decibels, plain_number, quantity
 from sosmith.gen.report.page import Figure
-from sosmith.gen.report.plots import COLOUR, MOST_DB, NARROW, PANEL_HEIGHT, draw, frequency_axis
+from sosmith.gen.report.plots import COLOUR, NARROW, PANEL_HEIGHT, draw, frequency_axis
 from sosmith.gen.version import __version__
 from sosmith.model.reference.accuracy import error_statistics, sqnr_db
 from sosmith.model.templates import render
 from sosmith.model.text_files import to_json, write_files
-
-_POINTS = 2000
 
 
 def chain_summary(design: ChainDesign, run: ChainRun) -> dict[str, Any]:
@@ -138,28 +137,19 @@ def _db(gain: float) -> float | None:
     return 20 * math.log10(gain) if gain > 0 else None
 
 
-def _level(gain: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
-    return np.asarray(20 * np.log10(np.maximum(np.abs(gain), 10 ** (-MOST_DB / 20))))
-
-
-def _frequencies(design: ChainDesign) -> np.ndarray[Any, Any]:
-    half = float(design.spec.base.sample_rate) / 2
-    return np.geomspace(half / (100 * design.factor), half, _POINTS)
-
-
 def _response_figure(design: ChainDesign) -> Figure:
     """Draw the gain of the whole from the input on, and where frequencies begin to fold."""
-    frequency = _frequencies(design)
-    level = _level(chain_gain(design, frequency))
+    frequency = frequencies(design)
+    whole = level(np.abs(chain_gain(design, frequency)))
 
     def paint(canvas: Canvas) -> None:
         axes = canvas.subplots()
-        axes.plot(frequency, level, color=COLOUR["hardware"], lw=1.6)
+        axes.plot(frequency, whole, color=COLOUR["hardware"], lw=1.6)
         if design.folding is not None:
             edge = float(design.spec.base.sample_rate) / (2 * design.factor)
             axes.axvspan(edge, float(frequency[-1]), facecolor=COLOUR["limit"], alpha=0.12, lw=0)
             axes.axhline(
-                float(_level(np.array([float(design.folding.gain)]))[0]), color=COLOUR["limit"], lw=1.4, ls="--"
+                float(level(np.array([float(design.folding.gain)]))[0]), color=COLOUR["limit"], lw=1.4, ls="--"
             )
         axes.set_ylabel("gain in dB")
         axes.set_xlabel("frequency at the input")
@@ -180,13 +170,13 @@ def _response_figure(design: ChainDesign) -> Figure:
 
 def _stages_figure(design: ChainDesign) -> Figure:
     """Draw the gains of the stages, each over the frequencies at the chain's input."""
-    frequency = _frequencies(design)
+    frequency = frequencies(design)
     filters = [stage for stage in design.stages if stage.parts]
 
     def paint(canvas: Canvas) -> None:
         axes = canvas.subplots(len(filters), 1, sharex=True, squeeze=False)[:, 0]
         for each, stage in zip(axes, filters, strict=True):
-            each.plot(frequency, _level(stage_gain(stage, frequency)), color=COLOUR["golden"], lw=1.2)
+            each.plot(frequency, level(stage_gain(stage, frequency)), color=COLOUR["golden"], lw=1.2)
             each.set_ylabel(f"{stage.spec.name}\ndB")
         axes[-1].set_xlabel("frequency at the input")
         frequency_axis(axes[-1], frequency)

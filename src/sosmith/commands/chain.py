@@ -32,14 +32,21 @@ def refuse(**options: Any) -> None:
             )
 
 
-def show_chain(asked: ChainSpecification, board: str | None, *, details: bool, as_json: bool) -> None:
-    """Design a chain, and show it."""
+def show_chain(
+    asked: ChainSpecification, board: str | None, plot: Path | None, *, details: bool, as_json: bool
+) -> None:
+    """Design a chain, show it, and draw it into the file `plot` if there is one."""
     from sosmith.interface.chain.design import design_chain
 
     with show_progress() as step:
         chain = design_chain(asked, board=board, progress=step)
         step("what folds", 0, 0)
         tables = [] if as_json else chain.tables(details=details)
+        if plot is not None:
+            step("drawing", 0, 0)
+            chain.plot(plot)
+    if plot is not None:
+        note(f"wrote {plot}")
     if as_json:
         print_json(chain.as_dict())
         return

@@ -93,8 +93,8 @@ def design_command(
         picture_format(plot)
     asked = specification_in(spec)
     if isinstance(asked, ChainSpecification):
-        refuse(core=core, realization=realization, widths_of=widths_of, plot=plot)
-        show_chain(asked, board, details=details, as_json=as_json)
+        refuse(core=core, realization=realization, widths_of=widths_of)
+        show_chain(asked, board, plot, details=details, as_json=as_json)
         return
     if asked.checked.filter.origin:
         note(asked.checked.filter.origin)

@@ -213,6 +213,22 @@ class Chain(View):
         progress("writing the report", 0, 0)
         return ChainReport(write_chain_report(self.core, run, place), place, run)
 
+    def plot(self, path: str | PathLike[str]) -> Path:
+        """Draw the gain of the chain and of its stages, and the limit of what folds, into a file; return its path.
+
+        Raises
+        ------
+        SpecificationError
+            If the name ends in neither .svg nor .png, or the folder cannot be written.
+        """
+        from sosmith.gen.chain.picture import chain_plot
+        from sosmith.gen.picture import format_of
+        from sosmith.model.text_files import write_contents
+
+        target = Path(fspath(path))
+        (written,) = write_contents(target.parent, {target.name: chain_plot(self.core, format_of(target))})
+        return written
+
     def tables(self, *, details: bool = False) -> list[Table]:
         """Return what `sosmith design` shows: stages, error budget and what folds; with `details` each stage's own."""
         tables = chain_tables(self.core)
