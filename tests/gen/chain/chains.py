@@ -60,7 +60,7 @@ def _stage(rng: random.Random, kind: str, rate: float) -> dict[str, Any]:
 
 
 def steps_of(chain: sosmith.Chain) -> list[tuple[list[tuple[Sequence[Fraction], Sequence[Fraction]]], int]]:
-    """Return what each stage does: sections, and by how much it decimates; a CIC filter and what is behind it are two."""
+    """Return what each stage does: sections, and by how much it decimates; a CIC filter and filter are two."""
     steps: list[tuple[list[tuple[Sequence[Fraction], Sequence[Fraction]]], int]] = []
     for table, stage in zip(chain.specification.as_dict()["stage"], chain.core.stages, strict=True):
         filter_ = stage.design.quantized.filter
