@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sosmith.gen.chain.response import Part, cic, factor_of, folding_gain, gain_into_passband, peak_gain
-from sosmith.gen.chain.specification import ChainSpec, StageSpec
+from sosmith.gen.chain.specification import ANY_INPUT, ANY_OUTPUT, ChainSpec, StageSpec
 from sosmith.gen.core import CoreDesign, design_core, polynomial_of, response_of
 from sosmith.gen.filter.largest_gain import Peak
 from sosmith.gen.fpga.boards import Board
@@ -39,9 +39,6 @@ _EARLY_SHARE = Fraction(1, 2)
 
 _LEAST = Fraction(9, 16)
 """Least error that a stage is allowed, in LSBs of its output."""
-
-_INPUT = "x"
-_OUTPUT = "y"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -196,8 +193,7 @@ class _Budget:
         """Return the exact response of a stage, which hardly depends on its ports."""
         if stage.kind == "polynomial":
             return ()
-        guess = Port.from_range(_INPUT, 16, Fraction(-1), Fraction(1), signed=True, unit="")
-        spec = stage.ordinary(self.spec, (guess,), replace(guess, name=_OUTPUT))
+        spec = stage.ordinary(self.spec, (ANY_INPUT,), ANY_OUTPUT)
         response, _ = response_of(spec, "filter", self.progress)
         assert response.ideal is not None
         sections, pre_stage = response.ideal.exact, response.pre_stage
@@ -240,7 +236,7 @@ class _Budget:
             output = self.last if is_last else self._port(stage, shares.steps[k], reach + carried + allowed)
             design = self._core(stage.ordinary(self.spec, inputs, output, allowed), stage)
             stages.append(StageDesign(spec=stage, design=design, parts=own, gain=gains[k], reach=reach))
-            inputs, error = (replace(output, name=_INPUT),), carried + stages[-1].bound
+            inputs, error = (replace(output, name=ANY_INPUT.name),), carried + stages[-1].bound
             left -= stages[-1].share
         chain = ChainDesign(spec=self.spec, stages=tuple(stages))
         now = [_parts_of(stage.design) for stage in stages]
@@ -263,7 +259,7 @@ class _Budget:
             raise ShortfallError(
                 f"stage {stage.name}: its results must fit {_MAX_BITS} bits, and need {bits} for an error this small"
             )
-        return Port(name=_OUTPUT, bits=bits, signed=True, lsb=step, zero=Fraction(0), unit=self.last.unit)
+        return Port(name=ANY_OUTPUT.name, bits=bits, signed=True, lsb=step, zero=Fraction(0), unit=self.last.unit)
 
     def _core(self, spec: Specification, stage: StageSpec) -> CoreDesign:
         return design_core(

@@ -44,11 +44,11 @@ def _filtered(stage: StageDesign, values: Values) -> Values:
             decimator.factor**decimator.stages
         )
         before = np.concatenate([np.full(len(taps) - 1, values[0]), values])
-        values = np.convolve(before, taps, mode="valid")[:: decimator.factor]
+        values = np.asarray(np.convolve(before, taps, mode="valid")[:: decimator.factor], dtype=np.float64)
     sos = quantized.filter.sos
     results = sosfilt(sos, values - values[0], np.zeros((len(sos), sos.shape[1] // 2 - 1)))
     results = results + dc_gain(sos) * values[0]
-    return results if decimator is not None else results[:: datapath.samples_per_result]
+    return results if decimator is not None else np.asarray(results[:: datapath.samples_per_result])
 
 
 def stage_gain(stage: StageDesign, frequency: Values) -> Values:

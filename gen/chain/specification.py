@@ -13,7 +13,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from sosmith.gen.specification.choices import AUTO, FIR_FAMILIES, MAX_TAPS
+from sosmith.gen.specification.choices import AUTO, FIR_FAMILIES, MAX_DECIMATION, MAX_DOWNSAMPLING, MAX_TAPS
 from sosmith.gen.specification.combinations import check_chain
 from sosmith.gen.specification.specification import STAGE, Specification, from_tree, parsed, text_of, to_json
 from sosmith.gen.specification.toml_text import toml_text
@@ -42,6 +42,12 @@ _OF_HARDWARE = ("architecture", "realization", "multipliers")
 _TOP = ("name", "sample_rate", "channels", "input", STAGE, "output", "hardware")
 _WIRE = {"sos": [[1, 0, 0, 1, 0, 0]]}
 _EXACT = Context(prec=200, traps=[Inexact])
+
+
+ANY_INPUT, ANY_OUTPUT = (
+    Port.from_range(name, 16, Fraction(-1), Fraction(1), signed=True, unit="") for name in ("x", "y")
+)
+"""Ports of a stage whose ports are not known yet."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -218,10 +224,13 @@ def _checked(tree: dict[str, Any], path: Path, text: str | None) -> ChainSpec:
     read, rate, findings = [], base.sample_rate, []
     for k, stage in enumerate(stages):
         try:
+            _check_rate(rate, f"stage[{k}]")
             read.append(_stage(stage, kinds[k], k, rate))
             rate /= read[-1].factor
         except UnfitError as unfit:
             findings.append(unfit)
+            if not _is_decimal(rate):
+                break
     if findings:
         raise together(findings)
     _check_names([stage.name for stage in read])
@@ -232,6 +241,8 @@ def _checked(tree: dict[str, Any], path: Path, text: str | None) -> ChainSpec:
         stages=tuple(read),
     )
     _check_steps(chain)
+    for one in chain.stages[kinds[0] == "polynomial" :]:
+        one.ordinary(chain, (ANY_INPUT,), ANY_OUTPUT)
     return chain
 
 
@@ -267,7 +278,6 @@ def _stage(table: Mapping[str, Any], kind: str, k: int, rate: Fraction) -> Stage
             where=f"{where}.kind",
         )
     factor = _factor(table, kind, where)
-    _check_rate(rate, name, where)
     return StageSpec(
         name=name,
         kind=kind,
@@ -291,20 +301,26 @@ def _factor(table: Mapping[str, Any], kind: str, where: str) -> int:
     if "decimate" not in table:
         return 1
     try:
-        return whole(2, 1024)(table["decimate"])
+        return whole(2, MAX_DECIMATION if kind == "iir" else MAX_DOWNSAMPLING)(table["decimate"])
     except UnfitError as unfit:
         raise unfit.inside(f"{where}.decimate") from None
 
 
-def _check_rate(rate: Fraction, name: str, where: str) -> None:
-    try:
-        decimal(rate)
-    except Inexact:
+def _check_rate(rate: Fraction, where: str) -> None:
+    if not _is_decimal(rate):
         raise UnfitError(
-            f"such that the rate at the input of {name} is a decimal number, in which its edges can be compared",
-            f"that of {literal(rate)} Hz",
-            where=f"{where}",
-        ) from None
+            "at a rate that is a decimal number, in which its edges can be compared",
+            f"at {literal(rate)} Hz",
+            where=where,
+        )
+
+
+def _is_decimal(value: Fraction) -> bool:
+    try:
+        decimal(value)
+    except Inexact:
+        return False
+    return True
 
 
 def _tables(table: Mapping[str, Any], kind: str, where: str, rate: Fraction, factor: int) -> dict[str, Any]:

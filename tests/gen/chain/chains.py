@@ -34,7 +34,7 @@ def draw(seed: int) -> dict[str, Any]:
         "channels": rng.choice([1, 1, 1, 3]),
         "input": {"x": {"bits": bits, "range": [low, 1.0], "signed": low < 0}},
         "stage": stages,
-        "output": {"bits": rng.randint(8, 16), "range": [-0.125, 0.125], "signed": True},
+        "output": {"bits": rng.randint(8, 16), "range": [-0.5, 0.5], "signed": True},
         "hardware": {"clock": 48e6},
     }
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -28,12 +29,14 @@ def test_a_chain_keeps_to_what_it_claims(seed: int, tmp_path: Path) -> None:
     assert len(results) == -(-SAMPLES // chain.factor)
     (port,), output = base.inputs, base.output
     low, high = (output.zero + output.lsb * code for code in (output.lowest, output.highest))
-    worst = Fraction(0)
+    worst, within = Fraction(0), 0
     for k in range(base.channels):
         values = [port.zero + port.lsb * int(code) for code in codes[:, k]]
         for code, value in zip(results[:, k].tolist(), exact(chain, values), strict=True):
             worst = max(worst, abs(output.zero + output.lsb * code - min(max(value, low), high)))
-    assert 0 < worst <= bound
+            within += low < value < high
+    assert worst <= bound
+    assert worst > bound / 4 or within < 20
 
     between: np.ndarray = codes[:, :, None]
     for stage in chain.core.stages[:-1]:
@@ -48,9 +51,8 @@ def test_a_chain_keeps_to_what_it_claims(seed: int, tmp_path: Path) -> None:
         spec=tmp_path / "chain.toml", files=tmp_path
     )
     states = {name: part.state.value for name, part in proof.scope.items()}
-    assert [states[name] for name in ("chain", "stages", "top", "arithmetic", "filter", "rtlil", "c_model")] == [
-        "proven"
-    ] * 7
+    assert {states[name] for name in ("chain", "stages", "top", "arithmetic", "filter", "c_model")} == {"proven"}
+    assert not proof.missing or any("decimated" in kind for kind in kinds_of(draw(seed)))
     assert proof.bound == pytest.approx(chain.bound, rel=1e-9)
 
 
@@ -88,20 +90,22 @@ def test_gains_to_the_end_are_those_of_responses() -> None:
     """A gain that is claimed is the sum of the magnitudes of what an impulse behind the stage makes at the end."""
     chain = sosmith.design_chain(draw(5))
     whole = np.abs(response(chain)).sum()
-    largest = float(
-        max(abs(port.lsb * code) for port in chain.core.spec.base.inputs for code in (port.lowest, port.highest))
-    )
+    ends = [abs(port.lsb * code) for port in chain.core.spec.base.inputs for code in (port.lowest, port.highest)]
+    largest = float(max(ends))
     assert float(chain.core.stages[-1].reach) == pytest.approx(whole * largest, rel=1e-6)
     assert chain.gains[chain.core.stages[-1].spec.name] == 1
 
 
-def test_the_draws_are_of_all_kinds() -> None:
-    tables = [draw(seed) for seed in SEEDS]
-    kinds = {
+def kinds_of(table: dict[str, Any]) -> set[str]:
+    """Return the kinds of a chain's stages; one with poles behind a decimator, not proven as a whole, apart."""
+    return {
         f"decimated {stage['kind']}" if "decimate" in stage and stage["kind"] == "iir" else stage["kind"]
-        for table in tables
         for stage in table["stage"]
     }
-    assert kinds == set(KINDS)
+
+
+def test_the_draws_are_of_all_kinds() -> None:
+    tables = [draw(seed) for seed in SEEDS]
+    assert {kind for table in tables for kind in kinds_of(table)} == set(KINDS)
     assert {len(table["stage"]) for table in tables} == {2, 3, 4}
     assert {table["channels"] for table in tables} == {1, 3}
