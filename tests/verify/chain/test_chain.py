@@ -147,8 +147,8 @@ def test_a_stage_that_was_changed_is_refused(folder: Path) -> None:
         (".s_axis_tdata(stage_low_tdata)", ".s_axis_tdata(stage_slow_tdata)", r"^s_axis_tdata of rx_out must be the "),
         (
             ".aresetn(aresetn),\n    .s_axis_tdata(stage_low",
-            ".aresetn(aclk),\n    .s_axis_tdata(stage_low",
-            r"^aresetn of ",
+            ".aresetn(s_axis_tvalid),\n    .s_axis_tdata(stage_low",
+            r"^aresetn of rx_out must be that of rx, not s_axis_tvalid$",
         ),
         ("endmodule", "  reg held;\n  always_ff @(posedge aclk) held <= aresetn;\nendmodule", r"alone$"),
         (
