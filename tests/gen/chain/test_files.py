@@ -1,4 +1,4 @@
-"""The files of a chain: the same bytes each time, a C model that computes what the design does, a top without warnings."""
+"""The files of a chain: the same bytes each time, a C model that computes what the design does, a top to lint."""
 
 from __future__ import annotations
 
