@@ -36,7 +36,7 @@ def _stages(design: ChainDesign) -> Table:
             )
         )
     head = ("stage", "what it is", "hardware", "clocks a sample", "bits out")
-    return Table(f"Chain {design.name}", rows, head, numbers=(3, 4))
+    return Table(f"{design.name}: chain", rows, head, numbers=(3, 4))
 
 
 def _budget(design: ChainDesign) -> Table:
