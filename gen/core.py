@@ -9,11 +9,11 @@ from sosmith.gen.architectures.architecture import Architecture
 from sosmith.gen.architectures.blocks import Blocks, blocks_for
 from sosmith.gen.architectures.budget import Budget
 from sosmith.gen.architectures.registry import candidates, fitting, reason_for
+from sosmith.gen.architectures.search import AskedRealization, Response, Search
 from sosmith.gen.calibration.fit import Fit, fit, read_measurements
 from sosmith.gen.filter.design import Filter, design
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.realizations.registry import REALIZATIONS, realizations_for
-from sosmith.gen.search import AskedRealization, Response, Search
 from sosmith.gen.specification.choices import AUTO, CORES, ERROR_FEEDBACK
 from sosmith.gen.specification.combinations import asked_by
 from sosmith.gen.specification.specification import Specification

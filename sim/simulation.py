@@ -88,7 +88,7 @@ def simulate(
     """
     started = time.monotonic()
     check_name(simulator, netlist=gates is not None)
-    with _alone_in(directory):
+    with alone_in(directory):
         for stale in ("report.json", "report.html"):  # of a run of another core, in case this run fails
             (directory / stale).unlink(missing_ok=True)
         facts = facts or core_facts(design)
@@ -174,7 +174,7 @@ def _gate_level(
 
 
 @contextmanager
-def _alone_in(directory: Path) -> Iterator[None]:
+def alone_in(directory: Path) -> Iterator[None]:
     """Lock `directory`, made if missing, so that no second run can mix its files with those of this one."""
     write_files(directory, {})
     handle = os.open(directory, os.O_RDONLY)

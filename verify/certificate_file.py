@@ -14,7 +14,7 @@ import re
 from enum import Enum
 from fractions import Fraction
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer, ValidationError
 from pydantic_core import ErrorDetails
@@ -66,11 +66,13 @@ def _sha256(value: object) -> object:
 Sha256 = Annotated[str, BeforeValidator(_sha256), Field(strict=True)]
 
 
-class _Part(BaseModel):
+class Entry(BaseModel):
+    """A part of a file of claims."""
+
     model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
 
 
-class PortEntry(_Part):
+class PortEntry(Entry):
     """An input or output: physical value = zero + lsb * code."""
 
     name: Text
@@ -109,7 +111,7 @@ class Operation(Enum):
     DELAY = "delay"  # the operand at the previous sample; 0 at reset
 
 
-class NodeEntry(_Part):
+class NodeEntry(Entry):
     """A node of a dataflow graph: its value is its code times ``2**-frac``, and the code stays in low..high.
 
     `operands` are indices of nodes in the same stage. Only a DELAY may refer to a later node.
@@ -125,7 +127,7 @@ class NodeEntry(_Part):
     name: Text = ""
 
 
-class StageEntry(_Part):
+class StageEntry(Entry):
     """A stage of the datapath."""
 
     name: Text
@@ -134,7 +136,7 @@ class StageEntry(_Part):
     outputs: Annotated[tuple[Index, ...], Field(min_length=1)]
 
 
-class SectionEntry(_Part):
+class SectionEntry(Entry):
     """An ideal section: coefficients of powers of ``z**-1``, the constant one first.
 
     Only the first one may have a numerator of more than three: all of that of a sampled filter.
@@ -144,7 +146,7 @@ class SectionEntry(_Part):
     denominator: Annotated[tuple[Rational, ...], Field(min_length=1, max_length=3)]
 
 
-class IdealEntry(_Part):
+class IdealEntry(Entry):
     """The exact calculation that the hardware approximates.
 
     `polynomial` holds the calibration's coefficients in physical units: row i is for the first input to the power i.
@@ -157,7 +159,7 @@ class IdealEntry(_Part):
     start: Literal["steady"] | None = None
 
 
-class BandEntry(_Part):
+class BandEntry(Entry):
     """The largest gain of anything in the band around a multiple of the lower rate, half of it to both sides.
 
     `at` is the frequency at the output, in units of the lower rate, at which hardly less is reached: `gain` is that,
@@ -168,7 +170,7 @@ class BandEntry(_Part):
     at: Rational
 
 
-class DecimationEntry(_Part):
+class DecimationEntry(Entry):
     """A CIC filter before the stages, which hands on every `factor`-th sample.
 
     `stages` integrators and combs of `width` bits; the rounding to nearest behind them drops `dropped` bits. The first
@@ -191,7 +193,7 @@ class DecimationEntry(_Part):
     calibration: CalibrationEntry | None = None
 
 
-class DownsamplingEntry(_Part):
+class DownsamplingEntry(Entry):
     """An FIR filter of which every `factor`-th result leaves, the first one that of the first sample.
 
     That sample goes in `filled` times before it counts.
@@ -201,7 +203,7 @@ class DownsamplingEntry(_Part):
     filled: Annotated[int, Field(strict=True, ge=0, le=1 << 10)]
 
 
-class GainEntry(_Part):
+class GainEntry(Entry):
     """Worst-case peak gains of a section as built: of the whole section, and of its recursion 1/A alone."""
 
     section: Text
@@ -209,7 +211,7 @@ class GainEntry(_Part):
     recursion_gain: Rational
 
 
-class OnlineSectionEntry(_Part):
+class OnlineSectionEntry(Entry):
     """Claims on the units of a section in on-line arithmetic.
 
     The digits of its result have the weights ``2**leading`` and below. A step takes digits that are `delay` places less
@@ -224,7 +226,7 @@ class OnlineSectionEntry(_Part):
     increment: Rational
 
 
-class OnlineEntry(_Part):
+class OnlineEntry(Entry):
     """Claims on sections in on-line arithmetic: `units` of them take turns, each a sample, `interval` clocks apart."""
 
     interval: Annotated[int, Field(strict=True, ge=1, le=_MAX_BITS)]
@@ -232,7 +234,7 @@ class OnlineEntry(_Part):
     sections: tuple[OnlineSectionEntry, ...]
 
 
-class ClaimsEntry(_Part):
+class ClaimsEntry(Entry):
     """Claims, in output LSBs; gains have no unit, and `peak_gain` is that of the ideal filter.
 
     `settling` is the number of samples after a start from zero that are flagged, since another past could change their
@@ -247,7 +249,7 @@ class ClaimsEntry(_Part):
     online: OnlineEntry | None = None
 
 
-class CalibrationEntry(_Part):
+class CalibrationEntry(Entry):
     """A datapath that computes the ideal polynomial of the inputs for a decimator, which takes its `output`.
 
     It limits nothing: its output holds the result for all inputs. Its claims are in LSBs of its output.
@@ -258,14 +260,14 @@ class CalibrationEntry(_Part):
     claims: ClaimsEntry
 
 
-class FileEntry(_Part):
+class FileEntry(Entry):
     """A file by its name, without a folder, and the SHA-256 of its bytes."""
 
     name: Text
     sha256: Sha256
 
 
-class FieldEntry(_Part):
+class FieldEntry(Entry):
     """A quantity in a stream: its lowest bit in ``tdata``, its bits, and what a code means."""
 
     name: Text
@@ -276,7 +278,7 @@ class FieldEntry(_Part):
     zero: Rational
 
 
-class StreamEntry(_Part):
+class StreamEntry(Entry):
     """A stream: the widths of ``tdata``, ``tdest`` and ``tuser`` in bits, 0 if there is none, and the fields."""
 
     width: Annotated[int, Field(strict=True, ge=8, le=1 << 12)]
@@ -291,7 +293,7 @@ _Codes = tuple[_Code, _Code]
 _Count = Annotated[int, Field(strict=True, ge=1, le=1 << 12)]
 
 
-class ItemEntry(_Part):
+class ItemEntry(Entry):
     """What the item is: everything that decides which proof its hardware needs, and that a user connects it by.
 
     `ahead` is the architecture of the calibration before a decimator, `samples` the number of samples of a beat, `hold`
@@ -321,7 +323,7 @@ class ItemEntry(_Part):
     given: StreamEntry
 
 
-class AboutEntry(_Part):
+class AboutEntry(Entry):
     """What the certificate is about.
 
     `specification` is the whole text of the specification, TOML, `sha256` that of its UTF-8 bytes, and `options` holds
@@ -341,7 +343,7 @@ class AboutEntry(_Part):
     certificate: Sha256
 
 
-class Certificate(_Part):
+class Certificate(Entry):
     """A whole certificate; `max_error` is in the unit of the output, and `about` is None without files."""
 
     format: Literal["sosmith certificate 2"]
@@ -368,8 +370,12 @@ def sealed(certificate: Certificate) -> Certificate:
 
 def certificate_text(certificate: Certificate) -> str:
     """JSON text with one node per line, identical on every run."""
-    tree = certificate.model_dump(mode="json", exclude_defaults=True)
-    return _layout(tree, "") + "\n"
+    return entries_text(certificate)
+
+
+def entries_text(entries: Entry) -> str:
+    """JSON text of a file of claims, each of the innermost lists and objects in a line."""
+    return _layout(entries.model_dump(mode="json", exclude_defaults=True), "") + "\n"
 
 
 def _layout(tree: Any, indent: str) -> str:
@@ -392,6 +398,20 @@ def read_certificate(path: Path) -> Certificate:
     SpecificationError
         If the file cannot be read or is no certificate.
     """
+    return read_entries(path, Certificate)
+
+
+Entries = TypeVar("Entries", bound=Entry)
+
+
+def read_entries(path: Path, kind: type[Entries]) -> Entries:
+    """Read a file of claims of a kind and check its form.
+
+    Raises
+    ------
+    SpecificationError
+        If the file cannot be read or is no certificate.
+    """
     try:
         text = read_given(path, _MAX_BYTES).decode("utf-8")
     except (OSError, UnicodeDecodeError) as error:
@@ -405,7 +425,7 @@ def read_certificate(path: Path) -> Certificate:
             parse_float=_refused,
             parse_constant=_refused,
         )
-        return Certificate.model_validate(tree)
+        return kind.model_validate(tree)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         place = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in first["loc"]).lstrip(".")

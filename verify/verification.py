@@ -1,7 +1,7 @@
 """Proves a certificate again by a different method, using only the certificate itself.
 
 1. Every graph must be well formed, and every range must follow from earlier ranges (`sosmith.verify.graph`).
-2. The polynomial and the output rounding are followed symbolically (`sosmith.verify.polynomial`).
+2. The polynomial and the output rounding are followed symbolically (`sosmith.verify.bounds.polynomial`).
 3. The sections' transfer functions are computed as determinants, and the Schur-Cohn recursion decides stability. A
    section may have several inputs and outputs; the cascade has one of each. A stage that starts a filter from its
    first sample is followed symbolically (`sosmith.verify.start`).
@@ -34,12 +34,12 @@ from flint import fmpq_poly
 from sosmith.verify.bounds.driven_responses import Denominator, Driven, deviation, extremes, magnitude, rational
 from sosmith.verify.bounds.l1_response import UndecidedError, fraction, is_stable
 from sosmith.verify.bounds.largest_gain import check_bands
+from sosmith.verify.bounds.polynomial import output_error, polynomial_error
 from sosmith.verify.bounds.settling import check_fading, without_counter
 from sosmith.verify.certificate_file import Certificate, Operation, StageEntry, on_grid
 from sosmith.verify.decimation import at_lower_rate, calibration_alone, rounding
 from sosmith.verify.graph import RejectedError, Transfer, check_graph, inputs_of, label, require
 from sosmith.verify.online import check_online
-from sosmith.verify.polynomial import output_error, polynomial_error
 from sosmith.verify.start import Start, check_start, section_alone
 
 Progress = Callable[[str, int, int], None]

@@ -15,7 +15,7 @@ bound is halved again and again, until no bound exceeds the largest gain found b
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
@@ -56,15 +56,22 @@ class Peak:
 
 
 @dataclass(frozen=True)
-class _Factor:
+class Factor:
     """Of a factor of the gain on an interval: itself in the middle and everywhere, and its logarithmic derivative."""
 
     middle: arb
     everywhere: arb
     slope: arb
 
-    def times(self, other: _Factor) -> _Factor:
-        return _Factor(self.middle * other.middle, self.everywhere * other.everywhere, self.slope + other.slope)
+    def times(self, other: Factor) -> Factor:
+        """Return the product of two factors on the same interval."""
+        return Factor(self.middle * other.middle, self.everywhere * other.everywhere, self.slope + other.slope)
+
+    def bound(self, length: Fraction) -> arb:
+        """Bound the gain on an interval of this length from above; infinite where nothing is known of it."""
+        steep = self.middle * (abs(self.slope) * ball(length / 2)).exp()
+        bounds = [bound.upper() for bound in (self.everywhere, steep) if bound.is_finite()]
+        return min(bounds, default=arb("inf"))
 
 
 class LargestGain:
@@ -82,7 +89,7 @@ class LargestGain:
         self._sections = sections
         self._factor = factor
         self._stages = stages
-        self._known: dict[tuple[Fraction, Fraction], _Factor] = {}
+        self._known: dict[tuple[Fraction, Fraction], Factor] = {}
 
     def of_band(self, band: int) -> Peak:
         """Bound the gain from the multiple `band` of the filter's rate, half the rate to both sides of it.
@@ -105,33 +112,47 @@ class LargestGain:
         At the present precision of FLINT, from a band or of the filter alone.
         """
         factor = self._on(low, high, band)
-        return factor.middle, _bound(factor, high - low)
+        return factor.middle, factor.bound(high - low)
 
     def _largest(self, low: Fraction, high: Fraction, band: int | None) -> Peak:
-        with ctx.workprec(_PRECISION):
-            at, best = low, arb(0)
-            open_: list[tuple[float, Fraction, Fraction, arb]] = [(-math.inf, low, high, arb("inf"))]
-            while True:
-                _, start, end, most = heappop(open_)
-                if most <= best * ball(1 + TOLERANCE):
-                    break
-                middle = (start + end) / 2
-                for one, other in ((start, middle), (middle, end)):
-                    reached, bound = self.on_interval(one, other, band)
-                    if reached.lower() > best:
-                        at, best = (one + other) / 2, reached.lower()
-                    heappush(open_, (-float(bound), one, other, bound))
+        return largest(lambda one, other: self._on(one, other, band), [(low, high)])
 
-        def gain() -> Fraction:
-            return nearest_multiple(self._on(at, at, band).middle * ball(1 + TOLERANCE), _GAIN_BITS)
-
-        return Peak(at=at, gain=evaluate(gain) + Fraction(1, 1 << _GAIN_BITS))
-
-    def _on(self, low: Fraction, high: Fraction, band: int | None) -> _Factor:
+    def _on(self, low: Fraction, high: Fraction, band: int | None) -> Factor:
         filter_ = self._known.get((low, high)) if low < high else None
         if filter_ is None:
-            filter_ = self._known[low, high] = _filter(self._sections, low, high)
+            filter_ = self._known[low, high] = gain_of_sections(self._sections, low, high)
         return filter_ if band is None else _cic(self._factor, self._stages, band, low, high).times(filter_)
+
+
+def largest(gain_on: Callable[[Fraction, Fraction], Factor], bands: Sequence[tuple[Fraction, Fraction]]) -> Peak:
+    """Bound the largest gain on any of some intervals, at least one, by branch and bound.
+
+    Parameters
+    ----------
+    gain_on : callable
+        Says what is known of the gain on an interval, at the present precision of FLINT.
+    bands : sequence of (Fraction, Fraction)
+        The intervals.
+    """
+    with ctx.workprec(_PRECISION):
+        at, best = bands[0][0], arb(0)
+        open_: list[tuple[float, Fraction, Fraction, arb]] = [(-math.inf, *band, arb("inf")) for band in bands]
+        while True:
+            _, start, end, most = heappop(open_)
+            if most <= best * ball(1 + TOLERANCE):
+                break
+            middle = (start + end) / 2
+            for one, other in ((start, middle), (middle, end)):
+                factor = gain_on(one, other)
+                reached, bound = factor.middle, factor.bound(other - one)
+                if reached.lower() > best:
+                    at, best = (one + other) / 2, reached.lower()
+                heappush(open_, (-float(bound), one, other, bound))
+
+    def gain() -> Fraction:
+        return nearest_multiple(gain_on(at, at).middle * ball(1 + TOLERANCE), _GAIN_BITS)
+
+    return Peak(at=at, gain=evaluate(gain) + Fraction(1, 1 << _GAIN_BITS))
 
 
 @lru_cache(maxsize=16)
@@ -150,35 +171,28 @@ def passband_gains(
     return tuple(gains.into_passband(band, edge) for band in range(1, bands + 1))
 
 
-def _bound(factor: _Factor, length: Fraction) -> arb:
-    """Bound a gain on an interval from above; infinite where nothing is known of it."""
-    steep = factor.middle * (abs(factor.slope) * ball(length / 2)).exp()
-    bounds = [bound.upper() for bound in (factor.everywhere, steep) if bound.is_finite()]
-    return min(bounds, default=arb("inf"))
-
-
 def _between(low: Fraction, high: Fraction) -> arb:
     return ball(low).union(ball(high))
 
 
-def _cic(factor: int, stages: int, band: int, low: Fraction, high: Fraction) -> _Factor:
+def _cic(factor: int, stages: int, band: int, low: Fraction, high: Fraction) -> Factor:
     """Gain of the CIC filter at `band` less a frequency in an interval."""
     middle, p = ball((low + high) / 2), _between(low, high)
     slope = stages * arb.pi() * (p.cot_pi() + ((band - p) / factor).cot_pi() / factor)
     gains = [(q.sin_pi() / (factor * ((band - q) / factor).sin_pi())) ** stages for q in (middle, p)]
-    return _Factor(gains[0], gains[1], slope)
+    return Factor(gains[0], gains[1], slope)
 
 
-def _filter(sections: Sequence[Exact], low: Fraction, high: Fraction) -> _Factor:
+def gain_of_sections(sections: Sequence[Exact], low: Fraction, high: Fraction) -> Factor:
     """Gain of sections on an interval of frequencies, of which ``d ln |B| / dp = 2 pi Im(u B'(u) / B(u))``."""
     u, everywhere = (acb(-2 * q).exp_pi_i() for q in (ball((low + high) / 2), _between(low, high)))
-    product = _Factor(arb(1), arb(1), arb(0))
+    product = Factor(arb(1), arb(1), arb(0))
     for numerator, denominator in sections:
         for taps, power in ((numerator, 1), (denominator, -1)):
             b = [ball(tap) for tap in taps]
             value = _horner(b, everywhere)
             slope = 2 * arb.pi() * (everywhere * _horner([k * c for k, c in enumerate(b)][1:], everywhere) / value).imag
-            product = product.times(_Factor(abs(_horner(b, u)) ** power, abs(value) ** power, power * slope))
+            product = product.times(Factor(abs(_horner(b, u)) ** power, abs(value) ** power, power * slope))
     return product
 
 

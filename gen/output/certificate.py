@@ -101,8 +101,8 @@ def certificate(
         format=FORMAT,
         name=datapath.name,
         about=about,
-        inputs=tuple(_port(port) for port in datapath.inputs),
-        output=_port(datapath.output),
+        inputs=tuple(port_entry(port) for port in datapath.inputs),
+        output=port_entry(datapath.output),
         max_error=max_error,
         ideal=IdealEntry(
             polynomial=None if quantized.polynomial is None else quantized.polynomial.coefficients,
@@ -143,7 +143,7 @@ def _downsampling(quantized: Quantized) -> DownsamplingEntry | None:
 def _calibration(quantized: Quantized) -> CalibrationEntry:
     datapath = quantized.datapath
     return CalibrationEntry(
-        output=_port(datapath.output),
+        output=port_entry(datapath.output),
         stages=tuple(_stage(stage) for stage in datapath.stages),
         claims=_claims(quantized, ()),
     )
@@ -244,7 +244,8 @@ def _bytes_of(path: Path) -> bytes:
         raise SpecificationError(f"{path}: the measurements must be a readable file, not: {error.strerror}") from None
 
 
-def _port(port: Port) -> PortEntry:
+def port_entry(port: Port) -> PortEntry:
+    """Return a port as an entry of a certificate."""
     return PortEntry(name=port.name, bits=port.bits, signed=port.signed, lsb=port.lsb, zero=port.zero, unit=port.unit)
 
 

@@ -20,7 +20,7 @@ def manifest(facts: CoreFacts) -> dict[str, Any]:
         "sosmith_version": __version__,
         "spec": facts.spec,
         "channels": facts.channels,
-        "streams": {"s_axis": _stream(interface.inputs), "m_axis": _stream(interface.outputs)},
+        "streams": {"s_axis": stream_entry(interface.inputs), "m_axis": stream_entry(interface.outputs)},
         "wear": None if facts.wear is None else [_entry(limits) for limits in facts.wear],
         "reset_cycles": interface.reset_cycles,
         "latency_cycles": interface.latency_cycles,
@@ -65,7 +65,8 @@ def _entry(facts: Any) -> dict[str, Any]:
     return {name: list(value) if isinstance(value, tuple) else value for name, value in asdict(facts).items()}
 
 
-def _stream(stream: StreamFacts) -> dict[str, Any]:
+def stream_entry(stream: StreamFacts) -> dict[str, Any]:
+    """Return a stream as JSON values."""
     dest = {"tdest": {"width": stream.dest_width}} if stream.dest_width else {}
     user = {"tuser": {"width": stream.user_width, "flags": dict(stream.flags)}} if stream.flags else {}
     several = {"samples": stream.lanes, "sample_width": stream.sample_width} if stream.lanes > 1 else {}

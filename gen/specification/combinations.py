@@ -244,6 +244,23 @@ ONLINE = Terms(
 TERMS = {terms.name: terms for terms in (PARALLEL, FOLDED, SERIAL, ONLINE)}
 """All architectures by name; `sosmith.gen.architectures.registry` has a class for each."""
 
+_OF_ONE_CORE = "the bound of a chain holds for constants that stay, and registers are those of one core"
+CHAIN = Terms(
+    "chain",
+    {
+        RELOAD: Refusal(Verdict.LATER, _OF_ONE_CORE),
+        PROTECT: Refusal(
+            Verdict.LATER, "a fault is a flag of a stage's own results, which the next stage does not hand on"
+        ),
+        SEVERAL: Refusal(Verdict.LATER, "a stage behind one that decimates has no beats of several samples"),
+        LOOK_AHEAD: Refusal(Verdict.LATER, "a chain has no rule yet for which of its stages need it"),
+        ZERO: Refusal(
+            Verdict.LATER, "the flag settling is of a stage's own results, which the next stage does not hand on"
+        ),
+    },
+)
+"""What a chain of stages takes: what its stages take by themselves, but for these options."""
+
 _APART: dict[tuple[Option, Option], Refusal] = {
     (FIR, LOOK_AHEAD): Refusal(Verdict.NO_USE, "it has no recursion, and registers between its sums without that"),
     **dict.fromkeys(((DECIMATE, each) for each in (RELOAD, PROTECT, ZERO)), LATER),
@@ -289,6 +306,19 @@ def check_combinations(spec: Specified) -> None:
     for (kept, other), refusal in (_APART | ({} if terms is None else dict(terms.apart))).items():
         if kept in asked and other in asked:
             raise _unfit(refusal, other.without, kept.phrase(spec), other.key, literal(other.of(spec)))
+
+
+def check_chain(spec: Specified) -> None:
+    """Check that a chain takes what its specification asks for.
+
+    Raises
+    ------
+    UnfitError
+        For the first option that it does not take.
+    """
+    for option in asked_by(spec):
+        if (refusal := CHAIN.lacks.get(option)) is not None:
+            raise _unfit(refusal, option.without, "[[stage]]", option.key, literal(option.of(spec)))
 
 
 def _without_option(spec: Specified, terms: Terms, option: Option, refusal: Refusal) -> UnfitError:
@@ -338,7 +368,9 @@ def combinations() -> tuple[Combination, ...]:
     After them, what a single architecture does not take together.
     """
     with_architecture = [
-        _combination(terms.name, option, terms.lacks.get(option)) for terms in TERMS.values() for option in OPTIONS
+        _combination(terms.name, option, terms.lacks.get(option))
+        for terms in (*TERMS.values(), CHAIN)
+        for option in OPTIONS
     ]
     of_options = [
         _combination(one.name, other, _APART.get((one, other)) or _APART.get((other, one)))

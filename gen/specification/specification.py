@@ -15,7 +15,7 @@ from sosmith.gen.specification.choices import CALIBRATION_INPUTS, FIR, FIR_FAMIL
 from sosmith.gen.specification.converters import ConverterSpec, converters, dac
 from sosmith.gen.specification.toml_text import toml_text
 from sosmith.gen.specification.uncertainty import CoefficientsSpec, UncertaintySpec
-from sosmith.gen.specification.values import UnfitError
+from sosmith.gen.specification.values import UnfitError, literal
 from sosmith.gen.specification.wear_limits import WearSpec
 from sosmith.model.converters.dac_writing import Writing
 from sosmith.model.errors import SpecificationError
@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 
 MAX_BYTES = 1 << 16
 """Maximum size of a specification in bytes; typical ones have one or two thousand."""
+
+STAGE = "stage"
+"""Key of the stages of a chain, whose specification is of another shape: `sosmith.gen.chain.specification`."""
 
 SECTIONS = "sections"
 """Default family, kind and method of a filter that is given by its sections."""
@@ -219,15 +222,37 @@ def load(path: Path) -> Specification:
         For all errors, in a sentence each: the file, the path of the key or the line, what was expected and what
         was found. Rules about several keys are checked once each key is right, and one of a subject is reported.
     """
-    return from_text(read_text(path, what="the specification", max_bytes=MAX_BYTES), path)
+    return from_text(text_of(path), path)
 
 
 def from_text(text: str, path: Path) -> Specification:
     """Check the specification with the TOML `text`; path and errors as for `from_tree`."""
+    return replace(from_tree(parsed(text, path), path), text=text)
+
+
+def parsed(text: str, path: Path) -> dict[str, Any]:
+    """Return the tree of the TOML `text`, with every float as `decimal.Decimal`.
+
+    Raises
+    ------
+    SpecificationError
+        If it is not TOML, or empty.
+    """
     tree = parse_toml(text, str(path), what="the specification", parse_float=Decimal)
     if not tree:
         raise SpecificationError(f"{path}: the specification must have keys, not be empty")
-    return replace(from_tree(tree, path), text=text)
+    return tree
+
+
+def text_of(path: Path) -> str:
+    """Return the text of a specification file.
+
+    Raises
+    ------
+    SpecificationError
+        If it cannot be read.
+    """
+    return read_text(path, what="the specification", max_bytes=MAX_BYTES)
 
 
 def from_tree(tree: dict[str, Any], path: Path) -> Specification:
@@ -250,6 +275,13 @@ def from_tree(tree: dict[str, Any], path: Path) -> Specification:
     from sosmith.gen.specification.schema import parse
 
     try:
+        if STAGE in tree:
+            raise UnfitError(
+                "left out here, as a chain is for design, generate, simulate and verify alone",
+                literal(tree[STAGE]),
+                where=STAGE,
+                later=True,
+            )
         document = parse(tree)
         check(document)
         return _specification(path, tree, document)
@@ -273,7 +305,7 @@ def _specification(path: Path, tree: dict[str, Any], document: Document) -> Spec
     )
     return Specification(
         path=path,
-        source={key: _to_json(value) for key, value in tree.items()},
+        source={key: to_json(value) for key, value in tree.items()},
         text=toml_text(tree),
         name=document.name,
         sample_rate=document.sample_rate,
@@ -305,13 +337,13 @@ def _specification(path: Path, tree: dict[str, Any], document: Document) -> Spec
     )
 
 
-def _to_json(value: Any) -> Any:
-    """Return `value` in the types of JSON."""
+def to_json(value: Any) -> Any:
+    """Return a value of a specification in the types of JSON."""
     match value:
         case dict():
-            return {key: _to_json(item) for key, item in value.items()}
+            return {key: to_json(item) for key, item in value.items()}
         case list():
-            return [_to_json(item) for item in value]
+            return [to_json(item) for item in value]
         case Decimal():
             return float(value)
         case _:

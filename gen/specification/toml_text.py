@@ -16,8 +16,8 @@ def toml_text(tree: Mapping[str, Any]) -> str:
     Parameters
     ----------
     tree : mapping of str
-        Texts, numbers (`Decimal` ones exactly), bools, lists of these, and mappings, which become tables. Empty
-        mappings are left out.
+        Texts, numbers (`Decimal` ones exactly), bools, lists of these, mappings, which become tables, and lists of
+        mappings. Empty mappings are left out.
 
     Examples
     --------
@@ -32,13 +32,28 @@ def toml_text(tree: Mapping[str, Any]) -> str:
 
 def _tables(tree: Mapping[str, Any], path: tuple[str, ...]) -> list[str]:
     """Return the texts of a table and of its nested tables."""
-    lines = [f"{key_text(key)} = {_value(value)}\n" for key, value in tree.items() if not isinstance(value, Mapping)]
-    header = [f"[{'.'.join(map(key_text, path))}]\n"] if path and lines else []
+    plain = {key: value for key, value in tree.items() if not isinstance(value, Mapping) and not _is_list(value)}
+    lines = [f"{key_text(key)} = {_value(value)}\n" for key, value in plain.items()]
+    header = [f"{_header(path)}\n"] if path and lines else []
     texts = ["".join(header + lines)] if lines else []
     for key, value in tree.items():
         if isinstance(value, Mapping):
             texts += _tables(value, (*path, key))
+        elif _is_list(value):
+            for table in value:
+                first, *others = _tables(table, (*path, key))
+                texts += [first.replace(_header((*path, key)), f"[{_header((*path, key))}]", 1), *others]
     return texts
+
+
+def _is_list(value: Any) -> bool:
+    """Whether it is a list of tables."""
+    return isinstance(value, list | tuple) and bool(value) and all(isinstance(item, Mapping) for item in value)
+
+
+def _header(path: tuple[str, ...]) -> str:
+    """Return the line before a table."""
+    return f"[{'.'.join(map(key_text, path))}]"
 
 
 def _value(value: Any) -> str:

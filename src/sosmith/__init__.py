@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     from sosmith.interface.build import Build
     from sosmith.interface.calibration import Calibration
     from sosmith.interface.certificate import Certificate, Proof
+    from sosmith.interface.chain.certificate import ChainCertificate, ChainProof
+    from sosmith.interface.chain.design import Chain, design_chain
+    from sosmith.interface.chain.report import ChainReport
+    from sosmith.interface.chain.specification import ChainSpecification
     from sosmith.interface.coefficients import Coefficients
     from sosmith.interface.comparison import Comparison, compare
     from sosmith.interface.design import Coefficient, Design, Section, design
@@ -47,6 +51,11 @@ __all__ = [
     "Build",
     "Calibration",
     "Certificate",
+    "Chain",
+    "ChainCertificate",
+    "ChainProof",
+    "ChainReport",
+    "ChainSpecification",
     "Coefficient",
     "Coefficients",
     "Comparison",
@@ -76,6 +85,7 @@ __all__ = [
     "__version__",
     "compare",
     "design",
+    "design_chain",
     "explore",
 ]
 
@@ -85,6 +95,10 @@ _MODULES = {
     "interface.build": ("Build",),
     "interface.calibration": ("Calibration",),
     "interface.certificate": ("Certificate", "Proof"),
+    "interface.chain.certificate": ("ChainCertificate", "ChainProof"),
+    "interface.chain.design": ("Chain", "design_chain"),
+    "interface.chain.report": ("ChainReport",),
+    "interface.chain.specification": ("ChainSpecification",),
     "interface.coefficients": ("Coefficients",),
     "interface.comparison": ("Comparison", "compare"),
     "interface.design": ("Coefficient", "Design", "Section", "design"),

@@ -279,7 +279,9 @@ def test_a_wrong_recursion_exceeds_its_bound(monkeypatch: pytest.MonkeyPatch) ->
     """With A(w) in place of A(-w), it is another filter, which no word lengths bring within the error allowed."""
     wrong = broken(realization, "{1 << k: -first, 2 << k: second}", "{1 << k: first, 2 << k: second}")
     monkeypatch.setattr(realization, "polynomials", wrong.polynomials)
-    monkeypatch.setattr("sosmith.gen.search.LOOK_AHEAD", {2: LOOK_AHEAD[2]})  # others take longer to fail the same way
+    monkeypatch.setattr(
+        "sosmith.gen.architectures.search.LOOK_AHEAD", {2: LOOK_AHEAD[2]}
+    )  # others take longer to fail the same way
     with pytest.raises(ShortfallError, match=r"^the filter's coefficients must keep their error below "):
         design_core(from_text(text(), Path("audio.toml")))
 

@@ -27,7 +27,7 @@ from sosmith.verify.specified.ideal_filter import stated_filter
 from sosmith.verify.specified.sections_file import sections_in, taps_in
 from sosmith.verify.specified.words import words_of
 
-_CALIBRATED = {"voltage": "V", "temperature": "degC"}
+CALIBRATED = {"voltage": "V", "temperature": "degC"}
 """Inputs of a calibration, in the order of the ports, and their units."""
 
 _START = "steady"
@@ -94,10 +94,10 @@ def _checked(certificate: Certificate, tree: Mapping[str, Any], margin: Fraction
     calibration: Mapping[str, Any] | None = tree.get("calibration")
     _equal("the name", certificate.name, tree["name"])
     unit = tree["output"].get("unit", "")
-    output = _port("y" if calibration is None else "clearance", tree["output"], unit)
+    output = stated_port("y" if calibration is None else "clearance", tree["output"], unit)
     inputs = [
-        _port(name, tree["input"][name], unit if calibration is None else _CALIBRATED[name])
-        for name in (tree["input"] if calibration is None else _CALIBRATED)
+        stated_port(name, tree["input"][name], unit if calibration is None else CALIBRATED[name])
+        for name in (tree["input"] if calibration is None else CALIBRATED)
     ]
     if core == "filter" and calibration is not None:  # the filter alone takes what the calibration would give it
         inputs = [output.model_copy(update={"name": f"{output.name}_in"})]
@@ -106,7 +106,7 @@ def _checked(certificate: Certificate, tree: Mapping[str, Any], margin: Fraction
         for key in PortEntry.model_fields:
             _equal(f"{key} of {stated.name}", getattr(proven, key), getattr(stated, key))
     allowed = tree["output"].get("max_error", "faithful")
-    _equal("max_error", certificate.max_error, output.lsb if allowed == "faithful" else _number(allowed))
+    _equal("max_error", certificate.max_error, output.lsb if allowed == "faithful" else stated_number(allowed))
     fitted = False
     if polynomial is not None:
         if calibration is None:
@@ -132,7 +132,7 @@ def _filter_distance(
     certificate: Certificate, tree: Mapping[str, Any], margin: Fraction, folder: Path
 ) -> Fraction | None:
     """Return how far the filter is from the specified one; None if it has to keep to losses only, and does."""
-    table, rate = dict(tree["filter"]), _number(tree["sample_rate"])
+    table, rate = dict(tree["filter"]), stated_number(tree["sample_rate"])
     decimates, entry = table.pop("decimate", None), certificate.decimation
     table.pop("hold", None)  # how often a result leaves, which changes none
     correction = Fraction(0)
@@ -140,7 +140,7 @@ def _filter_distance(
         lowers = entry or certificate.downsampling
         _equal("the factor of the decimator", 1 if lowers is None else lowers.factor, decimates or 1)
     if entry is not None:
-        _equal("the edge of the pass band", entry.edge, _number(table["cutoff"]) / rate)
+        _equal("the edge of the pass band", entry.edge, stated_number(table["cutoff"]) / rate)
         rate, correction = rate / entry.factor, entry.correction
     if "sos_file" in table:
         table["sos"] = sections_in(folder / table.pop("sos_file"))
@@ -190,12 +190,13 @@ def _check_digits(proven: Sequence[SectionEntry], exact: Sequence[SectionEntry])
 def _check_polynomial(proven: Sequence[Sequence[Fraction]], stated: Sequence[Sequence[Any]]) -> None:
     for i, (row, words) in enumerate(zip_longest(proven, stated, fillvalue=())):
         for j, (value, word) in enumerate(zip_longest(row, words, fillvalue=0)):
-            _equal(f"coefficient [{i}][{j}] of the calibration", value, _number(word))
+            _equal(f"coefficient [{i}][{j}] of the calibration", value, stated_number(word))
 
 
-def _port(name: str, table: Mapping[str, Any], unit: str) -> PortEntry:
+def stated_port(name: str, table: Mapping[str, Any], unit: str) -> PortEntry:
+    """Return a port from the words of its table."""
     bits, signed = table["bits"], table.get("signed", False)
-    low, high = map(_number, table["range"])
+    low, high = map(stated_number, table["range"])
     return PortEntry(
         name=name,
         bits=bits,
@@ -206,7 +207,8 @@ def _port(name: str, table: Mapping[str, Any], unit: str) -> PortEntry:
     )
 
 
-def _number(word: Any) -> Fraction:
+def stated_number(word: Any) -> Fraction:
+    """Return a number as it is written."""
     if isinstance(word, bool) or not isinstance(word, int | Decimal):
         raise TypeError(f"{word!r} must be a number")
     return Fraction(word)

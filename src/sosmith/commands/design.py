@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from sosmith.commands.chain import refuse, show_chain, write_chain
 from sosmith.commands.options import BOARD, CORE, REALIZATION, SPEC, WIDTHS_OF, print_tables
 from sosmith.interface.choices import BUILDABLE, picture_format
 from sosmith.interface.files import DEFAULT, contents, default_folder, titles, write_contents
@@ -86,11 +87,15 @@ def design_command(
         sosmith design my.toml --details --plot my.svg
         sosmith design my.toml --board icebreaker --json
     """
-    from sosmith.interface.specification import Specification
+    from sosmith.interface.chain.specification import ChainSpecification, specification_in
 
     if plot is not None:
         picture_format(plot)
-    asked = Specification.load(spec)
+    asked = specification_in(spec)
+    if isinstance(asked, ChainSpecification):
+        refuse(core=core, realization=realization, widths_of=widths_of)
+        show_chain(asked, board, plot, details=details, as_json=as_json)
+        return
     if asked.checked.filter.origin:
         note(asked.checked.filter.origin)
     with show_progress() as step:
@@ -131,14 +136,19 @@ def generate_command(
 ) -> None:
     """Write SystemVerilog, RTLIL, a manifest, a certificate and a bit-true C model for SPEC.
 
-    Prints the paths of the files to stdout, one per line. Two runs write identical files.
+    Prints the paths of the files to stdout, one per line. Two runs write identical files. A chain of stages has the
+    files of each stage as well.
 
     \b
         sosmith generate my.toml -o my_core
     """
-    from sosmith.interface.specification import Specification
+    from sosmith.interface.chain.specification import ChainSpecification, specification_in
 
-    asked = Specification.load(spec)
+    asked = specification_in(spec)
+    if isinstance(asked, ChainSpecification):
+        refuse(core=core, realization=realization, widths_of=widths_of)
+        write_chain(asked, board, output)
+        return
     with show_progress() as step:
         from sosmith.interface.design import design
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from sosmith.commands.chain import refuse, run_chain
 from sosmith.commands.options import (
     BAUD,
     BOARD,
@@ -187,7 +188,7 @@ def simulate_command(
         sosmith simulate my.toml --trace worst_case --simulator icarus -o build/worst
         sosmith simulate my.toml --port /dev/ttyUSB1
     """
-    from sosmith.interface.specification import Specification
+    from sosmith.interface.chain.specification import ChainSpecification, specification_in
 
     check_simulator(simulator, gates=gates is not None)
     if vectors is not None:
@@ -197,7 +198,25 @@ def simulate_command(
     if port is not None and (gates is not None or waves):
         raise SpecificationError("--port must come without --gates and --waves, which need a simulator")
     netlist_for = None if gates is None else board_named(gates, MODELLED)
-    asked = Specification.load(spec)
+    asked = specification_in(spec)
+    if isinstance(asked, ChainSpecification):
+        refuse(
+            core=core, realization=realization, widths_of=widths_of, gates=gates, port=port, vectors=vectors, date=date
+        )
+        passed = run_chain(
+            asked,
+            board,
+            source,
+            as_json=as_json,
+            output=output,
+            seconds=seconds,
+            simulator=simulator,
+            seed=seed,
+            idle=idle,
+            stall=stall,
+            waves=waves,
+        )
+        sys.exit(0 if passed else 1)
     if source is not None and not _is_file(source):
         check_scenario(source, _kind(asked, core))
     with show_progress() as step:

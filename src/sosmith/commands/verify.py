@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from sosmith.commands.chain import prove_chain, refuse
 from sosmith.terminal import JSON_OPTION, print_json, show_progress
 
 _NOT_ALL = 4
@@ -82,19 +83,26 @@ def verify(
     follow exactly, or anything that it is held against disagrees, and with 4 if nothing is wrong but a part of what was
     asked for is not proven: the table says which, and why.
 
+    The certificate of a chain names those of its stages, which lie beside it and are proven with it.
+
     \b
         sosmith verify my_core/my.certificate.json
         sosmith verify my_core/my.certificate.json --spec my.toml --files my_core --rebuild
         sosmith verify my_core/my.certificate.json --rocq --export my_core/rocq
         sosmith verify my_core/my.certificate.json --files my_core --smt my_core/goals
     """
-    from sosmith.interface.certificate import Certificate
+    from sosmith.interface.chain.certificate import ChainCertificate, certificate_in
     from sosmith.model.errors import ShortfallError
 
     if smt is not None and files is None:
         raise click.UsageError("--smt must have --files, the folder with the SystemVerilog")
-    read = Certificate.load(certificate)
+    read = certificate_in(certificate)
     limit = {} if time_limit is None else {"seconds": time_limit}
+    if isinstance(read, ChainCertificate):
+        refuse(rebuild=rebuild, core=core, second_reader=second_reader, rocq=rocq, export=export, smt=smt)
+        if not prove_chain(read, certificate, spec=spec, files=files, limit=limit, as_json=as_json) and not partial:
+            click.get_current_context().exit(_NOT_ALL)
+        return
     with show_progress() as step:
         try:
             proof = read.verify(

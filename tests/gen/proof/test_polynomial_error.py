@@ -16,9 +16,9 @@ from sosmith.gen.output.certificate import certificate
 from sosmith.gen.proof.polynomial_error import horner_error, rounded
 from sosmith.gen.word_lengths.input_stage import normalised
 from sosmith.model.sections.horner import HornerPolynomial, Variable
+from sosmith.verify.bounds.polynomial import polynomial_error
 from sosmith.verify.certificate_file import Certificate, certificate_text
 from sosmith.verify.graph import RejectedError
-from sosmith.verify.polynomial import polynomial_error
 from sosmith.verify.verification import verify
 
 SHARE = Fraction(45, 100)

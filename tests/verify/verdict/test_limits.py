@@ -9,11 +9,11 @@ from typing import Any
 
 import pytest
 
+from sosmith.verify.bounds.polynomial import _Value
 from sosmith.verify.c_model import forms as c_forms
 from sosmith.verify.graph import RejectedError
 from sosmith.verify.parallel import forms as parallel_forms
 from sosmith.verify.parallel.forms import Forms
-from sosmith.verify.polynomial import _Value
 from sosmith.verify.program import normal_form
 from sosmith.verify.reader.gates import Gates
 from sosmith.verify.verdict.limits import limited

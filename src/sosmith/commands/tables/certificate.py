@@ -6,6 +6,7 @@ from rich.markup import escape
 
 from sosmith.commands.tables.console import TableConsole, plain, print_all
 from sosmith.interface.certificate import Agreement, Entries, HardwareVerdict, ProgramVerdict, Proof
+from sosmith.interface.chain.certificate import ChainProof
 
 
 def print_proof(certificate: Entries, proof: Proof) -> None:
@@ -56,12 +57,22 @@ def print_proof(certificate: Entries, proof: Proof) -> None:
     _print_scope(console, proof)
 
 
+def print_chain_proof(name: str, proof: ChainProof) -> None:
+    """Print the proven error budget of a chain, and how much of each part is proven."""
+    console = TableConsole()
+    print_all(proof.tables())
+    console.print(f"[bold green]proven[/]: {escape(plain(name))}, from end to end")
+    if proof.files:
+        console.print(f"[bold green]unchanged[/]: {proof.files} files and the certificates, by their SHA-256")
+    _print_scope(console, proof)
+
+
 def _is_unit_proven(proof: Proof) -> bool:
     """Whether the unit that runs the programs is proven too."""
     return "unit" in proof.scope and not proof.scope["unit"].is_missing
 
 
-def _print_scope(console: TableConsole, proof: Proof) -> None:
+def _print_scope(console: TableConsole, proof: Proof | ChainProof) -> None:
     for name, part in proof.scope.items():
         if part.asked:
             colour = "green" if part.state.value == "proven" else "yellow"

@@ -1,0 +1,162 @@
+"""The files of a chain: those of each stage, and top, manifest, C model and certificate of the whole."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping, Sequence
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from sosmith.gen.chain.c_model import chain_header, chain_source
+from sosmith.gen.chain.design import ChainDesign
+from sosmith.gen.chain.top import chain_interface, top_text
+from sosmith.gen.filter.largest_gain import Peak
+from sosmith.gen.output.certificate import certificate, port_entry
+from sosmith.gen.output.generate import generated
+from sosmith.gen.output.manifest import stream_entry
+from sosmith.gen.version import __version__
+from sosmith.model.text_files import to_json, write_files
+from sosmith.verify.certificate_file import Certificate, FileEntry, entries_text, on_grid
+from sosmith.verify.chain.chain_file import (
+    ChainCertificate,
+    ChainStageEntry,
+    FoldingEntry,
+    LargestEntry,
+    sealed_chain,
+)
+
+Progress = Callable[[str], None]
+
+
+def generate_chain(design: ChainDesign, directory: Path, progress: Progress = lambda step: None) -> list[Path]:
+    """Write all files of a chain into a folder; return their paths. Two runs write the same bytes.
+
+    Raises
+    ------
+    SpecificationError
+        If the folder cannot be written.
+    ToolError
+        If Yosys fails, or the disk is full.
+    """
+    return write_files(directory, chain_texts(design, progress))
+
+
+def chain_texts(design: ChainDesign, progress: Progress = lambda step: None) -> dict[str, str]:
+    """Return the texts that `generate_chain` writes, by the names of the files."""
+    name, texts, claims = design.name, dict[str, str](), _claims(design)
+    for stage, proven in zip(design.stages, claims, strict=True):
+        progress(f"stage {stage.spec.name}")
+        texts |= generated(stage.design, claims=proven)
+    own = {
+        f"{name}.sv": top_text(design),
+        f"{name}.json": to_json(_manifest(design, claims)),
+        f"{name}.c": chain_source(design),
+        f"{name}.h": chain_header(design),
+    }
+    certified = entries_text(_certified(design, claims, texts, own))
+    return {**own, f"{name}.certificate.json": certified, **texts}
+
+
+def chain_manifest(design: ChainDesign) -> dict[str, Any]:
+    """Return what software needs to know of a chain: the content of ``<name>.json``."""
+    return _manifest(design, _claims(design))
+
+
+def _manifest(design: ChainDesign, claims: Sequence[Certificate]) -> dict[str, Any]:
+    """Return the manifest of a chain whose stages have these claims."""
+    errors = [proven.claims.bound * proven.output.lsb for proven in claims]
+    shares = [error * stage.gain for error, stage in zip(errors, design.stages, strict=True)]
+    interface = chain_interface(design)
+    return {
+        "name": design.name,
+        "core": "chain",
+        "sosmith_version": __version__,
+        "spec": design.spec.source,
+        "channels": design.spec.base.channels,
+        "streams": {"s_axis": stream_entry(interface.inputs), "m_axis": stream_entry(interface.outputs)},
+        "stages": [
+            {
+                "name": stage.spec.name,
+                "kind": stage.spec.kind,
+                "core": stage.design.datapath.name,
+                "architecture": stage.design.architecture.name,
+                "decimate": stage.design.datapath.samples_per_result,
+                "error_bound": float(error),
+                "gain_to_the_end": float(stage.gain),
+            }
+            for stage, error in zip(design.stages, errors, strict=True)
+        ],
+        "decimate": design.factor,
+        "error_bound": float(sum(shares, Fraction(0))),
+        "error_parts": {stage.spec.name: float(share) for stage, share in zip(design.stages, shares, strict=True)},
+        "error_unit": design.spec.base.output.unit,
+    }
+
+
+def chain_certificate(design: ChainDesign) -> ChainCertificate:
+    """Certify a chain before its files are written."""
+    claims = _claims(design)
+    texts = {f"{proven.name}.certificate.json": entries_text(proven) for proven in claims}
+    return _certified(design, claims, texts, {})
+
+
+def _claims(design: ChainDesign) -> list[Certificate]:
+    """Certify the stages one by one."""
+    return [
+        certificate(core.quantized, core.spec.max_error, online=core.architecture.online)
+        for core in (stage.design for stage in design.stages)
+    ]
+
+
+def _certified(
+    design: ChainDesign, claims: Sequence[Certificate], texts: Mapping[str, str], own: Mapping[str, str]
+) -> ChainCertificate:
+    """Certify a chain whose stages have these claims, and whose files have these texts."""
+    base = design.spec.base
+    entries = tuple(
+        ChainStageEntry(
+            name=stage.spec.name,
+            kind=stage.spec.kind,
+            certificate=_file(f"{proven.name}.certificate.json", texts[f"{proven.name}.certificate.json"]),
+            error=proven.claims.bound * proven.output.lsb,
+            gain=stage.gain,
+        )
+        for stage, proven in zip(design.stages, claims, strict=True)
+    )
+    return sealed_chain(
+        ChainCertificate(
+            format="sosmith chain certificate 1",
+            name=design.name,
+            specification=design.spec.text,
+            inputs=tuple(map(port_entry, base.inputs)),
+            output=port_entry(base.output),
+            max_error=base.max_error,
+            channels=base.channels,
+            stages=entries,
+            bound=sum((entry.error * entry.gain for entry in entries), Fraction(0)),
+            folding=_folding(design),
+            files=tuple(_file(name, text) for name, text in own.items()),
+            certificate="0" * 64,
+        )
+    )
+
+
+def _folding(design: ChainDesign) -> FoldingEntry | None:
+    if design.folding is None:
+        return None
+    passing = design.passing
+    return FoldingEntry(
+        factor=design.factor,
+        anywhere=_largest(design.folding),
+        edge=None if passing is None else design.edge,
+        passing=None if passing is None else _largest(passing),
+    )
+
+
+def _largest(peak: Peak) -> LargestEntry:
+    return LargestEntry(gain=on_grid(peak.gain), at=peak.at)
+
+
+def _file(name: str, text: str) -> FileEntry:
+    return FileEntry(name=name, sha256=hashlib.sha256(text.encode()).hexdigest())

@@ -1,0 +1,77 @@
+"""What a chain should compute, in double precision: its stages' exact filters in a row, limited at the end."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from sosmith.gen.chain.design import ChainDesign, StageDesign
+from sosmith.model.arithmetic.recursive_filters import dc_gain, sosfilt
+from sosmith.model.arrays import Codes, Values
+from sosmith.model.dataflow.decimator import impulse_response
+from sosmith.model.reference.golden import calibrated
+
+
+def golden_chain(design: ChainDesign, codes: Codes) -> Values:
+    """Compute the exact results of input codes in double precision, shape (results, channels).
+
+    Parameters
+    ----------
+    design : ChainDesign
+    codes : integer array, shape (samples, channels, inputs)
+    """
+    ends = design.spec.base.output
+    low, high = ends.decode(np.array([ends.lowest, ends.highest]))
+    return np.stack([np.clip(_column(design, codes[:, k]), low, high) for k in range(codes.shape[1])], axis=1)
+
+
+def _column(design: ChainDesign, codes: Codes) -> Values:
+    first = design.stages[0].design
+    values = calibrated(codes, first.datapath.inputs, first.quantized.polynomial)
+    for stage in design.stages:
+        values = _filtered(stage, values)
+    return values
+
+
+def _filtered(stage: StageDesign, values: Values) -> Values:
+    """Filter values and take every so many of the results, as if the first value had been there for ever."""
+    quantized, datapath = stage.design.quantized, stage.design.datapath
+    if quantized.filter is None:
+        return values
+    decimator = datapath.decimator
+    if decimator is not None:
+        taps = np.array(impulse_response(decimator.factor, decimator.stages)) / float(
+            decimator.factor**decimator.stages
+        )
+        before = np.concatenate([np.full(len(taps) - 1, values[0]), values])
+        values = np.asarray(np.convolve(before, taps, mode="valid")[:: decimator.factor], dtype=np.float64)
+    sos = quantized.filter.sos
+    results = sosfilt(sos, values - values[0], np.zeros((len(sos), sos.shape[1] // 2 - 1)))
+    results = results + dc_gain(sos) * values[0]
+    return results if decimator is not None else np.asarray(results[:: datapath.samples_per_result])
+
+
+def stage_gain(stage: StageDesign, frequency: Values) -> Values:
+    """Magnitude of a stage's gain for sines at the chain's input, in Hz: they reach it folded by the stages before."""
+    return np.asarray(np.abs(_complex(stage, frequency / float(stage.spec.rate))), dtype=np.float64)
+
+
+def chain_gain(design: ChainDesign, frequency: Values) -> npt.NDArray[np.complex128]:
+    """Complex gain from sines at the input, in Hz, to what comes out of them, without any rounding."""
+    total = np.ones(frequency.shape, dtype=np.complex128)
+    for stage in design.stages:
+        total = total * _complex(stage, frequency / float(stage.spec.rate))
+    return total
+
+
+def _complex(stage: StageDesign, turns: Values) -> npt.NDArray[np.complex128]:
+    total, step = np.ones(turns.shape, dtype=np.complex128), 1
+    for part in stage.parts:
+        u = np.exp(-2j * np.pi * turns * step)
+        for numerator, denominator in part.sections:
+            over, under = (
+                np.polynomial.polynomial.polyval(u, [float(c) for c in taps]) for taps in (numerator, denominator)
+            )
+            total = total * over / under
+        step *= part.factor
+    return total

@@ -1,0 +1,189 @@
+"""The report of one co-simulation of a chain: `report.json` for scripts, `report.html` for people."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure as Canvas
+
+from sosmith.gen.chain.design import ChainDesign
+from sosmith.gen.chain.facts import chain_tables
+from sosmith.gen.chain.golden import chain_gain, stage_gain
+from sosmith.gen.chain.picture import frequencies, level
+from sosmith.gen.chain.run import ChainRun
+from sosmith.gen.facts.table import Fact, Table
+from sosmith.gen.quantity import decibels, plain_number, quantity
+from sosmith.gen.report.page import Figure
+from sosmith.gen.report.plots import COLOUR, NARROW, PANEL_HEIGHT, draw, frequency_axis
+from sosmith.gen.version import __version__
+from sosmith.model.reference.accuracy import error_statistics, sqnr_db
+from sosmith.model.templates import render
+from sosmith.model.text_files import to_json, write_files
+
+
+def chain_summary(design: ChainDesign, run: ChainRun) -> dict[str, Any]:
+    """Content of ``report.json``: the keys of a core's report that have a meaning here, and `stages`, `folding`."""
+    output = design.spec.base.output
+    values = output.decode(run.received)
+    statistics = error_statistics(values - run.golden)
+    bound, allowed = float(design.bound), float(design.spec.base.max_error)
+    shortfalls = []
+    if run.mismatches:
+        shortfalls.append(
+            f"The hardware differs from the integer models at {run.mismatches:,} of {run.received.size:,} results."
+        )
+    if statistics.max_abs > bound:
+        error, limit = quantity(statistics.max_abs, output.unit), quantity(bound, output.unit)
+        shortfalls.append(f"The largest error is {error}, over the limit of {limit}.")
+    folding, passing = design.folding, design.passing
+    return {
+        "name": design.name,
+        "core": "chain",
+        "scenario": run.scenario,
+        "passed": not shortfalls,
+        "shortfalls": shortfalls,
+        "samples": run.received.size,
+        "channels": design.spec.base.channels,
+        "cycles": run.cycles,
+        "cycles_per_sample": run.cycles / (run.codes.shape[0] * run.codes.shape[1]),
+        "simulator": run.simulator,
+        "tools": run.tools,
+        "sosmith_version": __version__,
+        "seed": run.seed,
+        "bit_exact": run.mismatches == 0,
+        "mismatches": run.mismatches,
+        "error": {
+            "max_abs": statistics.max_abs,
+            "max_lsb": statistics.max_abs / float(output.lsb),
+            "rms": statistics.rms,
+            "bound": bound,
+            "unit": output.unit,
+            "parts": {stage.spec.name: float(stage.share) for stage in design.stages},
+        },
+        "max_error": allowed,
+        "lsb": float(output.lsb),
+        "sqnr_db": sqnr_db(run.golden, values - run.golden),
+        "stages": [
+            {
+                "name": stage.spec.name,
+                "kind": stage.spec.kind,
+                "architecture": stage.design.architecture.name,
+                "decimate": stage.design.datapath.samples_per_result,
+                "output_bits": stage.output.bits,
+                "error_bound": float(stage.bound),
+                "gain_to_the_end": float(stage.gain),
+            }
+            for stage in design.stages
+        ],
+        "folding": None
+        if folding is None
+        else {
+            "factor": design.factor,
+            "anywhere_db": _db(float(folding.gain)),
+            "passband_edge": None if passing is None or design.spec.edge is None else float(design.spec.edge),
+            "into_passband_db": None if passing is None else _db(float(passing.gain)),
+        },
+        "cycles_per_second": run.cycles_per_second,
+        "wall_seconds": run.wall_seconds,
+    }
+
+
+def write_chain_report(design: ChainDesign, run: ChainRun, directory: Path) -> dict[str, Any]:
+    """Write ``report.json`` and ``report.html``; return the content of the first."""
+    summary = chain_summary(design, run)
+    page = render(
+        ("sosmith.gen.chain", "sosmith.gen.report"),
+        "chain.html.jinja",
+        summary=summary,
+        figures=[_response_figure(design), _stages_figure(design)] if design.parts else [],
+        result=report_table(summary),
+        tables=chain_tables(design),
+    )
+    write_files(directory, {"report.json": to_json(summary), "report.html": page})
+    return summary
+
+
+def report_table(summary: dict[str, Any]) -> Table:
+    """Say the verdict, the arithmetic and the speed; `summary` is the content of ``report.json``."""
+    error, unit = summary["error"], summary["error"]["unit"]
+    exact = "all equal to the integer models" if summary["bit_exact"] else f"{summary['mismatches']:,} differ"
+    rows = [
+        Fact("Results", f"{summary['samples']:,}", sentence=exact),
+        Fact(
+            "Largest error",
+            error["max_abs"],
+            unit,
+            f"{plain_number(error['max_lsb'])} LSB; proven limit {quantity(error['bound'], unit)}",
+        ),
+        Fact("Error RMS", error["rms"], unit),
+    ]
+    if summary["sqnr_db"] is not None:
+        rows.append(Fact("Signal to error", decibels(summary["sqnr_db"])))
+    rows += [Fact("Short", reason) for reason in summary["shortfalls"]]
+    rows.append(
+        Fact(
+            "Clocks a sample",
+            f"{summary['cycles_per_sample']:.3g}",
+            sentence=f"{summary['simulator']}, with idle clocks",
+        )
+    )
+    return Table(summary["name"], rows, styles={"Short": "red"}, passed=summary["passed"])
+
+
+def _db(gain: float) -> float | None:
+    return 20 * math.log10(gain) if gain > 0 else None
+
+
+def _response_figure(design: ChainDesign) -> Figure:
+    """Draw the gain of the whole from the input on, and where frequencies begin to fold."""
+    frequency = frequencies(design)
+    whole = level(np.abs(chain_gain(design, frequency)))
+
+    def paint(canvas: Canvas) -> None:
+        axes = canvas.subplots()
+        axes.plot(frequency, whole, color=COLOUR["hardware"], lw=1.6)
+        if design.folding is not None:
+            edge = float(design.spec.base.sample_rate) / (2 * design.factor)
+            axes.axvspan(edge, float(frequency[-1]), facecolor=COLOUR["limit"], alpha=0.12, lw=0)
+            axes.axhline(
+                float(level(np.array([float(design.folding.gain)]))[0]), color=COLOUR["limit"], lw=1.4, ls="--"
+            )
+        axes.set_ylabel("gain in dB")
+        axes.set_xlabel("frequency at the input")
+        frequency_axis(axes, frequency)
+
+    legend = [("hardware", "", "exact response from end to end")]
+    caption = "Gain of a sine at the input to what comes out of it."
+    if design.folding is not None:
+        legend.append(("limit", "dashed", "proven limit of what folds"))
+        caption += " In the shaded band it comes out at a lower frequency."
+    return Figure(
+        title="The chain's response",
+        drawing=draw("chain", "Gain against frequency", NARROW, PANEL_HEIGHT, paint),
+        caption=caption,
+        legend=legend,
+    )
+
+
+def _stages_figure(design: ChainDesign) -> Figure:
+    """Draw the gains of the stages, each over the frequencies at the chain's input."""
+    frequency = frequencies(design)
+    filters = [stage for stage in design.stages if stage.parts]
+
+    def paint(canvas: Canvas) -> None:
+        axes = canvas.subplots(len(filters), 1, sharex=True, squeeze=False)[:, 0]
+        for each, stage in zip(axes, filters, strict=True):
+            each.plot(frequency, level(stage_gain(stage, frequency)), color=COLOUR["golden"], lw=1.2)
+            each.set_ylabel(f"{stage.spec.name}\ndB")
+        axes[-1].set_xlabel("frequency at the input")
+        frequency_axis(axes[-1], frequency)
+
+    height = max(PANEL_HEIGHT, 110 * len(filters))
+    return Figure(
+        title="Its stages",
+        drawing=draw("stages", "Gain of each stage against frequency", NARROW, height, paint),
+        caption="Gain of each stage in dB for a sine at the input of the chain, folded by the stages before it.",
+    )

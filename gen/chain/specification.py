@@ -1,0 +1,416 @@
+"""The specification of a chain: what is common to all of it, and a table ``[[stage]]`` for each stage, in order.
+
+Each stage is an ordinary specification, which `StageSpec.ordinary` writes as soon as its ports are known. So every rule
+about a filter is that of a filter alone, and what is here is about stages beside each other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from decimal import Context, Decimal, Inexact
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from sosmith.gen.specification.choices import AUTO, FIR_FAMILIES, MAX_DECIMATION, MAX_DOWNSAMPLING, MAX_TAPS
+from sosmith.gen.specification.combinations import check_chain
+from sosmith.gen.specification.specification import STAGE, Specification, from_tree, parsed, text_of, to_json
+from sosmith.gen.specification.toml_text import toml_text
+from sosmith.gen.specification.values import UnfitError, choice, identifier, literal, number, together, whole
+from sosmith.model.errors import SpecificationError
+from sosmith.model.port import Port
+from sosmith.model.suggestion import did_you_mean
+
+MAX_STAGES = 8
+"""Most stages of a chain."""
+
+_EDGES = ("passband_edge", "stopband_edge", "passband_loss", "stopband_loss")
+_COMMON = ("name", "kind", "architecture", "realization", "multipliers")
+_KEYS: dict[str, tuple[str, ...]] = {
+    "polynomial": ("coefficients", "data"),
+    "gain": ("factor",),
+    "iir": ("family", "band", "method", "order", "cutoff", *_EDGES, "sos", "sos_file", "decimate"),
+    "fir": ("family", "band", *_EDGES, "taps", "taps_file", "decimate"),
+    "halfband": ("passband_edge", "passband_loss", "stopband_loss", "decimate"),
+    "cic": ("order", "decimate"),
+}
+"""Keys of a stage by its kind, beside those of all."""
+
+KINDS = tuple(_KEYS)
+_OF_HARDWARE = ("architecture", "realization", "multipliers")
+_TOP = ("name", "sample_rate", "channels", "input", STAGE, "output", "hardware")
+_WIRE = {"sos": [[1, 0, 0, 1, 0, 0]]}
+_EXACT = Context(prec=200, traps=[Inexact])
+
+
+ANY_INPUT, ANY_OUTPUT = (
+    Port.from_range(name, 16, Fraction(-1), Fraction(1), signed=True, unit="") for name in ("x", "y")
+)
+"""Ports of a stage whose ports are not known yet."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class StageSpec:
+    """A stage of a chain.
+
+    Attributes
+    ----------
+    name : str
+        Name of the stage; that of its core has the name of the chain before it.
+    kind : str
+        One of `KINDS`.
+    tables : mapping of str
+        ``[filter]``, and ``[calibration]`` of a polynomial, as `tomllib` gives them.
+    hardware : mapping of str
+        What the stage says of its hardware.
+    factor : int
+        By how much it decimates; 1 if all results leave.
+    rate : Fraction
+        Of the samples that it takes, in Hz.
+    edge : Fraction or None
+        Upper edge of its pass band, in Hz, if it is a low-pass filter that states one.
+    """
+
+    name: str
+    kind: str
+    tables: Mapping[str, Any]
+    hardware: Mapping[str, Any]
+    factor: int
+    rate: Fraction
+    edge: Fraction | None
+
+    @property
+    def core(self) -> str:
+        """The core of its ordinary specification, one of `sosmith.gen.specification.choices.CORES`."""
+        return "calibration" if self.kind == "polynomial" else "filter"
+
+    @property
+    def needs_powers_of_two(self) -> bool:
+        """Whether its steps in and out must differ by a power of two: those of an FIR filter that decimates."""
+        return self.factor > 1 and self.kind != "iir"
+
+    def ordinary(
+        self, chain: ChainSpec, inputs: tuple[Port, ...], output: Port, max_error: Fraction | None = None
+    ) -> Specification:
+        """Return the stage by itself, between ports; without `max_error` it may take one LSB of the output.
+
+        Raises
+        ------
+        SpecificationError
+            If the stage breaks a rule.
+        """
+        name = f"{chain.name}_{self.name}"
+        hardware = chain.base.source.get("hardware", {})
+        tree: dict[str, Any] = {
+            "name": name,
+            "sample_rate": decimal(self.rate),
+            "channels": chain.base.channels,
+            "input": {port.name: _format(port) for port in inputs},
+            **self.tables,
+            "output": _format(output)
+            | {"unit": output.unit}
+            | ({} if max_error is None else {"max_error": decimal(max_error)}),
+            "hardware": {"clock": decimal(chain.base.hardware.clock)}
+            | {key: hardware[key] for key in _OF_HARDWARE if key in hardware and key != "realization"}
+            | dict(self.hardware),
+        }
+        return from_tree(tree, chain.base.path.parent / f"{chain.base.path.name}: stage {self.name}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ChainSpec:
+    """A checked specification of a chain.
+
+    Attributes
+    ----------
+    base : Specification
+        What is common: name, rate, channels, ports, allowed error and hardware. Its filter is a wire.
+    source : dict
+        The file as read, in the types of JSON.
+    text : str
+        TOML.
+    stages : tuple of StageSpec
+        In the order of the samples.
+    """
+
+    base: Specification
+    source: dict[str, Any]
+    text: str
+    stages: tuple[StageSpec, ...]
+
+    @property
+    def name(self) -> str:
+        """Name of the top module and of the files."""
+        return self.base.name
+
+    @property
+    def factor(self) -> int:
+        """Samples of a channel for each result."""
+        product = 1
+        for stage in self.stages:
+            product *= stage.factor
+        return product
+
+    @property
+    def edge(self) -> Fraction | None:
+        """Upper edge of the chain's pass band, in Hz: the lowest that a stage states; None if none does."""
+        return min((stage.edge for stage in self.stages if stage.edge is not None), default=None)
+
+
+def is_chain(tree: Mapping[str, Any]) -> bool:
+    """Say whether a specification is that of a chain."""
+    return STAGE in tree
+
+
+def load_chain(path: Path) -> ChainSpec:
+    """Read and check the specification of a chain in a file.
+
+    Raises
+    ------
+    SpecificationError
+        If it is none, or breaks a rule.
+    """
+    text = text_of(path)
+    return chain_from_tree(parsed(text, path), path, text)
+
+
+def chain_from_tree(tree: Mapping[str, Any], path: Path, text: str | None = None) -> ChainSpec:
+    """Check a specification that has been read, with every float as `decimal.Decimal`.
+
+    Raises
+    ------
+    SpecificationError
+        If it breaks a rule.
+    """
+    try:
+        return _checked(dict(tree), path, text)
+    except UnfitError as unfit:
+        raise SpecificationError(f"{path}: {unfit}") from None
+
+
+def decimal(value: Fraction) -> Decimal:
+    """Return a number as a decimal, exactly.
+
+    Raises
+    ------
+    Inexact
+        If its digits never end.
+    """
+    return _EXACT.divide(Decimal(value.numerator), Decimal(value.denominator))
+
+
+def _format(port: Port) -> dict[str, Any]:
+    low = port.zero + port.lsb * port.lowest
+    high = low + port.lsb * 2**port.bits
+    return {"bits": port.bits, "range": [decimal(low), decimal(high)], "signed": port.signed}
+
+
+def _checked(tree: dict[str, Any], path: Path, text: str | None) -> ChainSpec:
+    for key, value in tree.items():
+        if key not in _TOP:
+            raise UnfitError(f"left out with [[stage]], which takes {', '.join(_TOP)}", literal(value), where=str(key))
+    stages = tree.get(STAGE)
+    if not isinstance(stages, list) or not all(isinstance(stage, dict) for stage in stages):
+        raise UnfitError("a list of tables [[stage]]", literal(stages), where=STAGE)
+    if not 1 <= len(stages) <= MAX_STAGES:
+        raise UnfitError(f"a list of 1 to {MAX_STAGES} tables [[stage]]", f"{len(stages)} of them", where=STAGE)
+    kinds = [_kind(stage, k) for k, stage in enumerate(stages)]
+    common = {key: value for key, value in tree.items() if key != STAGE}
+    if kinds[0] == "polynomial":
+        common["calibration"] = {key: stages[0][key] for key in _KEYS["polynomial"] if key in stages[0]}
+    base = from_tree(common | {"filter": _WIRE}, path)
+    check_chain(base)
+    read, rate, findings = [], base.sample_rate, []
+    for k, stage in enumerate(stages):
+        try:
+            _check_rate(rate, f"stage[{k}]")
+            read.append(_stage(stage, kinds[k], k, rate))
+            rate /= read[-1].factor
+        except UnfitError as unfit:
+            findings.append(unfit)
+            if not _is_decimal(rate):
+                break
+    if findings:
+        raise together(findings)
+    _check_names([stage.name for stage in read])
+    chain = ChainSpec(
+        base=base,
+        source={key: to_json(value) for key, value in tree.items()},
+        text=text if text is not None else toml_text(tree),
+        stages=tuple(read),
+    )
+    _check_steps(chain)
+    for one in chain.stages[kinds[0] == "polynomial" :]:
+        one.ordinary(chain, (ANY_INPUT,), ANY_OUTPUT)
+    return chain
+
+
+def _kind(stage: Mapping[str, Any], k: int) -> str:
+    try:
+        return choice(KINDS)(stage.get("kind", "missing"))
+    except UnfitError as unfit:
+        raise unfit.inside(f"stage[{k}].kind") from None
+
+
+def _stage(table: Mapping[str, Any], kind: str, k: int, rate: Fraction) -> StageSpec:
+    where = f"stage[{k}]"
+    known = (*_COMMON, *_KEYS[kind])
+    for key, value in table.items():
+        if key == "interpolate":
+            raise UnfitError(
+                "left out, as stages only lower the rate", literal(value), where=f"{where}.{key}", later=True
+            )
+        if key not in known:
+            raise UnfitError(
+                f"one of the keys {', '.join(known)} in a stage of the kind {kind}",
+                f"an unknown one{did_you_mean(key, known)}",
+                where=f"{where}.{key}",
+            )
+    try:
+        name = identifier(table.get("name", "missing"))
+    except UnfitError as unfit:
+        raise unfit.inside(f"{where}.name") from None
+    if kind == "polynomial" and k > 0:
+        raise UnfitError(
+            "another kind behind the first stage, as a polynomial makes of an error another one for each value",
+            "polynomial",
+            where=f"{where}.kind",
+        )
+    factor = _factor(table, kind, where)
+    return StageSpec(
+        name=name,
+        kind=kind,
+        tables=_tables(table, kind, where, rate, factor),
+        hardware={key: table[key] for key in _OF_HARDWARE if key in table},
+        factor=factor,
+        rate=rate,
+        edge=_edge(table, kind),
+    )
+
+
+def _factor(table: Mapping[str, Any], kind: str, where: str) -> int:
+    if kind == "cic" and "decimate" not in table:
+        raise UnfitError("given for a CIC filter", "missing", where=f"{where}.decimate")
+    if table.get("decimate") == AUTO:
+        raise UnfitError(
+            "a whole number in a stage, as the rates of the stages behind it follow from it",
+            literal(AUTO),
+            where=f"{where}.decimate",
+        )
+    if "decimate" not in table:
+        return 1
+    try:
+        return whole(2, MAX_DECIMATION if kind == "iir" else MAX_DOWNSAMPLING)(table["decimate"])
+    except UnfitError as unfit:
+        raise unfit.inside(f"{where}.decimate") from None
+
+
+def _check_rate(rate: Fraction, where: str) -> None:
+    if not _is_decimal(rate):
+        raise UnfitError(
+            "at a rate that is a decimal number, in which its edges can be compared",
+            f"at {literal(rate)} Hz",
+            where=where,
+        )
+
+
+def _is_decimal(value: Fraction) -> bool:
+    try:
+        decimal(value)
+    except Inexact:
+        return False
+    return True
+
+
+def _tables(table: Mapping[str, Any], kind: str, where: str, rate: Fraction, factor: int) -> dict[str, Any]:
+    """Return the tables of the ordinary specification."""
+    decimate = {"decimate": factor} if factor > 1 else {}
+    if kind == "polynomial":
+        return {"calibration": {key: table[key] for key in _KEYS[kind] if key in table}, "filter": _WIRE}
+    if kind == "gain":
+        if "factor" not in table:
+            raise UnfitError("a number other than 0", "missing", where=f"{where}.factor")
+        return {"filter": {"taps": [table["factor"]]}}
+    if kind == "cic":
+        return {"filter": {"taps": _cic(table, where, factor)} | decimate}
+    given = {key: table[key] for key in _KEYS[kind] if key in table and key not in {"band", "decimate"}}
+    if kind == "halfband":
+        given |= {"family": "halfband"}
+        if "passband_edge" in given:
+            edge = number(given["passband_edge"])
+            given["stopband_edge"] = decimal(rate / 2 - edge)
+    if "band" in table or kind == "halfband" or _by_bands(given):
+        given["kind"] = table.get("band", "lowpass")
+    if kind == "fir" and _by_bands(given) and "family" not in given:
+        given["family"] = "equiripple"
+    is_fir = kind != "iir"
+    if "family" in given and (given["family"] in FIR_FAMILIES) != is_fir:
+        families = "an FIR family" if is_fir else "a family with poles"
+        raise UnfitError(f"{families} in a stage of the kind {kind}", literal(given["family"]), where=f"{where}.family")
+    return {"filter": given | decimate}
+
+
+def _by_bands(given: Mapping[str, Any]) -> bool:
+    return not any(key in given for key in ("taps", "taps_file", "sos", "sos_file"))
+
+
+def _cic(table: Mapping[str, Any], where: str, factor: int) -> list[Decimal]:
+    """Taps of moving sums of `factor` samples one behind the other, whose gain at zero frequency is 1."""
+    try:
+        order = whole(1, 12)(table.get("order"))
+    except UnfitError as unfit:
+        raise unfit.inside(f"{where}.order") from None
+    if factor & (factor - 1):
+        raise UnfitError(
+            "a power of two for a CIC filter, whose weights are then exact", literal(factor), where=f"{where}.decimate"
+        )
+    if order * (factor - 1) + 1 > MAX_TAPS:
+        raise UnfitError(
+            f"such that order * (decimate - 1) is below {MAX_TAPS}, as a CIC filter is built as the FIR filter that it "
+            "is; two stages one behind the other decimate further",
+            literal(factor),
+            where=f"{where}.decimate",
+        )
+    taps = [1]
+    for _ in range(order):
+        taps = [sum(taps[max(0, k - factor + 1) : k + 1]) for k in range(len(taps) + factor - 1)]
+    return [decimal(Fraction(tap, factor**order)) for tap in taps]
+
+
+def _edge(table: Mapping[str, Any], kind: str) -> Fraction | None:
+    """Upper edge of a low-pass filter's pass band, as far as it is a number."""
+    if table.get("band", "lowpass") != "lowpass" or kind in {"polynomial", "gain", "cic"}:
+        return None
+    edge = table.get("passband_edge", table.get("cutoff"))
+    return Fraction(edge) if isinstance(edge, int | Decimal) and not isinstance(edge, bool) else None
+
+
+def _check_names(names: list[str]) -> None:
+    for k, name in enumerate(names):
+        if name in names[:k]:
+            raise UnfitError("another name than those of the stages before", literal(name), where=f"stage[{k}].name")
+        for other in names:
+            if name.startswith(f"{other}_"):
+                raise UnfitError(
+                    f"a name that does not begin with {other}_, as parts of the stage {other} do",
+                    literal(name),
+                    where=f"stage[{k}].name",
+                )
+
+
+def _check_steps(chain: ChainSpec) -> None:
+    """Check that steps can change where they must: not inside an FIR filter that decimates."""
+    ratio = chain.base.inputs[0].lsb / chain.base.output.lsb
+    fits = not ratio.numerator & (ratio.numerator - 1) and not ratio.denominator & (ratio.denominator - 1)
+    if all(stage.needs_powers_of_two for stage in chain.stages) and not fits:
+        raise UnfitError(
+            "such that one LSB of the input is a power of two of those of the output, as all stages are FIR filters "
+            "that decimate",
+            literal([chain.base.output.lsb * code for code in _ends(chain.base.output)]),
+            where="output.range",
+        )
+
+
+def _ends(port: Port) -> tuple[int, int]:
+    return port.lowest, port.lowest + 2**port.bits

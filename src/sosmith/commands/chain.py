@@ -1,0 +1,111 @@
+"""What `design`, `generate`, `simulate` and `verify` do with a chain of stages."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from sosmith.commands.options import print_tables
+from sosmith.interface.files import default_folder
+from sosmith.model.errors import ShortfallError, SpecificationError
+from sosmith.terminal import note, print_json, reader_may_leave, show_progress
+
+if TYPE_CHECKING:
+    from sosmith.interface.chain.certificate import ChainCertificate
+    from sosmith.interface.chain.specification import ChainSpecification
+
+
+def refuse(**options: Any) -> None:
+    """Refuse options of a command that a chain does not take, by their names; None and False are not given.
+
+    Raises
+    ------
+    SpecificationError
+        For the first one that is given.
+    """
+    for name, value in options.items():
+        if value is not None and value is not False:
+            raise SpecificationError(
+                f"--{name.replace('_', '-')} must be left out with a chain of stages, as it is about a single core"
+            )
+
+
+def show_chain(
+    asked: ChainSpecification, board: str | None, plot: Path | None, *, details: bool, as_json: bool
+) -> None:
+    """Design a chain, show it, and draw it into the file `plot` if there is one."""
+    from sosmith.interface.chain.design import design_chain
+
+    with show_progress() as step:
+        chain = design_chain(asked, board=board, progress=step)
+        step("what folds", 0, 0)
+        tables = [] if as_json else chain.tables(details=details)
+        if plot is not None:
+            step("drawing", 0, 0)
+            chain.plot(plot)
+    if plot is not None:
+        note(f"wrote {plot}")
+    if as_json:
+        print_json(chain.as_dict())
+        return
+    print_tables(tables)
+
+
+def write_chain(asked: ChainSpecification, board: str | None, output: Path | None) -> None:
+    """Write the files of a chain, and print their paths."""
+    from sosmith.interface.chain.design import design_chain
+
+    with show_progress() as step:
+        paths = design_chain(asked, board=board, progress=step).generate(output or default_folder(asked.name), step)
+    for path in paths:
+        click.echo(path)
+
+
+def run_chain(
+    asked: ChainSpecification,
+    board: str | None,
+    source: str | None,
+    *,
+    as_json: bool,
+    output: Path | None,
+    **options: Any,
+) -> bool:
+    """Simulate a chain and show the report; return whether it passed."""
+    from sosmith.interface.chain.design import design_chain
+
+    with show_progress() as step:
+        chain = design_chain(asked, board=board, progress=step)
+        report = chain.simulate(source, folder=output or default_folder(asked.name), progress=step, **options)
+    with reader_may_leave():
+        if as_json:
+            print_json(report.summary)
+        else:
+            print_tables([report.table])
+    note(f"report: {(report.folder / 'report.html').resolve().as_uri()}")
+    return report.passed
+
+
+def prove_chain(
+    read: ChainCertificate, path: Path, *, spec: Path | None, files: Path | None, limit: dict[str, float], as_json: bool
+) -> bool:
+    """Prove the certificate of a chain and show what is proven; return whether all of it is.
+
+    Raises
+    ------
+    ShortfallError
+        If anything is wrong.
+    """
+    with show_progress() as step:
+        try:
+            proof = read.verify(step, spec=spec, files=files, **limit)
+        except ShortfallError as error:
+            raise ShortfallError(f"{path}: {error}") from None
+    if as_json:
+        print_json({"name": read.name, **proof.as_dict()})
+    else:
+        from sosmith.commands.tables.certificate import print_chain_proof
+
+        print_chain_proof(read.name, proof)
+    return not proof.missing

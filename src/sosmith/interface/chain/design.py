@@ -1,0 +1,290 @@
+"""Designs of chains, and their uses: compute, generate, prove, simulate."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from os import PathLike, fspath
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from sosmith.gen.chain.design import ChainDesign
+from sosmith.gen.chain.design import design_chain as design_stages
+from sosmith.gen.chain.facts import chain_tables
+from sosmith.gen.chain.generate import chain_certificate, chain_manifest, generate_chain
+from sosmith.gen.chain.golden import chain_gain, golden_chain
+from sosmith.gen.facts.table import Table, View
+from sosmith.gen.fpga.boards import find_board
+from sosmith.interface.arrays import real_numbers
+from sosmith.interface.chain.specification import ChainSpecification
+from sosmith.interface.design import Codes, Design, Floats
+from sosmith.interface.inputs import codes_of, encoded, traces_of
+from sosmith.interface.quantity import Quantity
+from sosmith.model.arrays import side_by_side
+from sosmith.model.errors import SpecificationError, falling_short
+
+if TYPE_CHECKING:
+    from sosmith.interface.certificate import Progress
+    from sosmith.interface.chain.certificate import ChainCertificate
+    from sosmith.interface.chain.report import ChainReport
+
+
+@dataclass(frozen=True)
+class Chain(View):
+    """A chain of proven stages, with one bound from end to end, as returned by `design_chain`.
+
+    Values are in physical units. Arrays hold one sample per row, shape (samples,) for one channel and (samples,
+    channels) for several; of results there is one for `factor` samples, the first with the first of them.
+
+    Examples
+    --------
+    >>> import numpy as np, sosmith
+    >>> chain = sosmith.design_chain({
+    ...     "name": "slow",
+    ...     "sample_rate": 8000,
+    ...     "input": {"x": {"bits": 8, "range": [-1.0, 1.0], "signed": True}},
+    ...     "stage": [
+    ...         {"name": "first", "kind": "cic", "order": 2, "decimate": 4},
+    ...         {"name": "second", "kind": "fir", "taps": [0.25, 0.5, 0.25]},
+    ...     ],
+    ...     "output": {"bits": 12, "range": [-1.0, 1.0], "signed": True},
+    ... })
+    >>> [stage.name for stage in chain.stages], chain.factor
+    (['slow_first', 'slow_second'], 4)
+    >>> x = np.sin(2 * np.pi * 50 * np.arange(400) / 8000)
+    >>> bool(abs(chain.run(x=x) - chain.run_exact(x=x)).max() <= chain.bound <= chain.specification.max_error)
+    True
+    """
+
+    core: ChainDesign = field(repr=False)
+    """The design in the form of the inner packages."""
+
+    @property
+    def specification(self) -> ChainSpecification:
+        """The specification that was designed."""
+        return ChainSpecification(self.core.spec)
+
+    @property
+    def name(self) -> str:
+        """Name of the top module and of the files."""
+        return self.core.name
+
+    @property
+    def stages(self) -> tuple[Design, ...]:
+        """The stages, each a design of its own, in the order of the samples."""
+        return tuple(Design(stage.design) for stage in self.core.stages)
+
+    @property
+    def factor(self) -> int:
+        """Samples of a channel for each result."""
+        return self.core.factor
+
+    @property
+    def bound(self) -> Quantity:
+        """Proven bound on ``|hardware - exact|`` from end to end, for all inputs in range."""
+        return self._in_unit(float(self.core.bound))
+
+    @property
+    def budget(self) -> dict[str, Quantity]:
+        """What each stage adds to `bound`: its own error times `gains`."""
+        return {stage.spec.name: self._in_unit(float(stage.share)) for stage in self.core.stages}
+
+    @property
+    def gains(self) -> dict[str, float]:
+        """How much of an error at each stage's output reaches the end at most, proven."""
+        return {stage.spec.name: float(stage.gain) for stage in self.core.stages}
+
+    @property
+    def folding(self) -> dict[str, tuple[float, float]]:
+        """Largest gains of what comes out at another frequency, and the frequencies in Hz where they are reached.
+
+        "anywhere" is of all of it, "passband" of what comes out in the pass band, if a stage states one; empty for a
+        chain that does not decimate. Both are proven.
+        """
+        rate = self.core.spec.base.sample_rate
+        peaks = {"anywhere": self.core.folding, "passband": self.core.passing}
+        return {name: (float(peak.gain), float(peak.at * rate)) for name, peak in peaks.items() if peak is not None}
+
+    @cached_property
+    def manifest(self) -> dict[str, Any]:
+        """What software needs to know of the chain: the content of ``<name>.json``."""
+        return chain_manifest(self.core)
+
+    @cached_property
+    def certificate(self) -> ChainCertificate:
+        """The claims about the chain; `generate` writes it, and the stages' own, with the digests of all files."""
+        from sosmith.interface.chain.certificate import ChainCertificate
+
+        return ChainCertificate(chain_certificate(self.core))
+
+    def frequency_response(self, f: npt.ArrayLike) -> npt.NDArray[np.complex128]:
+        """Return the complex gain from sines at the input to what comes out of them, folded or not.
+
+        Parameters
+        ----------
+        f : array_like
+            Frequencies in Hz.
+
+        Raises
+        ------
+        SpecificationError
+            If a frequency is not a finite real number.
+        """
+        frequencies = real_numbers(f, "frequencies")
+        if not np.isfinite(frequencies).all():
+            raise SpecificationError(f"frequencies must be finite, not {frequencies[~np.isfinite(frequencies)][0]}")
+        return chain_gain(self.core, frequencies)
+
+    def run(self, **inputs: npt.ArrayLike) -> Floats:
+        """Compute the output of the hardware for `inputs` bit for bit, starting from reset.
+
+        Raises
+        ------
+        SpecificationError
+            If an input is missing, unknown, complex or not finite, or the shapes do not fit.
+        """
+        return self.core.spec.base.output.decode(self._computed(encoded(self._first, inputs)))
+
+    def run_codes(self, **inputs: npt.ArrayLike) -> Codes:
+        """Compute as `run` does, but from integer codes to integer codes; errors as there."""
+        return self._computed(codes_of(self._first, inputs))
+
+    def run_exact(self, **inputs: npt.ArrayLike) -> Floats:
+        """Compute the exact result that `run` approximates: from the same input codes, in double precision."""
+        codes = encoded(self._first, inputs)
+        block = codes.reshape(len(codes), -1, codes.shape[-1])
+        return golden_chain(self.core, block).reshape(-1, *codes.shape[1:-1])
+
+    def generate(self, folder: str | PathLike[str], progress: Progress = lambda step, done, total: None) -> list[Path]:
+        """Write the files of all stages, the top that joins them, manifest, C model and certificate.
+
+        Raises
+        ------
+        SpecificationError
+            If the folder cannot be written.
+        ToolError
+            If Yosys fails, or the disk is full.
+        """
+        return generate_chain(self.core, Path(fspath(folder)), lambda step: progress(step, 0, 0))
+
+    def simulate(
+        self,
+        trace: str | PathLike[str] | Mapping[str, npt.ArrayLike] | None = None,
+        *,
+        folder: str | PathLike[str] | None = None,
+        seconds: float | None = None,
+        simulator: str = "verilator",
+        idle: float = 0.3,
+        stall: float = 0.3,
+        waves: bool = False,
+        seed: int = 1,
+        progress: Progress = lambda step, done, total: None,
+    ) -> ChainReport:
+        """Simulate the top with all cores, and compare every result with the integer models and the exact result.
+
+        Parameters are those of `Design.simulate`, and errors too.
+        """
+        from sosmith.gen.chain.report import write_chain_report
+        from sosmith.interface.chain.report import ChainReport
+        from sosmith.sim.chain import simulate_chain
+
+        for name, share in (("idle", idle), ("stall", stall)):
+            if not 0 <= share <= 0.99:
+                raise SpecificationError(f"{name} must be from 0 to 0.99, not {share}")
+        place = Path("build") / self.name if folder is None else Path(fspath(folder))
+        progress("trace", 0, 0)
+        traces = traces_of(self._first, trace, seed=seed, seconds=seconds)
+        run = simulate_chain(
+            self.core,
+            side_by_side([each.codes for each in traces]),
+            place,
+            simulator=simulator,
+            seed=seed,
+            idle=idle,
+            stall=stall,
+            waves=waves,
+            progress=progress,
+        )
+        run = replace(run, scenario=traces[0].name)
+        progress("writing the report", 0, 0)
+        return ChainReport(write_chain_report(self.core, run, place), place, run)
+
+    def plot(self, path: str | PathLike[str]) -> Path:
+        """Draw the gain of the chain and of its stages, and the limit of what folds, into a file; return its path.
+
+        Raises
+        ------
+        SpecificationError
+            If the name ends in neither .svg nor .png, or the folder cannot be written.
+        """
+        from sosmith.gen.chain.picture import chain_plot
+        from sosmith.gen.picture import format_of
+        from sosmith.model.text_files import write_contents
+
+        target = Path(fspath(path))
+        (written,) = write_contents(target.parent, {target.name: chain_plot(self.core, format_of(target))})
+        return written
+
+    def tables(self, *, details: bool = False) -> list[Table]:
+        """Return what `sosmith design` shows: stages, error budget and what folds; with `details` each stage's own."""
+        tables = chain_tables(self.core)
+        if details:
+            for stage in self.stages:
+                tables += stage.tables()
+        return tables
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the `manifest`, and what folds."""
+        return self.manifest | {
+            "folding": {name: {"gain": gain, "at": at} for name, (gain, at) in self.folding.items()}
+        }
+
+    @property
+    def _first(self) -> Any:
+        return self.core.stages[0].design
+
+    def _computed(self, codes: Codes) -> Codes:
+        block = codes[:, None, :] if codes.ndim == 2 else codes
+        results = self.core.compute(block)
+        return results[:, 0] if codes.ndim == 2 else results
+
+    def _in_unit(self, value: float) -> Quantity:
+        return Quantity(value, self.core.spec.base.output.unit)
+
+    def __repr__(self) -> str:
+        stages = " -> ".join(stage.spec.name for stage in self.core.stages)
+        return f"<sosmith.Chain {self.name}: {stages}, error at most {self.bound}>"
+
+
+def design_chain(
+    specification: ChainSpecification | str | PathLike[str] | Mapping[str, Any],
+    *,
+    board: str | None = None,
+    progress: Progress = lambda step, done, total: None,
+) -> Chain:
+    """Design a chain: formats between the stages, each stage by itself, and prove the error from end to end.
+
+    Parameters
+    ----------
+    specification : ChainSpecification, path or mapping
+        The specification; a path or a mapping is passed to `ChainSpecification.load`.
+    board : str
+        Name of the target board, as for `design`.
+    progress : callable
+        Called with the name of each step, 0 and 0.
+
+    Raises
+    ------
+    SpecificationError
+        If a stage breaks a rule, or there is no such board.
+    ShortfallError
+        If no word lengths meet the allowed error.
+    """
+    spec = specification if isinstance(specification, ChainSpecification) else ChainSpecification.load(specification)
+    target = None if board is None else find_board(board)
+    with falling_short(spec.checked.base.path):
+        return Chain(design_stages(spec.checked, board=target, progress=lambda step: progress(step, 0, 0)))

@@ -1,0 +1,126 @@
+"""Specifications of chains."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from sosmith.gen.chain.specification import ChainSpec, chain_from_tree, is_chain, load_chain
+from sosmith.gen.facts.table import Table, View
+from sosmith.gen.specification.exact_values import exact
+from sosmith.gen.specification.specification import parsed, text_of
+from sosmith.interface.quantity import Quantity
+from sosmith.interface.specification import Specification, path_of
+
+
+@dataclass(frozen=True)
+class ChainSpecification(View):
+    """A checked specification of a chain of stages; make one with `load`.
+
+    Examples
+    --------
+    >>> import sosmith
+    >>> spec = sosmith.ChainSpecification.load({
+    ...     "name": "receiver",
+    ...     "sample_rate": 64000,
+    ...     "input": {"x": {"bits": 12, "range": [-1.0, 1.0], "signed": True}},
+    ...     "stage": [
+    ...         {"name": "cic", "kind": "cic", "order": 3, "decimate": 8},
+    ...         {"name": "channel", "kind": "fir", "taps": [0.25, 0.5, 0.25]},
+    ...     ],
+    ...     "output": {"bits": 16, "range": [-1.0, 1.0], "signed": True},
+    ... })
+    >>> spec, spec.factor
+    (<sosmith.ChainSpecification receiver: cic -> channel, 64000 Hz to 8000 Hz>, 8)
+    """
+
+    checked: ChainSpec = field(repr=False)
+    """The same specification with every number as an exact `fractions.Fraction`."""
+
+    @classmethod
+    def load(cls, source: str | PathLike[str] | Mapping[str, Any]) -> ChainSpecification:
+        """Read and check a TOML file with tables ``[[stage]]``, or a dict with the same keys.
+
+        Raises
+        ------
+        SpecificationError
+            For all errors of the keys, with the path of each, what was expected and what was given.
+        """
+        if isinstance(source, Mapping):
+            return cls(chain_from_tree(exact(source), Path("specification")))
+        return cls(load_chain(Path(path_of(source, "the specification must be a path or a dict"))))
+
+    @property
+    def name(self) -> str:
+        """Name of the top module and of the files."""
+        return self.checked.name
+
+    @property
+    def stages(self) -> tuple[str, ...]:
+        """Names of the stages, in the order of the samples."""
+        return tuple(stage.name for stage in self.checked.stages)
+
+    @property
+    def factor(self) -> int:
+        """Samples of a channel for each result."""
+        return self.checked.factor
+
+    @property
+    def sample_rate(self) -> float:
+        """Samples per second of each channel, in Hz."""
+        return float(self.checked.base.sample_rate)
+
+    @property
+    def channels(self) -> int:
+        """Number of channels."""
+        return self.checked.base.channels
+
+    @property
+    def inputs(self) -> dict[str, str]:
+        """Unit of each input by its name, in the order of the fields in the hardware."""
+        return {port.name: port.unit for port in self.checked.base.inputs}
+
+    @property
+    def max_error(self) -> Quantity:
+        """Largest allowed difference between hardware and exact result, in the unit of the output."""
+        return Quantity(float(self.checked.base.max_error), self.checked.base.output.unit)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the keys as given, in JSON types; `load` accepts them."""
+        return dict(self.checked.source)
+
+    def toml(self) -> str:
+        """Return the specification as the text of a TOML file; `load` reads back the same."""
+        return self.checked.text
+
+    def tables(self) -> list[Table]:
+        """Return the stages: name, kind, rate and factor."""
+        rows = [
+            (stage.name, f"{stage.kind}, {float(stage.rate):g} Hz, 1 of {stage.factor}")
+            for stage in self.checked.stages
+        ]
+        return [Table(f"Chain {self.name}", rows, ("stage", "what it is"))]
+
+    def __repr__(self) -> str:
+        rate = self.sample_rate
+        return (
+            f"<sosmith.ChainSpecification {self.name}: {' -> '.join(self.stages)}, "
+            f"{rate:g} Hz to {rate / self.factor:g} Hz>"
+        )
+
+
+def specification_in(source: str | PathLike[str]) -> Specification | ChainSpecification:
+    """Read a specification file: that of a chain if it has tables ``[[stage]]``, or else that of a core.
+
+    Raises
+    ------
+    SpecificationError
+        As the `load` of either.
+    """
+    path = Path(path_of(source, "the specification must be a path"))
+    if is_chain(parsed(text_of(path), path)):
+        return ChainSpecification.load(source)
+    return Specification.load(source)

@@ -1,0 +1,178 @@
+"""Specifications of chains: what each table becomes, and every refusal word for word."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import sosmith
+from sosmith.model.errors import SpecificationError
+
+TREE: dict[str, Any] = {
+    "name": "rx",
+    "sample_rate": 8000.0,
+    "input": {"x": {"bits": 8, "range": [-1.0, 1.0], "signed": True}},
+    "stage": [
+        {"name": "slow", "kind": "cic", "order": 2, "decimate": 4},
+        {"name": "half", "kind": "halfband", "passband_edge": 300.0, "passband_loss": 0.1, "stopband_loss": 40.0},
+        {"name": "low", "kind": "iir", "family": "butterworth", "order": 2, "cutoff": 200.0, "decimate": 2},
+        {"name": "amp", "kind": "gain", "factor": -1.5},
+    ],
+    "output": {"bits": 10, "range": [-1.0, 1.0], "signed": True},
+}
+
+
+def loaded(change: Callable[[dict[str, Any]], object] = lambda tree: None) -> sosmith.ChainSpecification:
+    tree = copy.deepcopy(TREE)
+    change(tree)
+    return sosmith.ChainSpecification.load(tree)
+
+
+def test_each_stage_becomes_a_specification_of_its_own() -> None:
+    spec = loaded()
+    assert spec.stages == ("slow", "half", "low", "amp")
+    assert spec.factor == 8
+    tables = {stage.name: stage.tables["filter"] for stage in spec.checked.stages}
+    assert [float(tap) * 16 for tap in tables["slow"]["taps"]] == [1, 2, 3, 4, 3, 2, 1]
+    assert tables["half"]["stopband_edge"] == 700
+    assert tables["half"]["kind"] == tables["low"]["kind"] == "lowpass"
+    assert [stage.rate for stage in spec.checked.stages] == [8000, 2000, 2000, 1000]
+    assert spec.checked.edge == 200
+    assert tables["amp"]["taps"] == [Fraction(-3, 2)]
+
+
+def test_text_and_keys_read_back_the_same(tmp_path: Path) -> None:
+    spec = loaded()
+    assert sosmith.ChainSpecification.load(spec.as_dict()).checked.stages == spec.checked.stages
+    (tmp_path / "rx.toml").write_text(spec.toml(), encoding="utf-8")
+    assert spec.toml().count("[[stage]]\n") == 4
+    assert sosmith.ChainSpecification.load(tmp_path / "rx.toml").checked.stages == spec.checked.stages
+
+
+def stage(k: int, **keys: Any) -> Callable[[dict[str, Any]], object]:
+    """Return a change of a stage; None takes a key away."""
+
+    def change(tree: dict[str, Any]) -> None:
+        tree["stage"][k] |= keys
+        tree["stage"][k] = {key: value for key, value in tree["stage"][k].items() if value is not None}
+
+    return change
+
+
+def hardware(**keys: Any) -> Callable[[dict[str, Any]], object]:
+    return lambda tree: tree.update(hardware=keys)
+
+
+REFUSED: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
+    "interpolate": (
+        stage(0, interpolate=2),
+        "not yet available: stage[0].interpolate must be left out, as stages only lower the rate, not 2",
+    ),
+    "unknown key": (
+        stage(3, order=2),
+        "stage[3].order must be one of the keys name, kind, architecture, realization, multipliers, factor in a stage "
+        "of the kind gain, not an unknown one",
+    ),
+    "kind": (
+        stage(0, kind="fft"),
+        "stage[0].kind must be one of polynomial, gain, iir, fir, halfband, cic, not 'fft'",
+    ),
+    "polynomial": (
+        stage(1, kind="polynomial", passband_edge=None, passband_loss=None, stopband_loss=None),
+        "stage[1].kind must be another kind behind the first stage, as a polynomial makes of an error another one for "
+        "each value, not polynomial",
+    ),
+    "auto": (
+        stage(2, decimate="auto"),
+        "stage[2].decimate must be a whole number in a stage, as the rates of the stages behind it follow from it, not "
+        "'auto'",
+    ),
+    "cic without": (stage(0, decimate=None), "stage[0].decimate must be given for a CIC filter, not missing"),
+    "cic by 3": (
+        stage(0, decimate=3),
+        "stage[0].decimate must be a power of two for a CIC filter, whose weights are then exact, not 3",
+    ),
+    "long cic": (
+        stage(0, order=5, decimate=64),
+        "stage[0].decimate must be such that order * (decimate - 1) is below 256, as a CIC filter is built as the FIR "
+        "filter that it is; two stages one behind the other decimate further, not 64",
+    ),
+    "same name": (
+        stage(1, name="slow"),
+        "stage[1].name must be another name than those of the stages before, not 'slow'",
+    ),
+    "begins": (
+        stage(1, name="slow_down"),
+        "stage[1].name must be a name that does not begin with slow_, as parts of the stage slow do, not 'slow_down'",
+    ),
+    "family": (
+        stage(2, family="kaiser"),
+        "stage[2].family must be a family with poles in a stage of the kind iir, not 'kaiser'",
+    ),
+    "rate": (
+        lambda tree: tree["stage"].insert(0, {"name": "third", "kind": "fir", "taps": [1], "decimate": 3}),
+        "stage[1] must be at a rate that is a decimal number, in which its edges can be compared, not at "
+        "2666.6666666666665 Hz",
+    ),
+    "filter": (
+        lambda tree: tree.update(filter={"taps": [1.0]}),
+        "filter must be left out with [[stage]], which takes name, sample_rate, channels, input, stage, output, "
+        "hardware, not a table",
+    ),
+    "none": (lambda tree: tree.update(stage=[]), "stage must be a list of 1 to 8 tables [[stage]], not 0 of them"),
+    "reload": (
+        hardware(reload=True),
+        "not yet available: hardware.reload must be false with [[stage]], as the bound of a chain holds for constants "
+        "that stay, and registers are those of one core, not true",
+    ),
+    "protect": (
+        hardware(protect="detect"),
+        "not yet available: hardware.protect must be 'none' with [[stage]], as a fault is a flag of a stage's own "
+        "results, which the next stage does not hand on, not 'detect'",
+    ),
+    "start": (
+        hardware(start="zero"),
+        "not yet available: hardware.start must be 'steady' with [[stage]], as the flag settling is of a stage's own "
+        "results, which the next stage does not hand on, not 'zero'",
+    ),
+    "samples": (
+        hardware(samples_per_clock=2),
+        "not yet available: hardware.samples_per_clock must be 1 with [[stage]], as a stage behind one that decimates "
+        "has no beats of several samples, not 2",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_a_chain_does_not_take_is_refused(name: str) -> None:
+    change, sentence = REFUSED[name]
+    with pytest.raises(SpecificationError) as refused:
+        loaded(change)
+    assert str(refused.value) == f"specification: {sentence}"
+
+
+def test_a_stage_that_breaks_a_rule_of_filters_is_named() -> None:
+    with pytest.raises(SpecificationError) as refused:
+        loaded(stage(2, cutoff=900.0))
+    assert str(refused.value).startswith("specification: stage low: filter.decimate must be ")
+
+
+def test_a_chain_is_no_specification_of_a_core() -> None:
+    with pytest.raises(SpecificationError) as refused:
+        sosmith.Specification.load(TREE)
+    assert str(refused.value) == (
+        "specification: not yet available: stage must be left out here, as a chain is for design, generate, simulate "
+        "and verify alone, not [a table, a table, a table, a table]"
+    )
+
+
+def test_an_error_that_is_too_small_is_refused() -> None:
+    tree = copy.deepcopy(TREE)
+    tree["output"] |= {"bits": 32, "max_error": 2.4e-10}
+    with pytest.raises(sosmith.ShortfallError, match=r"stage \w+: .*"):
+        sosmith.design_chain(tree)

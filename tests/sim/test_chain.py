@@ -1,0 +1,82 @@
+"""Chains in the simulators: all cores with the top, with random handshakes, against the integer models in a row."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.gen.chain.chains import draw, stimulus
+
+import sosmith
+from sosmith.sim import chain as simulation
+
+SEEDS = range(24)
+FEW = (3,)
+CASES = [pytest.param(seed, marks=[] if seed in FEW else pytest.mark.slow) for seed in SEEDS]
+
+
+@pytest.mark.parametrize("simulator", ["verilator", "icarus"])
+@pytest.mark.parametrize("seed", CASES)
+def test_the_hardware_equals_the_models(seed: int, simulator: str, tmp_path: Path) -> None:
+    chain = sosmith.design_chain(draw(seed))
+    codes = stimulus(chain, 700, seed)
+    (port,) = chain.core.spec.base.inputs
+    report = chain.simulate({"x": port.decode(codes)}, folder=tmp_path, simulator=simulator, seed=seed)
+    assert report.bit_exact
+    assert report.passed
+    assert report.summary["samples"] == -(-700 // chain.factor) * chain.core.spec.base.channels
+    assert report.summary["error"]["max_abs"] <= report.summary["error"]["bound"] == float(chain.bound)
+    assert (tmp_path / "report.html").read_text(encoding="utf-8").count("<svg") == 2
+
+
+def test_a_calibration_before_a_filter(tmp_path: Path) -> None:
+    chain = sosmith.design_chain(instrument())
+    volts, degrees = (
+        np.linspace(port.lowest, port.highest, 200).astype(np.int64) for port in chain.core.spec.base.inputs
+    )
+    results = chain.run_codes(voltage=volts, temperature=degrees[::-1].copy())
+    report = chain.simulate(
+        {
+            port.name: port.decode(codes)
+            for port, codes in zip(chain.core.spec.base.inputs, (volts, degrees[::-1]), strict=True)
+        },
+        folder=tmp_path,
+        simulator="icarus",
+    )
+    assert report.passed
+    assert np.array_equal(report.run.received[:, 0], results)
+
+
+def instrument() -> dict[str, Any]:
+    return {
+        "name": "gauge",
+        "sample_rate": 100.0,
+        "input": {
+            "voltage": {"bits": 10, "range": [0.0, 10.0]},
+            "temperature": {"bits": 10, "range": [0.0, 128.0]},
+        },
+        "stage": [
+            {"name": "cal", "kind": "polynomial", "coefficients": [[1.16, -0.0036], [0.3672, 0.0006618], [0.05812]]},
+            {"name": "low", "kind": "fir", "taps": [0.25, 0.5, 0.25], "decimate": 2},
+        ],
+        "output": {"bits": 12, "range": [0.0, 16.0], "unit": "mm"},
+    }
+
+
+def test_a_core_that_gives_another_result_is_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A top in which a stage is taken twice is no chain, and the run says so."""
+    whole = simulation.whole_text
+
+    def crossed(design: Any, directory: Path) -> str:
+        return whole(design, directory).replace(
+            ".m_axis_tdata(m_axis_tdata)", ".m_axis_tdata({m_axis_tdata[14:0], m_axis_tdata[15]})"
+        )
+
+    monkeypatch.setattr(simulation, "whole_text", crossed)
+    chain = sosmith.design_chain(instrument())
+    report = chain.simulate({"voltage": [1.0] * 8, "temperature": [20.0] * 8}, folder=tmp_path, simulator="icarus")
+    assert not report.passed
+    assert report.summary["mismatches"] > 0
+    assert "differs from the integer models" in report.summary["shortfalls"][0]

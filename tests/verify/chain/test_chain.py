@@ -1,0 +1,211 @@
+"""The proof of a chain: what it accepts, and that it refuses each claim, wire and word that was changed."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import sosmith
+from sosmith.model.errors import ShortfallError, SpecificationError
+from sosmith.verify.certificate_file import entries_text
+from sosmith.verify.chain.chain_file import ChainCertificate, read_chain, sealed_chain
+
+TREE: dict[str, Any] = {
+    "name": "rx",
+    "sample_rate": 8000.0,
+    "input": {"x": {"bits": 8, "range": [-1.0, 1.0], "signed": True}},
+    "stage": [
+        {"name": "slow", "kind": "cic", "order": 2, "decimate": 2},
+        {"name": "low", "kind": "iir", "family": "butterworth", "order": 2, "cutoff": 400.0, "architecture": "folded"},
+        {"name": "out", "kind": "fir", "taps": [0.25, 0.5, 0.25], "decimate": 2},
+    ],
+    "output": {"bits": 10, "range": [-1.0, 1.0], "signed": True},
+}
+CERTIFICATE = "rx.certificate.json"
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("chain")
+    chain = sosmith.design_chain(TREE)
+    chain.generate(folder)
+    (folder / "rx.toml").write_text(chain.specification.toml(), encoding="utf-8")
+    return folder
+
+
+@pytest.fixture
+def folder(written: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(written, tmp_path / "copy"))
+
+
+def proven(folder: Path, *, spec: bool = True) -> sosmith.ChainProof:
+    return sosmith.ChainCertificate.load(folder / CERTIFICATE).verify(
+        files=folder, spec=folder / "rx.toml" if spec else None
+    )
+
+
+def sealed_again(folder: Path, change: Callable[[dict[str, Any]], None] = lambda tree: None) -> None:
+    """Change claims, and give the certificate the digests of the files as they are, and its own."""
+    tree = read_chain(folder / CERTIFICATE).model_dump(mode="json")
+    change(tree)
+    for entry in (*tree["files"], *(stage["certificate"] for stage in tree["stages"])):
+        entry["sha256"] = hashlib.sha256((folder / entry["name"]).read_bytes()).hexdigest()
+    certificate = sealed_chain(ChainCertificate.model_validate(tree))
+    (folder / CERTIFICATE).write_text(entries_text(certificate), encoding="utf-8")
+
+
+def test_all_of_a_chain_is_proven(folder: Path) -> None:
+    proof = proven(folder)
+    assert not proof.missing
+    assert {"chain", "stages", "top"} <= {name for name, part in proof.scope.items() if part.state.value == "proven"}
+    assert proof.files == 19
+    assert sum(proof.budget.values()) == pytest.approx(proof.bound)
+    assert proof.bound <= proof.allowed
+
+
+def test_sealing_again_changes_nothing(folder: Path) -> None:
+    before = (folder / CERTIFICATE).read_bytes()
+    sealed_again(folder)
+    assert (folder / CERTIFICATE).read_bytes() == before
+
+
+def changed(path: str, value: Callable[[str], str]) -> Callable[[dict[str, Any]], None]:
+    """Return a change of one claim, by keys and indices with dots."""
+
+    def change(tree: Any) -> None:
+        *way, last = path.split(".")
+        for key in way:
+            tree = tree[int(key) if key.isdigit() else key]
+        tree[last] = value(tree[last])
+
+    return change
+
+
+def less(text: str) -> str:
+    """Return a rational that is 1 % less."""
+    return str(Fraction(text) * Fraction(99, 100))
+
+
+def more(text: str) -> str:
+    """Return a rational that is 1 % more."""
+    return str(Fraction(text) * Fraction(101, 100))
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "sentence"),
+    [
+        ("stages.0.gain", less, r"^the gain behind stage slow must be .*, not .*$"),
+        ("stages.0.gain", more, r"^the gain behind stage slow must be .*, not .*$"),
+        ("stages.1.error", less, r"^the error of stage low must be .*, not .*$"),
+        ("bound", less, r"^the bound of the chain must be .*, not .*$"),
+        ("max_error", lambda _: "1/4096", r"^the bound of the chain must be at most 0\.000244141, not .*$"),
+        ("folding.anywhere.gain", less, r"^the largest gain of what folds must be at least .*, not .*$"),
+        ("folding.anywhere.gain", more, r"^the largest gain of what folds must be that at .* or little more, not .*$"),
+        ("folding.passing.gain", less, r"^the largest gain into the pass band must be at least .*, not .*$"),
+        ("folding.factor", lambda _: 8, r"^the factor of the chain must be 4, not 8$"),
+        ("channels", lambda _: 2, r"^stage slow must have 2 channels, not 1$"),
+        ("stages.2.kind", lambda _: "polynomial", r"^stage out must have a polynomial if it is one, and no other$"),
+    ],
+)
+def test_a_claim_that_does_not_follow_is_refused(
+    path: str, value: Callable[[Any], Any], sentence: str, folder: Path
+) -> None:
+    sealed_again(folder, changed(path, value))
+    with pytest.raises(ShortfallError, match=sentence):
+        proven(folder, spec=False)
+
+
+def test_a_certificate_that_was_changed_is_refused(folder: Path) -> None:
+    text = (folder / CERTIFICATE).read_text(encoding="utf-8")
+    (folder / CERTIFICATE).write_text(text.replace('"channels": 1', '"channels": 2'), encoding="utf-8")
+    with pytest.raises(ShortfallError, match=r"^the SHA-256 of the certificate itself must be .*: it was changed$"):
+        proven(folder)
+
+
+def test_a_stage_that_was_changed_is_refused(folder: Path) -> None:
+    path = folder / "rx_low.certificate.json"
+    path.write_text(path.read_text(encoding="utf-8") + " ", encoding="utf-8")
+    with pytest.raises(ShortfallError, match=r"rx_low\.certificate\.json must have the SHA-256 .*, not .*$"):
+        proven(folder)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        (
+            ".s_axis_tvalid(stage_slow_tvalid)",
+            ".s_axis_tvalid(s_axis_tvalid)",
+            r"^s_axis_tvalid of rx_low must be the ",
+        ),
+        (".s_axis_tdata(stage_low_tdata)", ".s_axis_tdata(stage_slow_tdata)", r"^s_axis_tdata of rx_out must be the "),
+        (
+            ".aresetn(aresetn),\n    .s_axis_tdata(stage_low",
+            ".aresetn(s_axis_tvalid),\n    .s_axis_tdata(stage_low",
+            r"^aresetn of rx_out must be that of rx, not s_axis_tvalid$",
+        ),
+        ("endmodule", "  reg held;\n  always_ff @(posedge aclk) held <= aresetn;\nendmodule", r"alone$"),
+        (
+            "endmodule",
+            "  wire spare;\n  assign spare = aresetn;\nendmodule",
+            r"^rx must have instances and wires alone$",
+        ),
+        ("  rx_low stage_low (", "  rx_slow stage_low (", r"."),
+    ],
+)
+def test_another_wire_is_refused(old: str, new: str, sentence: str, folder: Path) -> None:
+    path = folder / "rx.sv"
+    text = path.read_text(encoding="utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new, 1), encoding="utf-8")
+    sealed_again(folder)
+    with pytest.raises(ShortfallError, match=sentence):
+        proven(folder, spec=False)
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "sentence"),
+    [
+        ("rx.c", "result, status))", "result, NULL))", r"^rx\.c must have status after "),
+        ("rx.c", "return 1;", "return 0;", r"^rx\.c must have 1 after "),
+        ("rx.h", "rx_low_state low;", "rx_slow_state low;", r"^rx\.h must have rx_low_state after "),
+        ("rx.json", '"decimate": 4', '"decimate": 2', r"^decimate of the manifest must be 4, not 2$"),
+    ],
+)
+def test_another_model_or_manifest_is_refused(file: str, old: str, new: str, sentence: str, folder: Path) -> None:
+    path = folder / file
+    text = path.read_text(encoding="utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new, 1), encoding="utf-8")
+    sealed_again(folder)
+    with pytest.raises(ShortfallError, match=sentence):
+        proven(folder, spec=False)
+
+
+def test_other_words_are_refused(folder: Path) -> None:
+    path = folder / "rx.toml"
+    text = path.read_text(encoding="utf-8")
+    path.write_text(text.replace("cutoff = 400.0", "cutoff = 401.0"), encoding="utf-8")
+    with pytest.raises(ShortfallError, match=r"^the specification must have the text in the certificate of the chain$"):
+        proven(folder)
+    other = path.read_text(encoding="utf-8")
+    sealed_again(folder, lambda tree: tree.update(specification=other))
+    with pytest.raises(
+        ShortfallError, match=r"^the filter of stage low must be as the specification of the chain says"
+    ):
+        proven(folder)
+
+
+def test_a_certificate_without_a_file_has_no_stages_beside_it() -> None:
+    certificate = sosmith.design_chain(TREE | {"stage": TREE["stage"][2:]}).certificate
+    with pytest.raises(
+        SpecificationError, match=r"^the certificate of a chain must be read from a file, beside those of"
+    ):
+        certificate.verify()
+    assert json.loads(certificate.text())["format"] == "sosmith chain certificate 1"

@@ -1,0 +1,73 @@
+"""The C model of a chain: each sample goes through the models of the stages, which are proven by themselves, in order.
+
+Only one text says that, apart from comments and blanks, so that it is compared token by token.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+
+from sosmith.verify.certificate_file import Certificate
+from sosmith.verify.chain.chain_file import ChainCertificate
+from sosmith.verify.chain.responses import factor_of, parts_of
+from sosmith.verify.graph import require
+
+_COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
+_TOKEN = re.compile(r"\w+|\S")
+
+
+def check_chain_model(source: str, header: str, chain: ChainCertificate, cores: Sequence[Certificate]) -> None:
+    """Check the two files of a chain's C model.
+
+    Raises
+    ------
+    RejectedError
+        If a token is another one.
+    """
+    name = chain.name
+    samples = ", ".join(f"int64_t {port.name}_code" for port in chain.inputs)
+    push = f"int {name}_push({name}_state *state, {samples}, int64_t *result, uint8_t *status)"
+    reset = f"void {name}_reset({name}_state *state)"
+    guard = f"{name.upper()}_H"
+    cpp = "#ifdef __cplusplus"
+    state = f"{' '.join(('typedef struct {', *_fields(chain, cores)))} }} {name}_state; {reset}; {push};"
+    wanted = [f"#ifndef {guard}", f"#define {guard}", *(f'#include "{core.name}.h"' for core in cores)]
+    wanted += [cpp, 'extern "C" {', "#endif", state, cpp, "}", "#endif", "#endif"]
+    _same(header, wanted, f"{name}.h")
+    body = f"{reset} {{ memset(state, 0, sizeof *state); }} {push} {{ {' '.join(_calls(chain, cores))} return 1; }}"
+    _same(source, [f'#include "{name}.h"', "#include <string.h>", body], f"{name}.c")
+
+
+def _decimates(core: Certificate) -> bool:
+    return factor_of(parts_of(core)) > 1
+
+
+def _fields(chain: ChainCertificate, cores: Sequence[Certificate]) -> Iterator[str]:
+    for entry, core in zip(chain.stages, cores, strict=True):
+        yield f"{core.name}_{'decimator' if _decimates(core) else 'state'} {entry.name};"
+
+
+def _calls(chain: ChainCertificate, cores: Sequence[Certificate]) -> Iterator[str]:
+    given = ", ".join(f"{port.name}_code" for port in chain.inputs)
+    for k, (entry, core) in enumerate(zip(chain.stages, cores, strict=True)):
+        flags = "status" if k == len(cores) - 1 else "NULL"
+        if _decimates(core):
+            yield f"if (!{core.name}_push(&state->{entry.name}, {given}, result, {flags})) return 0;"
+        else:
+            yield f"*result = {core.name}_step(&state->{entry.name}, {given}, {flags});"
+        given = "*result"
+
+
+def _same(text: str, wanted: Sequence[str], what: str) -> None:
+    own = [token for line in _COMMENT.sub(" ", text).split("\n") for token in _tokens(line)]
+    other = [token for line in wanted for token in _tokens(line)]
+    for k, token in enumerate(other):
+        read = own[k] if k < len(own) else ""
+        require(read == token, f"{what} must have {token} after {' '.join(other[max(0, k - 4) : k])!r}, not {read!r}")
+    require(len(own) == len(other), f"{what} must end after {' '.join(other[-4:])!r}, not go on")
+
+
+def _tokens(line: str) -> list[str]:
+    """Return the tokens of a line; a line for the preprocessor is one, since it ends what it says."""
+    return [line.strip()] if line.strip().startswith("#") else _TOKEN.findall(line)

@@ -1,0 +1,94 @@
+"""The file format of a chain's certificate: its stages' certificates by their digests, and what follows from them.
+
+Numbers are written as in the certificate of a core. Errors and bounds are in the unit of the output, gains have none.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from sosmith.verify.certificate_file import (
+    Entry,
+    FileEntry,
+    LongText,
+    PortEntry,
+    Rational,
+    Sha256,
+    Text,
+    entries_text,
+    read_entries,
+)
+
+
+class ChainStageEntry(Entry):
+    """A stage: its certificate, its own error, and how much of that reaches the end at most."""
+
+    name: Text
+    kind: Literal["polynomial", "gain", "iir", "fir", "halfband", "cic"]
+    certificate: FileEntry
+    error: Rational
+    gain: Rational
+
+
+class LargestEntry(Entry):
+    """A gain that nothing exceeds, and a frequency in units of the sample rate at which hardly less is reached."""
+
+    gain: Rational
+    at: Rational
+
+
+class FoldingEntry(Entry):
+    """What comes out at another frequency than it went in, as only every `factor`-th sample leaves.
+
+    `anywhere` bounds the gain of all of it: of frequencies from half the lower rate on. `passing` bounds that of what
+    comes out at a frequency up to `edge`, in units of the sample rate; both are None without a pass band.
+    """
+
+    factor: Annotated[int, Field(strict=True, ge=2, le=1 << 20)]
+    anywhere: LargestEntry
+    edge: Rational | None = None
+    passing: LargestEntry | None = None
+
+
+class ChainCertificate(Entry):
+    """The certificate of a chain.
+
+    The exact result is that of the stages' exact calculations one behind the other, limited to the output's range once,
+    at the end. `specification` is the whole text, TOML, and `files` are those of the whole: those of the stages stand
+    in their own certificates. `certificate` is the SHA-256 of this file's own text with 64 zeros in this place.
+    """
+
+    format: Literal["sosmith chain certificate 1"]
+    name: Text
+    specification: LongText
+    inputs: Annotated[tuple[PortEntry, ...], Field(min_length=1, max_length=2)]
+    output: PortEntry
+    max_error: Rational
+    channels: Annotated[int, Field(strict=True, ge=1, le=1 << 16)]
+    stages: Annotated[tuple[ChainStageEntry, ...], Field(min_length=1, max_length=8)]
+    bound: Rational
+    folding: FoldingEntry | None = None
+    files: Annotated[tuple[FileEntry, ...], Field(max_length=8)] = ()
+    certificate: Sha256
+
+
+def sealed_chain(certificate: ChainCertificate) -> ChainCertificate:
+    """Return a certificate with the SHA-256 of its own text."""
+    blank = certificate.model_copy(update={"certificate": "0" * 64})
+    digest = hashlib.sha256(entries_text(blank).encode()).hexdigest()
+    return certificate.model_copy(update={"certificate": digest})
+
+
+def read_chain(path: Path) -> ChainCertificate:
+    """Read the certificate of a chain and check its form.
+
+    Raises
+    ------
+    SpecificationError
+        If the file cannot be read, or is none.
+    """
+    return read_entries(path, ChainCertificate)

@@ -1,0 +1,299 @@
+"""Proves the certificate of a chain: its stages one by one, and what is claimed of all of them together.
+
+The sum over all stages of an error and how much of it reaches the end bounds the whole, if every port between stages
+holds all that can pass it: the exact value, which the response up to there bounds, and the errors made before it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import partial
+from pathlib import Path
+
+from sosmith.verify.bounds.l1_response import UndecidedError
+from sosmith.verify.certificate_file import Certificate, ItemEntry, entries_text, on_grid, read_certificate
+from sosmith.verify.chain.c_model import check_chain_model
+from sosmith.verify.chain.chain_file import ChainCertificate, sealed_chain
+from sosmith.verify.chain.folding import check_folding
+from sosmith.verify.chain.manifest import check_chain_manifest
+from sosmith.verify.chain.responses import Part, parts_of, peak_gain, reach_of
+from sosmith.verify.chain.top import check_top
+from sosmith.verify.chain.words import check_words
+from sosmith.verify.graph import RejectedError, require
+from sosmith.verify.verdict.door import Judgement, Stated, judge
+from sosmith.verify.verdict.generated_files import about_of, ascii_text, content_of, sha256, unicode_text
+from sosmith.verify.verdict.limits import SECONDS, limited
+from sosmith.verify.verdict.scope import Part as ScopePart
+from sosmith.verify.verdict.scope import State
+from sosmith.verify.verification import Progress
+
+_OWN_FILES = ("{}.sv", "{}.json", "{}.c", "{}.h")
+_GRID = Fraction(1, 1 << 64)
+
+
+@dataclass(frozen=True)
+class ChainJudgement:
+    """What is proven of a chain.
+
+    Attributes
+    ----------
+    stages : mapping of str to Judgement
+        Of each stage, by its name.
+    bound : Fraction
+        Bound on the error from end to end, in the unit of the output.
+    budget : mapping of str to Fraction
+        What each stage adds to it.
+    files : int
+        Files that were compared, those of the stages included.
+    scope : mapping of str to Part
+        How much of each part is proven.
+    """
+
+    stages: Mapping[str, Judgement]
+    bound: Fraction
+    budget: Mapping[str, Fraction]
+    files: int
+    scope: Mapping[str, ScopePart] = field(default_factory=dict)
+
+
+def judge_chain(
+    chain: ChainCertificate,
+    progress: Progress,
+    *,
+    folder: Path,
+    content: bytes,
+    text: str | None = None,
+    spec_folder: Path = Path(),
+    with_files: bool = True,
+    seconds: float = SECONDS,
+) -> ChainJudgement:
+    """Prove the certificate of a chain, and hold it against a specification and a folder of files.
+
+    Parameters
+    ----------
+    chain : ChainCertificate
+    progress : callable
+        Called with the name of a step, the amount done and the total.
+    folder : Path
+        Folder of the stages' certificates, and of the files.
+    content : bytes
+        Content of the certificate's own file.
+    text : str or None
+        The specification.
+    spec_folder : Path
+        Its folder.
+    with_files : bool
+        Whether files are proven too.
+    seconds : float
+        Time that each stage, and the whole, may take, in s; 0 for any.
+
+    Raises
+    ------
+    RejectedError
+        If anything is wrong: what is only not proven is in the scope.
+    """
+    _check_seal(chain, content)
+    cores, stages = [], dict[str, Judgement]()
+    for entry in chain.stages:
+        name = f"{chain.name}_{entry.name}"
+        require(
+            entry.certificate.name == f"{name}.certificate.json",
+            f"the certificate of stage {entry.name} must be {name}.certificate.json, not {entry.certificate.name}",
+        )
+        path = folder / entry.certificate.name
+        own = content_of(path)
+        _compare(str(path), entry.certificate.sha256, own)
+        core = read_certificate(path)
+        require(core.name == name, f"the core of stage {entry.name} must be {name}, not {core.name}")
+        data = about_of(core).measurements
+        stated = (
+            None
+            if text is None
+            else Stated(
+                about_of(core).specification,
+                spec_folder,
+                None if data is None else spec_folder / data.name,
+                "calibration" if entry.kind == "polynomial" else "filter",
+            )
+        )
+        try:
+            stages[entry.name] = judge(
+                core,
+                partial(_named, progress, entry.name),
+                stated=stated,
+                folder=folder if with_files else None,
+                content=own,
+                seconds=seconds,
+            )
+        except RejectedError as error:
+            raise RejectedError(f"stage {entry.name}: {error}") from None
+        cores.append(core)
+    with limited(seconds):
+        progress("chain", 0, 0)
+        items = _check_joints(chain, cores)
+        budget = _check_bound(chain, cores)
+        progress("folding", 0, 0)
+        try:
+            check_folding(chain.folding, [part for core in cores for part in parts_of(core)])
+        except UndecidedError as error:
+            raise RejectedError(f"{error} could not be decided") from None
+        if text is not None:
+            check_words(chain, text, cores)
+        files = sum(len(stage.files) for stage in stages.values())
+        if with_files:
+            progress("files", 0, 0)
+            files += _check_files(chain, folder, cores, items, stages)
+    return ChainJudgement(stages, chain.bound, budget, files, _scope(chain, stages, text is not None, with_files))
+
+
+def _named(progress: Progress, stage: str, step: str, done: int, total: int) -> None:
+    progress(f"{stage}: {step}", done, total)
+
+
+def _check_seal(chain: ChainCertificate, content: bytes) -> None:
+    own = sealed_chain(chain).certificate
+    require(
+        chain.certificate == own,
+        f"the SHA-256 of the certificate itself must be {own}, not {chain.certificate}: it was changed",
+    )
+    require(
+        entries_text(chain).encode() == content,
+        "the certificate must have the layout in which it was written, not another one",
+    )
+
+
+def _compare(what: str, stated: str, content: bytes) -> None:
+    digest = sha256(content)
+    require(digest == stated, f"{what} must have the SHA-256 {stated} of the certificate, not {digest}")
+
+
+def _check_joints(chain: ChainCertificate, cores: Sequence[Certificate]) -> list[ItemEntry]:
+    """Check that each stage takes what the one before it gives, and that none has what a chain lacks."""
+    items = []
+    names = [entry.name for entry in chain.stages]
+    require(len(set(names)) == len(names), "the stages of a chain must have names of their own")
+    for k, (entry, core) in enumerate(zip(chain.stages, cores, strict=True)):
+        what = f"stage {entry.name}"
+        item = about_of(core).item
+        if item is None:
+            raise RejectedError(f"the certificate of {what} must state what the item is")
+        plain = not item.reload and not item.hold and item.samples == 1 and item.protect == "none"
+        require(plain, f"{what} must be without reload, hold, protection and several samples a clock")
+        steady = item.start == "steady" or entry.kind == "polynomial"
+        require(steady, f"{what} must start from the steady state of its first sample, not from {item.start}")
+        require(item.channels == chain.channels, f"{what} must have {chain.channels} channels, not {item.channels}")
+        require(
+            (core.ideal.polynomial is not None) == (entry.kind == "polynomial"),
+            f"{what} must have a polynomial if it is one, and no other",
+        )
+        require(
+            entry.kind != "polynomial" or (k == 0 and not core.ideal.sections), "a polynomial must be the first stage"
+        )
+        taken = chain.inputs if k == 0 else (_unnamed(cores[k - 1].output),)
+        own = core.inputs if k == 0 else tuple(map(_unnamed, core.inputs))
+        require(own == taken, f"{what} must take what is before it, {taken}, not {own}")
+        items.append(item)
+    require(_unnamed(cores[-1].output) == _unnamed(chain.output), "the last stage must give the output of the chain")
+    return items
+
+
+def _unnamed(port: object) -> object:
+    return port.model_copy(update={"name": ""})  # type: ignore[attr-defined]
+
+
+def _check_bound(chain: ChainCertificate, cores: Sequence[Certificate]) -> dict[str, Fraction]:
+    """Check the gains, the errors, that no port between stages limits anything, and the sum."""
+    parts = [parts_of(core) for core in cores]
+    budget: dict[str, Fraction] = {}
+    reach, carried = reach_of(cores[0]), Fraction(0)
+    for k, (entry, core) in enumerate(zip(chain.stages, cores, strict=True)):
+        behind = [part for each in parts[k + 1 :] for part in each]
+        gain = on_grid(peak_gain(behind)) if behind else Fraction(1)
+        require(
+            gain <= entry.gain <= gain + 2 * _GRID,
+            f"the gain behind stage {entry.name} must be {float(gain):.12g}, not {float(entry.gain):.12g}",
+        )
+        error = core.claims.bound * core.output.lsb
+        require(error == entry.error, f"the error of stage {entry.name} must be {error}, not {entry.error}")
+        budget[entry.name] = error * entry.gain
+        if k == len(cores) - 1:
+            break
+        own = list(parts[k])
+        carried = (carried * peak_gain(own) if own else Fraction(0)) + error
+        so_far: list[Part] = [part for each in parts[: k + 1] for part in each]
+        largest = (reach * peak_gain(so_far) if so_far else reach) + carried
+        port = core.output
+        require(port.zero == 0 and port.signed, f"the port behind stage {entry.name} must be signed")
+        require(
+            largest < port.highest * port.lsb,
+            f"the port behind stage {entry.name} must hold magnitudes of {float(largest):.6g}, "
+            f"not end at {float(port.highest * port.lsb):.6g}",
+        )
+    bound = sum(budget.values(), Fraction(0))
+    require(chain.bound == bound, f"the bound of the chain must be {float(bound):.12g}, not {float(chain.bound):.12g}")
+    require(
+        bound <= chain.max_error,
+        f"the bound of the chain must be at most {float(chain.max_error):.6g}, not {float(bound):.6g}",
+    )
+    return budget
+
+
+def _check_files(
+    chain: ChainCertificate,
+    folder: Path,
+    cores: Sequence[Certificate],
+    items: Sequence[ItemEntry],
+    stages: Mapping[str, Judgement],
+) -> int:
+    """Check the files of the whole; return how many there are."""
+    names = [entry.name for entry in chain.files]
+    wanted = [name.format(chain.name) for name in _OWN_FILES]
+    require(names == wanted, f"the files of the chain must be {', '.join(wanted)}, not {', '.join(names)}")
+    contents = {}
+    for entry in chain.files:
+        contents[entry.name] = content_of(folder / entry.name)
+        _compare(str(folder / entry.name), entry.sha256, contents[entry.name])
+    sv, json, c, h = wanted
+    texts = [
+        ascii_text(f"{core.name}.sv", stage.files[f"{core.name}.sv"])
+        for core, stage in zip(cores, stages.values(), strict=True)
+    ]
+    check_top(texts, ascii_text(sv, contents[sv]), chain.name, [core.name for core in cores], items)
+    check_chain_manifest(contents[json], chain, cores, items)
+    check_chain_model(unicode_text(c, contents[c]), unicode_text(h, contents[h]), chain, cores)
+    return len(contents)
+
+
+def _scope(
+    chain: ChainCertificate, stages: Mapping[str, Judgement], specified: bool, with_files: bool
+) -> dict[str, ScopePart]:
+    """Return how much of each part is proven: of the stages together, and of the chain."""
+    scope: dict[str, ScopePart] = {}
+    for name in next(iter(stages.values())).scope:
+        scope[name] = _together({stage: each.scope[name] for stage, each in stages.items()})
+    gains = "each stage's error and its gain to the end bound the whole, and no port between stages limits what passes"
+    folds = "; no frequency that folds has more than the gains that are claimed" if chain.folding is not None else ""
+    chained = {"chain": ScopePart(State.PROVEN, gains + folds)}
+    if specified:
+        chained["stages"] = ScopePart(State.PROVEN, "each stage is the one that the words of the chain ask for")
+    if with_files:
+        chained["top"] = ScopePart(
+            State.PROVEN,
+            "it has instances of the cores and the wires between their streams; manifest and C model follow",
+        )
+    return chained | scope
+
+
+def _together(parts: Mapping[str, ScopePart]) -> ScopePart:
+    """Return what is proven of a part in all stages; the least of it, and why."""
+    order = (State.NOT_READ, State.PARTIAL, State.PROVEN)
+    asked = {stage: part for stage, part in parts.items() if part.asked} or parts
+    least = min((part.state for part in asked.values()), key=order.index)
+    reasons = {part.why for part in asked.values() if part.state is least}
+    whose = [stage for stage, part in asked.items() if part.state is least]
+    why = reasons.pop() if len(reasons) == 1 else "; ".join(f"{stage}: {asked[stage].why}" for stage in whose)
+    if len(whose) < len(asked) and least is not State.PROVEN:
+        why = f"{', '.join(whose)}: {why}" if len(whose) == 1 else why
+    return ScopePart(least, why, any(part.asked for part in parts.values()))

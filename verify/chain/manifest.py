@@ -1,0 +1,92 @@
+"""The manifest of a chain, every field of which follows from certificates and the specification."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from decimal import Decimal
+from typing import Any
+
+from sosmith.verify.certificate_file import Certificate, ItemEntry, PortEntry, StreamEntry
+from sosmith.verify.chain.chain_file import ChainCertificate
+from sosmith.verify.chain.responses import factor_of, parts_of
+from sosmith.verify.graph import RejectedError, require
+from sosmith.verify.specified.words import words_of
+from sosmith.verify.verdict.generated_files import about_of
+
+
+def check_chain_manifest(
+    content: bytes, chain: ChainCertificate, cores: Sequence[Certificate], items: Sequence[ItemEntry]
+) -> None:
+    """Check the manifest of a chain.
+
+    Raises
+    ------
+    RejectedError
+        If a field is not what follows.
+    """
+    try:
+        tree = json.loads(content)
+    except (ValueError, RecursionError):
+        raise RejectedError("the manifest must be JSON") from None
+    wanted = _wanted(chain, cores, items)
+    require(isinstance(tree, dict) and [*tree] == [*wanted], f"the manifest must have the fields {', '.join(wanted)}")
+    for name, value in wanted.items():
+        require(tree[name] == value, f"{name} of the manifest must be {value}, not {tree[name]}")
+
+
+def _wanted(chain: ChainCertificate, cores: Sequence[Certificate], items: Sequence[ItemEntry]) -> dict[str, Any]:
+    parts = [parts_of(core) for core in cores]
+    return {
+        "name": chain.name,
+        "core": "chain",
+        "sosmith_version": about_of(cores[0]).versions["sosmith"],
+        "spec": _plain(words_of(chain.specification)),
+        "channels": chain.channels,
+        "streams": {
+            "s_axis": _stream(items[0].taken, cores[0].inputs, {}),
+            "m_axis": _stream(items[-1].given, (cores[-1].output,), items[-1].flags),
+        },
+        "stages": [
+            {
+                "name": entry.name,
+                "kind": entry.kind,
+                "core": core.name,
+                "architecture": item.architecture,
+                "decimate": factor_of(own),
+                "error_bound": float(entry.error),
+                "gain_to_the_end": float(entry.gain),
+            }
+            for entry, core, item, own in zip(chain.stages, cores, items, parts, strict=True)
+        ],
+        "decimate": factor_of([part for own in parts for part in own]),
+        "error_bound": float(chain.bound),
+        "error_parts": {entry.name: float(entry.error * entry.gain) for entry in chain.stages},
+        "error_unit": chain.output.unit,
+    }
+
+
+def _stream(stream: StreamEntry, ports: Sequence[PortEntry], flags: dict[str, int]) -> dict[str, Any]:
+    dest = {"tdest": {"width": stream.dest_width}} if stream.dest_width else {}
+    user = {"tuser": {"width": stream.user_width, "flags": flags}} if flags else {}
+    fields = [
+        {
+            "name": field.name,
+            "offset": field.offset,
+            "width": field.width,
+            "signed": field.signed,
+            "lsb": float(field.lsb),
+            "zero": float(field.zero),
+            "unit": port.unit,
+        }
+        for field, port in zip(stream.fields, ports, strict=True)
+    ]
+    return dest | {"width": stream.width, "fields": fields} | user
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_plain(item) for item in value]
+    return float(value) if isinstance(value, Decimal) else value
