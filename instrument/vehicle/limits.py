@@ -22,7 +22,7 @@ assumed to be the same."""
 
 TRACK_RESISTANCE, OF_LOAD = 10e3, 1 / 3
 """Force in N and share of the load of a wheelset that the track resists sideways: 1 t + Q / 3 (Prud'homme 1967, by
-github.com/StructuralWizard/Rail, en/12Mechanics), where that has a factor of 0.85, too. Taken as 1 here, for 10 kN: k1 of
+github.com/StructuralWizard/Rail, en/12Mechanics), times 0.85 there. Here that factor is 1, and 1 t 10 kN: k1 of
 EN 14363 for vehicles with drives, which is assumed."""
 
 

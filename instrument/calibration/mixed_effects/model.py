@@ -138,6 +138,13 @@ class Scatters:
         best = int(np.argmax(self.weight))
         return Scatters(self.scatter[best : best + 1], self.ratio[best : best + 1], np.ones(1), np.ones(1))
 
+    def together(self, other: Scatters, share: float) -> Scatters:
+        """Return these pairs and those of another model, whose probability is `share`."""
+        parts = ((self, 1.0 - share), (other, share))
+        scatter, ratio = (np.concatenate((getattr(self, name), getattr(other, name))) for name in ("scatter", "ratio"))
+        weight = np.concatenate([part * one.weight for one, part in parts])
+        return Scatters(scatter, ratio, weight, np.concatenate([part * one.of_intervals for one, part in parts]))
+
     def mean_of(self, values: Values) -> Values:
         """Return the posterior mean of values whose last axis is the pair."""
         return _weighted(values, self.weight)
