@@ -13,6 +13,8 @@ from benchmarks.day_alarms import ALLOWED, FAULT_DAY, FAULT_DAYS, KINDS, NEAR_RE
 from benchmarks.day_bench import HELD_DAYS, KNOWN_TO, MORNING, ORDER, TARGETS
 from benchmarks.day_service import DAYS, FIRST, JUMP, RATE, SUM_KNOWN_TO, WAYS
 
+from sosmith.instrument.calibration.health.charts import WARNING_LIMIT
+
 RUN_NAMES = {"bench_43_50": "43 to 50 °C", "bench_92_96": "92 to 96 °C"}
 
 GOALS: dict[tuple[str, str], float] = {
@@ -307,13 +309,17 @@ def _coverage(rows: list[dict[str, Any]]) -> list[str]:
         "not is warned of."
     )
     plain = next(row for row in rows if row["case"] == "as its type")
+    beyond, days = plain["beyond"]
+    rate = f"one in {days / beyond:.0f}" if beyond else "none"
     return [
         "## Sensors that are not as their type",
         "",
         f"{EACH} measurements on each of {DAYS_BEFORE} days, which scatter by 0.3 mm, of a sensor of the type",
         "equation 5a with one thing wrong; errors of the days of 0.12 mm over 2 mm. The shares of true clearances",
         "inside the 95 % intervals, on the last of these days, whose curve is followed, and on the day after. Warned",
-        "of: by the fit, or by an alarm of the sensor's health. *Step told*: the fit says that the sensor stepped.",
+        "of: by the fit, by an alarm of the sensor's health, or by its notice. *Step told*: the fit says that it",
+        "stepped; *possible*: it may have, or has. *Noticed*: the last day's shift is beyond the warning limit of",
+        f"{WARNING_LIMIT:g} standard deviations and within that of an alarm.",
         f"*Silent*: sensors of whose readings less than {100 * ENOUGH:g} % are inside on one of the days, and of which",
         "nothing is said. The error of one day is common to all of its readings, so that some of these are among",
         "sensors of which 95 % hold on average.",
@@ -323,8 +329,11 @@ def _coverage(rows: list[dict[str, Any]]) -> list[str]:
         "A step is looked for on each of the last ten days: the evidence of one, divided by their number, must be a",
         "hundred times that of none before it is told, which a sensor of the type does at most once in 100 fits",
         f"(Markov's inequality; here {plain['step']} of {plain['count']}). One of 0.3 V is 0.2 mm, less than twice the",
-        "error of a day, and on its first day often cannot be told from one: where it is twice as probable as none,",
-        "that is said, and intervals hold in either case. [health.md](health.md) says how soon later days tell it.",
+        "error of a day, and on its first day often cannot be told from one. Where it is as probable as none, that is",
+        f"said (of sensors as their type for {plain['possible']} of {plain['count']}), the curve is the mean of both",
+        "by their probabilities, and intervals hold in either case; past doubt, both are those with the step.",
+        f"The warning limit, by chance, {beyond} of {days} days of sensors as their type are beyond, {rate}.",
+        "[health.md](health.md) says how soon later days tell a step.",
         "The warning of a sensor as its type is that so few measurements do not say how far an error of a day reaches.",
         "",
     ]
