@@ -31,7 +31,12 @@ SERVICE_GOALS = {False: 97.7, True: 98.9}
 
 def page(found: dict[str, Any]) -> str:
     """Return the page."""
-    parts = (_head(), _bench(found["bench"]), _service(found["service"]), _alarms(found["alarms"]))
+    parts = (
+        _head(),
+        _bench(found["bench"]),
+        _service(found["service"], found["without drift"]),
+        _alarms(found["alarms"]),
+    )
     others = (_plans(found["advice"]), _coverage(found["coverage"]))
     return "\n".join(_wrapped([line for part in (*parts, *others) for line in part]))
 
@@ -130,7 +135,7 @@ def _bench(rows: list[dict[str, Any]]) -> list[str]:
     ]
 
 
-def _service(rows: list[dict[str, Any]]) -> list[str]:
+def _service(rows: list[dict[str, Any]], still: list[dict[str, Any]]) -> list[str]:
     count = rows[0]["count"]
     text = [
         f"## {DAYS} days of service",
@@ -173,7 +178,9 @@ def _service(rows: list[dict[str, Any]]) -> list[str]:
         f"loaded: accuracy, share inside, and the largest difference in points. Sets refused: {refused}.",
         "",
         "Without targets, intervals of the filter hold more than they say: they allow for the drift of the type, and",
-        "the sensors of the bench do not age. What is shared no number of days averages away.",
+        "the sensors of the bench do not age. With a type that does not drift, either, those of the same axles hold",
+        f"{_held(still, 'filter')} % by the filter and {_held(still, 'filter and sum')} % by filter and sum.",
+        "What is shared no number of days averages away.",
         "",
     ]
 
@@ -337,6 +344,11 @@ def _coverage(rows: list[dict[str, Any]]) -> list[str]:
         "The warning of a sensor as its type is that so few measurements do not say how far an error of a day reaches.",
         "",
     ]
+
+
+def _held(rows: list[dict[str, Any]], way: str) -> str:
+    (row,) = (row for row in rows if row["way"] == way)
+    return f"{100 * row['inside']:.1f} +- {100 * row['inside_error']:.1f}"
 
 
 def _followed(row: dict[str, Any]) -> str:

@@ -40,10 +40,11 @@ LARGE = 3.0
 STEP = 1.5
 """Ratio of neighbouring points of the grid of scatters."""
 
-FRESH, POSSIBLE = 3, 0.0
-"""Last days, and the same without that division, from which on a step is possible and intervals must hold in either
-case: as probable as none. What began earlier has had the days since to show. Of sensors without a step, about one fit
-in four has such a day (`python -m benchmarks.days`)."""
+FRESH, POSSIBLE, LATER = 3, 0.0, 1.0
+"""Last days on which a step is possible, so that intervals must hold in either case; the same without that division
+from which on it is: as probable as none on the last day; and what more it must be for each day since, which would have
+shown it. What began earlier has had the days to show. Of sensors without a step, about one fit in five has such a day
+(`python -m benchmarks.days`)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,6 +134,7 @@ def step_of(model: Model, plain: Posterior, date: int) -> Step | None:
     if len(rows.days) < FEWEST_DAYS:
         return None
     at = plain.scatters.likeliest
+    last = len(rows.days) - 1
     days = range(max(1, len(rows.days) - RECENT), len(rows.days))
     plainly = model.evidence(at.scatter, at.ratio)
     first = {k: _with_step(model, k).evidence(at.scatter, at.ratio) - plainly for k in days}
@@ -141,16 +143,17 @@ def step_of(model: Model, plain: Posterior, date: int) -> Step | None:
     own = plain.scatters.scatter
     scatters = SCATTERS[(own.min() / STEP <= SCATTERS) & (own.max() * STEP >= SCATTERS)]
     without = model.evidence(scatters, RATIOS)
-    for some in (days, days[-FRESH:]):
-        best = max(some, key=lambda k: first[k])
-        stepped = _with_step(model, best)
-        evidence = stepped.evidence(scatters, RATIOS) - without
-        if evidence > (CERTAIN + math.log(len(days)) if some == days else POSSIBLE):
-            times = LARGE if evidence > CERTAIN + math.log(len(days)) else 1.0
-            stepped = _with_step(model, best, times)
+    past_doubt = CERTAIN + math.log(len(days))
+    best = max(days, key=lambda k: first[k])
+    fresh = max(days[-FRESH:], key=lambda k: first[k] - LATER * (last - k))
+    for day, least in ((best, past_doubt), (fresh, POSSIBLE + LATER * (last - fresh))):
+        evidence = _with_step(model, day).evidence(scatters, RATIOS) - without
+        if evidence > least:
+            times = LARGE if evidence > past_doubt else 1.0
+            stepped = _with_step(model, day, times)
             found = stepped.posterior(stepped.scatters(), plain.curves, date)
             size = times * float(found.scatters.mean_of(found.mean)[-1]) * known.offset
-            return Step(rows.days[best], len(days), size, evidence, _collapsed(found, times))
+            return Step(rows.days[day], len(days), size, evidence, _collapsed(found, times))
     return None
 
 
