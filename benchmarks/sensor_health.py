@@ -295,7 +295,7 @@ The picture is of an emulated sensor that is turned on day 60.
 - **Scatter**: the same for the scatter, upwards.
 
 Within the limit of a step there is a warning limit. Where the offset of the last day is {warning:g} standard deviations
-or more, a notice says by how many mm the sensor reads differently, that one day in 20 does so by chance
+or more, a notice says by how many mm the sensor reads differently, that one day in 20 is beyond the limit by chance
 ([how many did](days.md#sensors-that-are-not-as-their-type)), and that after a step intervals may not hold until another
 day is measured. It is no alarm, and the exit status is 0.
 

@@ -77,8 +77,8 @@ class Notice:
         way = "more" if self.shift > 0 else "less"
         return (
             f"{self.date}: the sensor reads {abs(self.shift):.2g} mm {way} than by the days before, "
-            f"{abs(self.deviations):.1f} times what a day scatters by: one day in 20 does so by chance; if the sensor "
-            "has stepped, intervals may not hold until another day is measured"
+            f"{abs(self.deviations):.1f} times what a day scatters by; beyond {WARNING_LIMIT:g} is one day in 20 by "
+            "chance; if the sensor has stepped, intervals may not hold until another day is measured"
         )
 
 
