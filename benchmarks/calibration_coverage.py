@@ -19,7 +19,6 @@ from sosmith.instrument.calibration.acceptance import DEFAULT_RANGES
 from sosmith.instrument.calibration.bayesian_fit import BayesianFit, bayesian_fit
 from sosmith.instrument.calibration.health.charts import WARNING_LIMIT
 from sosmith.instrument.calibration.health.monitoring import health_of
-from sosmith.instrument.calibration.mixed_effects.steps import step_of
 from sosmith.instrument.calibration.sensor_type import DEFAULT_TYPE, SENSOR_TYPES
 from sosmith.instrument.calibration.uncertainty import SHARE, of_posterior
 from sosmith.model.arrays import Values
@@ -170,7 +169,8 @@ def _day_after(made: BayesianFit, date: int) -> BayesianFit:
     """Return the calibration for a day without measurements, as a fit of all measurements for that day gives it."""
     known = made.posterior
     later = made.model.posterior(known.scatters, known.curves, date)
-    made = replace(made, posterior=later, plain=True, step=step_of(made.model, later, date))
+    step = None if made.step is None else made.step.on(made.model, later, date)
+    made = replace(made, posterior=later, plain=True, step=step)
     return replace(made, fit=replace(made.fit, polynomial=TYPE.polynomial(made.averaged.deviations)))
 
 

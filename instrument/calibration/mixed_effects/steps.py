@@ -81,6 +81,17 @@ class Step:
         """Probability of a step on that day, beforehand as probable as none."""
         return 1.0 / (1.0 + math.exp(-self.evidence))
 
+    def on(self, model: Model, plain: Posterior, date: int) -> Step:
+        """Return the same step with size and posterior for the day of ordinal `date`.
+
+        `model` and `plain` are those without a step; the parameters of `step_of`.
+        """
+        times = LARGE if self.told else 1.0
+        stepped = _with_step(model, model.rows.days.index(self.day), times)
+        found = stepped.posterior(stepped.scatters(), plain.curves, date)
+        size = times * float(found.scatters.mean_of(found.mean)[-1]) * model.sensor_type.offset
+        return replace(self, size=size, posterior=_collapsed(found, times))
+
     def averaged(self, plain: Posterior) -> Posterior:
         """Return what is known of the day of the calibration whether the sensor stepped or not.
 
@@ -130,7 +141,7 @@ def step_of(model: Model, plain: Posterior, date: int) -> Step | None:
     date : int
         Ordinal, not before the last measurement.
     """
-    rows, known = model.rows, model.sensor_type
+    rows = model.rows
     if len(rows.days) < FEWEST_DAYS:
         return None
     at = plain.scatters.likeliest
@@ -149,11 +160,8 @@ def step_of(model: Model, plain: Posterior, date: int) -> Step | None:
     for day, least in ((best, past_doubt), (fresh, POSSIBLE + LATER * (last - fresh))):
         evidence = _with_step(model, day).evidence(scatters, RATIOS) - without
         if evidence > least:
-            times = LARGE if evidence > past_doubt else 1.0
-            stepped = _with_step(model, day, times)
-            found = stepped.posterior(stepped.scatters(), plain.curves, date)
-            size = times * float(found.scatters.mean_of(found.mean)[-1]) * known.offset
-            return Step(rows.days[day], len(days), size, evidence, _collapsed(found, times))
+            one = Step(rows.days[day], len(days), 0.0, evidence, plain)
+            return one.on(model, plain, date)
     return None
 
 
