@@ -127,7 +127,8 @@ class BayesianFit:
     @cached_property
     def doubts(self) -> tuple[str, ...]:
         """Sentences about what explains the measurements far better than the type's errors of a day do."""
-        return doubts_of(self.model, self.posterior.curves, self.clearance, self.given, of_day=not self.plain)
+        posterior = self.posterior
+        return doubts_of(self.model, posterior.curves, self.clearance, self.given, of_day=posterior.same_day)
 
     @property
     def missed(self) -> str:
