@@ -55,7 +55,7 @@ FIRST_SEEDS = {
     "without drift": 79101,
     "alarms": 69201,
     "advice": 29301,
-    "coverage": 29401,
+    "coverage": 39401,
 }
 """By none of these seeds was anything chosen; sets that were looked at while building are not among them."""
 
