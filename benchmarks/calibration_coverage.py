@@ -17,8 +17,8 @@ import numpy as np
 from sosmith.gen.calibration.fit import Measurements
 from sosmith.instrument.calibration.acceptance import DEFAULT_RANGES
 from sosmith.instrument.calibration.bayesian_fit import BayesianFit, bayesian_fit
+from sosmith.instrument.calibration.health.charts import WARNING_LIMIT
 from sosmith.instrument.calibration.health.monitoring import health_of
-from sosmith.instrument.calibration.mixed_effects.steps import step_of
 from sosmith.instrument.calibration.sensor_type import DEFAULT_TYPE, SENSOR_TYPES
 from sosmith.instrument.calibration.uncertainty import SHARE, of_posterior
 from sosmith.model.arrays import Values
@@ -111,7 +111,7 @@ def _sensor(case: Case, seed: int) -> tuple[Measurements, list[list[Reading]]]:
     """Emulate a sensor: its measurements, and readings on the last day of these and on days that may come after it."""
     chance = np.random.default_rng(seed)
     z = chance.normal(size=5) if case.typical else np.zeros(5)
-    columns, last, after = [], [], []
+    columns, last, after = list[list[Values]](), list[Reading](), list[Reading]()
     for day in range(DAYS + AFTER):
         if day <= DAYS:  # each of the days after is the day after the last one, drawn anew
             before = z
@@ -143,7 +143,10 @@ def one_sensor(case: Case, seed: int) -> dict[str, Any]:
     try:
         made = bayesian_fit(measurements, TYPE, last_day, DEFAULT_RANGES)
     except SpecificationError:
-        return {"inside": None, "half_width": None, "warned": True, "step": False}
+        return {"inside": None, "half_width": None, "warned": True, "step": False, "beyond": [0, 0]} | {
+            "possible": False,
+            "noticed": False,
+        }
     inside, widths = list[float](), list[float]()
     for days, one in zip(readings, (made, _day_after(made, last_day + 1)), strict=True):
         V, T, d = (np.concatenate(values) for values in zip(*days, strict=True))
@@ -153,17 +156,22 @@ def one_sensor(case: Case, seed: int) -> dict[str, Any]:
         widths.append(float(half.mean()))
     lack = of_posterior(measurements, made).lack.structured
     told = bool(made.surprise or made.doubts or made.rails.found or lack or made.step)
-    told = told or bool(health_of(measurements, TYPE, made.rails.ends).alarms)
+    health = health_of(measurements, TYPE, made.rails.ends)
+    told = told or bool(health.alarms) or health.notice is not None
     step = made.step is not None and made.step.told
-    return {"inside": inside, "half_width": widths, "warned": told, "step": step}
+    offsets = health.innovations.offset[health.first :]
+    beyond = [int(np.count_nonzero(np.abs(offsets) >= WARNING_LIMIT)), len(offsets)]
+    found = {"inside": inside, "half_width": widths, "warned": told, "step": step, "beyond": beyond}
+    return found | {"possible": made.step is not None, "noticed": health.notice is not None}
 
 
 def _day_after(made: BayesianFit, date: int) -> BayesianFit:
     """Return the calibration for a day without measurements, as a fit of all measurements for that day gives it."""
     known = made.posterior
     later = made.model.posterior(known.scatters, known.curves, date)
-    fit = replace(made.fit, polynomial=TYPE.polynomial(later.deviations))
-    return replace(made, fit=fit, posterior=later, plain=True, step=step_of(made.model, later, date))
+    step = None if made.step is None else made.step.on(made.model, later, date)
+    made = replace(made, posterior=later, plain=True, step=step)
+    return replace(made, fit=replace(made.fit, polynomial=TYPE.polynomial(made.averaged.deviations)))
 
 
 def summed(case: Case, found: Sequence[dict[str, Any]]) -> dict[str, Any]:
@@ -179,6 +187,9 @@ def summed(case: Case, found: Sequence[dict[str, Any]]) -> dict[str, Any]:
         "half_width": half,
         "warned": sum(one["warned"] for one in found),
         "step": sum(one["step"] for one in found),
+        "possible": sum(one["possible"] for one in found),
+        "noticed": sum(one["noticed"] for one in found),
+        "beyond": np.sum([one["beyond"] for one in found], axis=0).tolist(),
         "silent": sum(min(one["inside"]) < ENOUGH and not one["warned"] for one in fitted),
         "refused": len(found) - len(fitted),
         "count": len(found),
@@ -199,7 +210,8 @@ def main() -> None:
 
 
 HEADER = (
-    f"sensor | its last day, % inside {100 * SHARE:.0f} % | ± mm | day after, % | ± mm | warned of | step told | silent"
+    f"sensor | its last day, % inside {100 * SHARE:.0f} % | ± mm | day after, % | ± mm | warned of | step told | "
+    "possible | noticed | silent"
 )
 """Of the table."""
 
@@ -208,7 +220,8 @@ def row_of(one: dict[str, Any]) -> list[str]:
     """Return the cells of a case."""
     columns = zip(one["inside"], one["inside_error"], one["half_width"], strict=True)
     cells = [f"{100 * a:.1f} +- {100 * e:.1f} | {b:.3f}" for a, e, b in columns]
-    return [one["case"], *cells, f"{one['warned']} of {one['count']}", f"{one['step']}", f"{one['silent']}"]
+    counts = [str(one[key]) for key in ("step", "possible", "noticed", "silent")]
+    return [one["case"], *cells, f"{one['warned']} of {one['count']}", *counts]
 
 
 if __name__ == "__main__":

@@ -33,7 +33,7 @@ CASES = tuple(
 )
 """Days before, scatter of a measurement in mm, wished half-width in mm, and highest order of a day's polynomial."""
 
-EACH, PER_DAY = 3, 20
+EACH, PER_DAY = 4, 20
 """Sensors of each case, and measurements of each day before."""
 
 

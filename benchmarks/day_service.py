@@ -8,7 +8,7 @@ double precision and by the integers of the hardware with the curve of the day.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -25,6 +25,7 @@ from sosmith.instrument.calibration.acceptance import DEFAULT_RANGES
 from sosmith.instrument.calibration.bayesian_fit import BayesianFit, bayesian_fit
 from sosmith.instrument.calibration.mixed_effects.day_polynomial import polynomial_of
 from sosmith.instrument.calibration.mixed_effects.model import Posterior, mixture_half_width
+from sosmith.instrument.calibration.sensor_type import SensorType
 from sosmith.instrument.scenarios.file import ScenarioFile
 from sosmith.instrument.uncertainty.instrument_budget import slopes
 from sosmith.instrument.wear.state_space import DayReading, DayState, WearModel, filtered
@@ -90,12 +91,19 @@ def true_clearances(seed: int) -> Values:
 
 
 def in_service(
-    scenario: ScenarioFile, core: CoreDesign, seed: int, wheel: int, true: Values, *, targets: bool
+    scenario: ScenarioFile,
+    core: CoreDesign,
+    seed: int,
+    wheel: int,
+    true: Values,
+    *,
+    targets: bool,
+    sensor_type: SensorType = TYPE,
 ) -> Wheel:
     """Read one wheel over the days; with `targets`, two gauges of whole millimetres about it are read each morning."""
     sensor = 2 * seed + wheel
     first = scenario.document.start.toordinal()
-    known, made = _before(scenario, sensor)
+    known, made = _before(scenario, sensor, sensor_type)
     so_far = before_targets(made)
     chance = streams(sensor, "service of a wheel")
     double, uncertainty, shared, taken, sets = list[float](), list[float](), list[float](), [], list[Datapath]()
@@ -136,10 +144,10 @@ def in_service(
 
 
 @lru_cache(maxsize=2)
-def _before(scenario: ScenarioFile, sensor: int) -> tuple[Measurements, BayesianFit]:
+def _before(scenario: ScenarioFile, sensor: int, sensor_type: SensorType) -> tuple[Measurements, BayesianFit]:
     """Return the measurements before the service, and the calibration by them."""
     known = measured(scenario, sensor)
-    return known, bayesian_fit(known, TYPE, max(known.days), DEFAULT_RANGES)
+    return known, bayesian_fit(known, sensor_type, max(known.days), DEFAULT_RANGES)
 
 
 def by_hardware(core: CoreDesign, wheels: Sequence[Wheel]) -> list[Values]:
@@ -275,3 +283,11 @@ def one_service(scenario: ScenarioFile, core: CoreDesign, seed: int) -> list[dic
             for way, one in judged(wheels, read, seed).items():
                 rows.append({"seed": seed, "targets": bool(targets), "by": by, "way": way, "refused": refused} | one)
     return rows
+
+
+def without_drift(scenario: ScenarioFile, core: CoreDesign, seed: int) -> list[dict[str, Any]]:
+    """Return the figures of one axle without targets by a type that does not drift, as the bench's sensors do not."""
+    true, still = true_clearances(seed), replace(TYPE, offset_drift=0.0, gain_drift=0.0)
+    wheels = [in_service(scenario, core, seed, w, true[w], targets=False, sensor_type=still) for w in range(2)]
+    read = np.array([wheel.double for wheel in wheels])
+    return [{"seed": seed, "targets": False, "way": way} | one for way, one in judged(wheels, read, seed).items()]

@@ -27,6 +27,7 @@ from sosmith.instrument.calibration.health.charts import (
     DECISION,
     MOST_OF_A_DAY,
     STEP_LIMIT,
+    WARNING_LIMIT,
     charts_of,
 )
 from sosmith.instrument.calibration.health.explanation import FOLLOWING, explanation_of
@@ -232,6 +233,7 @@ def document(found: dict[str, Any]) -> str:
         days=found["days"],
         seeds=found["seeds"],
         step=STEP_LIMIT,
+        warning=WARNING_LIMIT,
         most=MOST_OF_A_DAY,
         allowance=ALLOWANCE,
         decision=DECISION,
@@ -291,6 +293,11 @@ The picture is of an emulated sensor that is turned on day 60.
 - **Drift**: cumulative sums of offset and gain, upwards and downwards. Each day adds its number, at most {most:g},
   less {allowance:g}; the alarm is at {decision:g}.
 - **Scatter**: the same for the scatter, upwards.
+
+Within the limit of a step there is a warning limit. Where the offset of the last day is {warning:g} standard deviations
+or more, a notice says by how many mm the sensor reads differently, that one day in 20 is beyond the limit by chance
+([how many did](days.md#sensors-that-are-not-as-their-type)), and that after a step intervals may not hold until another
+day is measured. It is no alarm, and the exit status is 0.
 
 Readings at the sensor's rail do not count, nor do measurements off the plane of their own day; `add` tells how many
 are off the curve that it fits to all days, which may be others. The first day is held against the type only, and

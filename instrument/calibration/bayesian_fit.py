@@ -92,7 +92,8 @@ class BayesianFit:
     clearance : ndarray, shape (n,)
         Clearance in mm of each row of the model, at which the errors of the days are taken.
     step : Step or None
-        A step of the sensor on one of the last days, if one is possible: intervals hold with it and without.
+        A step of the sensor on one of the last days, if one is possible: intervals hold with it and, unless it is past
+        doubt, without.
     """
 
     fit: Fit
@@ -111,15 +112,28 @@ class BayesianFit:
         """What is known if the sensor stepped, where it may have; else the posterior."""
         return self.posterior if self.step is None else self.step.posterior
 
+    @property
+    def either(self) -> tuple[Posterior, ...]:
+        """What intervals hold for: with a step and without, or only with it where it is past doubt."""
+        if self.step is None:
+            return (self.posterior,)
+        return (self.step.posterior,) if self.step.told else (self.posterior, self.step.posterior)
+
+    @cached_property
+    def averaged(self) -> Posterior:
+        """What the polynomial is made of: the posterior, with a step and without where the sensor may have stepped."""
+        return self.posterior if self.step is None else self.step.averaged(self.posterior)
+
     @cached_property
     def doubts(self) -> tuple[str, ...]:
         """Sentences about what explains the measurements far better than the type's errors of a day do."""
-        return doubts_of(self.model, self.posterior.curves, self.clearance, self.given, of_day=not self.plain)
+        posterior = self.posterior
+        return doubts_of(self.model, posterior.curves, self.clearance, self.given, of_day=posterior.same_day)
 
     @property
     def missed(self) -> str:
         """A sentence if the polynomial follows the day's curve much worse than that is known, else empty."""
-        posterior, order = self.posterior, self.fit.orders[0]
+        posterior, order = self.averaged, self.fit.orders[0]
         if self.plain or posterior.sensor_type.order == MOST_ORDER:
             return ""
         V, T = (values[::SOME] for values in self.region.points())
@@ -173,7 +187,8 @@ def bayesian_fit(
     2. Without systematic errors of the days, the model gives a curve, at which those errors are then taken.
     3. Measurements whose residual from the curve of their day is more than `REJECTED` standard deviations are left
        out, and the model is fitted again, until these are the same.
-    4. A step of the sensor on one of the last days is looked for; the curve stays, and intervals hold in either case.
+    4. A step of the sensor on one of the last days is looked for. Where there may be one, the posterior is that with a
+       step and that without, by their probabilities, and intervals hold in either case, unless it is past doubt.
     5. The posterior mean for `date` is the polynomial. If there are measurements of that very day, it is the polynomial
        nearest to the day's own curve, with squared errors relative to the clearance, unless that polynomial leaves the
        range of the clearance somewhere or falls with the voltage; for a later day the day's own curve is unknown.
@@ -228,14 +243,16 @@ def bayesian_fit(
             f"{measurements.source}: at most a quarter of the measurements must be outliers for a sensor of the type "
             f"{sensor_type.name}, not {outliers:,} of {len(d):,}"
         )
-    posterior = model.posterior(model.scatters(), curves, max(date, rows.days[-1]))
+    day = max(date, rows.days[-1])
+    posterior = model.posterior(model.scatters(), curves, day)
+    step = step_of(model, posterior, day)
     usable = _without_rails(measurements, rails, ranges[1])
     region = CoveredRegion.of(usable.voltage, usable.temperature)
-    polynomial, plain = polynomial_of(posterior, usable, region, ranges)
+    averaged = posterior if step is None else step.averaged(posterior)
+    polynomial, plain = polynomial_of(averaged, usable, region, ranges)
     given = np.empty(len(d))
     given[order] = weights
     fit = _as_fit(measurements, polynomial, usable.covered, given)
-    step = step_of(model, posterior, max(date, rows.days[-1]))
     return BayesianFit(fit, posterior, model, plain, order, at_rail, rails, region, clearance, step)
 
 

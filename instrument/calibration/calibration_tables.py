@@ -172,7 +172,7 @@ def _rejected(fit: Fit) -> str:
 
 
 def health_table(sensor: str, found: Health) -> Table:
-    """Return the charts of a sensor, and a sentence for each alarm."""
+    """Return the charts of a sensor, and a sentence for each alarm and for the notice of the last day."""
     known = found.innovations
     days, outliers, measured = len(known.days) - found.first, int(known.outliers.sum()), int(known.count.sum())
     verdict = count(len(found.alarms), "alarm") if found.alarms else "no alarm"
@@ -190,7 +190,7 @@ def health_table(sensor: str, found: Health) -> Table:
         for chart in found.charts
     ]
     title = f"Sensor {sensor}: {verdict}; {count(days, 'day')} on the charts, to {date_of(known.days[-1])}{left_out}"
-    notes = [alarm.sentence for alarm in found.alarms]
+    notes = [one.sentence for one in (*found.alarms, found.notice) if one is not None]
     return Table(title, rows, ("control chart", "last day", "largest", "limit", "alarm"), notes=notes)
 
 

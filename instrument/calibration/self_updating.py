@@ -160,10 +160,12 @@ class Addition:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """A sentence for each alarm that the days of the file have raised."""
-        first = min((reading.date for reading in self.file.readings), default="")
-        alarms = () if self.health is None else self.health.alarms
-        return tuple(alarm.sentence for alarm in alarms if alarm.raised >= first)
+        """A sentence for each alarm that the days of the file have raised, and for the last day beyond its limit."""
+        if self.health is None:
+            return ()
+        first, notice = min((reading.date for reading in self.file.readings), default=""), self.health.notice
+        found = [alarm.sentence for alarm in self.health.alarms if alarm.raised >= first]
+        return (*found, *([notice.sentence] if notice is not None and notice.date >= first else []))
 
 
 def add(

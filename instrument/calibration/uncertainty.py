@@ -155,11 +155,10 @@ def of_posterior(measurements: Measurements, made: BayesianFit) -> Uncertainty:
     Where the sensor may have stepped, it is the wider of the intervals with and without a step.
     """
     posterior, polynomial = made.posterior, made.fit.polynomial
-    either = [posterior] if made.step is None else [posterior, made.step.posterior]
 
     def standard_error(V: Values, T: Values) -> Values:
         variances = []
-        for one in either:
+        for one in made.either:
             mean, variance = one.predicted(V, T)
             variances.append(one.scatters.variance_of(variance + (mean - polynomial(V, T)[:, None]) ** 2))
         return np.asarray(np.sqrt(np.max(variances, axis=0)))
@@ -178,9 +177,8 @@ def reading_half_width(made: BayesianFit, V: Values, T: Values, beside: Values |
 
     `beside` is the variance in mm**2 of what else a reading errs by, such as the noise that a filter lets through.
     """
-    either = [made.posterior] if made.step is None else [made.posterior, made.step.posterior]
     centre = made.fit.polynomial(V, T)
-    return np.asarray(np.max([one.half_width(V, T, centre, SHARE, beside) for one in either], axis=0))
+    return np.asarray(np.max([one.half_width(V, T, centre, SHARE, beside) for one in made.either], axis=0))
 
 
 def _predicted(made: BayesianFit) -> CrossValidation | None:

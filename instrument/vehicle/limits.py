@@ -13,13 +13,17 @@ from sosmith.instrument.vehicle.parameters import Parameters
 from sosmith.instrument.vehicle.track import Track
 
 SLIDING = 2.0
-"""Length in m over which EN 14363 averages guiding forces and Y/Q: a shorter peak moves no track and climbs no rail."""
+"""Length in m over which UIC 518 and EN 14363 average guiding forces and Y/Q (gensys.se, UIC518_tests): a shorter peak
+moves no track and climbs no rail."""
 
 QUOTIENT = 0.8
-"""Limit of EN 14363 (from memory) for the average of Y/Q over `SLIDING`."""
+"""Limit of UIC 518 for the average of Y/Q over `SLIDING` (railwaynews.net on its 4th edition); that of EN 14363 is
+assumed to be the same."""
 
 TRACK_RESISTANCE, OF_LOAD = 10e3, 1 / 3
-"""Force in N and share of the load of a wheelset that the track resists sideways (Prud'homme; from memory)."""
+"""Force in N and share of the load of a wheelset that the track resists sideways: 1 t + Q / 3 (Prud'homme 1967, by
+github.com/StructuralWizard/Rail, en/12Mechanics), times 0.85 there. Here that factor is 1, and 1 t 10 kN: k1 of
+EN 14363 for vehicles with drives, which is assumed."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -94,7 +98,7 @@ def nadal_limit(tangent: float, friction: float) -> float:
 
 
 def prudhomme_limit(load: float) -> float:
-    """Return the force in N on the track by one wheelset that shifts it: 10 kN + 2 Q0 / 3 (EN 14363, k1 = 1).
+    """Return the force in N on the track by one wheelset that shifts it: 10 kN + 2 Q0 / 3; see `TRACK_RESISTANCE`.
 
     Parameters
     ----------

@@ -14,6 +14,7 @@ import pytest
 from examples.wear_campaign import bench, campaign, hardware, methods, reloads, ride, week
 from examples.wear_campaign.bench import PAPER_FILTER
 from examples.wear_campaign.document import document
+from examples.wear_campaign.methods_document import gain_with_share
 from examples.wear_campaign.spread import spread
 from scipy import signal
 
@@ -81,6 +82,31 @@ def test_the_first_seeds_of_the_rule_alone_are_those_of_the_methods() -> None:
         paper = row["methods"]["paper"]
         assert alone["accuracy"][: len(paper["accuracy"])] == pytest.approx(paper["accuracy"], abs=2e-4)
         assert alone["order"][: len(paper["order"])] == paper["order"]
+
+
+def test_a_gain_with_the_share_of_many_seeds_is_that_of_both_kinds_of_fits() -> None:
+    def row(order: list[int], apart: list[float]) -> dict[str, Any]:
+        paper = {"accuracy": [90.0] * len(apart), "order": order}
+        return {"methods": {"paper": paper, "bayes": {"accuracy": [90.0 + one for one in apart]}}}
+
+    many = np.array([True] * 30 + [False] * 70)
+    mean, error = gain_with_share(many, row([1, 1, 2, 2], [9.0, 11.0, -1.0, 1.0]))
+    assert mean == pytest.approx(0.3 * 10)
+    assert error == pytest.approx(np.sqrt(0.3**2 * 1 + 0.7**2 * 1 + 10**2 * 0.3 * 0.7 / 100))
+    assert gain_with_share(np.zeros(100, bool), row([2, 2], [1.0, 3.0])) == pytest.approx((2.0, 1.0))
+    # the same share as of the few: their mean gain
+    same, _ = gain_with_share(np.array([True, False]), row([1, 1, 2, 2], [9.0, 11.0, -1.0, 1.0]))
+    assert same == pytest.approx(5.0)
+
+
+def test_forty_seeds_know_the_gains_within_a_kind_of_fit() -> None:
+    """That is why the other methods have fewer seeds than the rule."""
+    found = outcome()
+    benches = [row for row in found["methods"] if row["case"] in found["settings"]["bench"]["scenarios"]]
+    for alone, row in zip(found["rule"], benches, strict=True):
+        mean, error = gain_with_share(np.array(alone["order"]) == 1, row)
+        assert error < 0.5
+        assert -0.2 < mean < 6.0
 
 
 @pytest.mark.slow

@@ -17,6 +17,10 @@ from sosmith.model.arrays import Values
 STEP_LIMIT = 4.5
 """Standard deviations of one day's offset or gain from which on it is a step."""
 
+WARNING_LIMIT = 2.0
+"""Standard deviations of one day's offset from which on it is said, without an alarm: the warning limit that control
+charts usually have beside that for action. A normal number is beyond it once in 22 days."""
+
 ALLOWANCE = 0.5
 """Taken from each day's standard normal number before it is summed: half the shift that the sum finds soonest."""
 

@@ -14,8 +14,8 @@ DIGITS = 4
 
 
 def health_json(sensor: str, found: Health) -> dict[str, Any]:
-    """Return the charts and their alarms; each day's numbers are standard normal ones."""
-    known = found.innovations
+    """Return the charts, their alarms, and the notice of the last day; each day's numbers are standard normal ones."""
+    known, notice = found.innovations, found.notice
     return {
         "sensor": sensor,
         "alarms": [
@@ -33,6 +33,14 @@ def health_json(sensor: str, found: Health) -> dict[str, Any]:
             }
             for alarm in found.alarms
         ],
+        "notice": None
+        if notice is None
+        else {
+            "date": notice.date,
+            "reads_more_by_mm": round(notice.shift, DIGITS),
+            "deviations": round(notice.deviations, DIGITS),
+            "sentence": notice.sentence,
+        },
         "charts": {
             chart.name: {"limit": chart.limit, "values": np.round(chart.values, DIGITS).tolist()}
             for chart in found.charts
@@ -46,6 +54,7 @@ def health_json(sensor: str, found: Health) -> dict[str, Any]:
                 "offset": round(float(known.offset[k]), DIGITS),
                 "gain": round(float(known.gain[k]), DIGITS),
                 "scatter": round(float(known.scatter[k]), DIGITS),
+                "reads_more_by_mm": round(-float(known.shift[k]), DIGITS),
             }
             for k, day in enumerate(known.days)
         ],

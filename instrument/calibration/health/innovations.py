@@ -108,8 +108,11 @@ class Day:
         evidence = float(special.logsumexp(logarithm))
         return Belief(mean, factor, logarithm - evidence), off, evidence
 
-    def standardised(self, belief: Belief, off: Values) -> tuple[float, float, float]:
-        """Return offset, gain and scatter as standard normal numbers, given the squared distance `off`."""
+    def standardised(self, belief: Belief, off: Values) -> tuple[float, float, float, float]:
+        """Return offset, gain and scatter as standard normal numbers, given the squared distance `off`.
+
+        And the offset as it is measured, in tolerances.
+        """
         score = self.h - applied(self.j, belief.mean)
         of_factor = product(self.j, belief.factor)
         spread = self.j + product(of_factor, transposed(of_factor))
@@ -124,7 +127,8 @@ class Day:
         rest = np.maximum(off - offset**2 - gain**2, 0.0)
         each = (offset, gain, _normal(rest, freedom))
         first, second, third = (_mixed(x, belief.logarithm) for x in each)
-        return first, second, third
+        shift = np.sum(np.exp(belief.logarithm) * score[_OFFSET] / self.j[_OFFSET, _OFFSET])
+        return first, second, third, float(shift)
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,6 +143,8 @@ class Innovations:
         Measurements, and how many of them were left out as outliers.
     offset, gain, scatter : ndarray
         Positive if the measured clearance, its slope over the voltage, or the scatter is larger than expected.
+    shift : ndarray
+        The offset in mm: measured clearance less the expected one.
     """
 
     days: tuple[int, ...]
@@ -147,6 +153,7 @@ class Innovations:
     offset: Values
     gain: Values
     scatter: Values
+    shift: Values
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,8 +191,8 @@ class Course:
         """Days since the day before; 0 for the first."""
         return [0, *(later - day for day, later in zip(self.ordinals, self.ordinals[1:], strict=False))]
 
-    def beliefs(self) -> Iterator[tuple[Belief, tuple[float, float, float]]]:
-        """Yield the belief before each day, and offset, gain and scatter of the day as standard normal numbers."""
+    def beliefs(self) -> Iterator[tuple[Belief, tuple[float, float, float, float]]]:
+        """Yield the belief before each day, and what `Day.standardised` gives of the day."""
         shape = (len(self.scatters), len(self.ratios))
         expected = self.sensor_type.systematic
         systematic = np.maximum(np.multiply.outer(self.scatters, self.ratios), 0.03 * expected)
@@ -199,8 +206,9 @@ class Course:
 
     def innovations(self) -> Innovations:
         """Go through the days."""
-        offset, gain, scatter = np.array([found for _, found in self.beliefs()]).T
-        return Innovations(self.ordinals, self.count, self.outliers, offset, gain, scatter)
+        offset, gain, scatter, shift = np.array([found for _, found in self.beliefs()]).T
+        tolerance = float(self.sensor_type.deviations[0][0, 0])
+        return Innovations(self.ordinals, self.count, self.outliers, offset, gain, scatter, tolerance * shift)
 
 
 def course_of(measurements: Measurements, sensor_type: SensorType, voltages: Range) -> Course:

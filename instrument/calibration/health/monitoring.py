@@ -8,7 +8,7 @@ from functools import cache, partial
 
 from sosmith.gen.calibration.fit import Measurements
 from sosmith.instrument.calibration.acceptance import Range
-from sosmith.instrument.calibration.health.charts import Chart, charts_of
+from sosmith.instrument.calibration.health.charts import STEP_LIMIT, WARNING_LIMIT, Chart, charts_of
 from sosmith.instrument.calibration.health.explanation import Explanation, explanation_of
 from sosmith.instrument.calibration.health.innovations import Innovations, course_of
 from sosmith.instrument.calibration.sensor_type import SensorType
@@ -53,6 +53,35 @@ class Alarm:
         )
 
 
+@dataclass(frozen=True)
+class Notice:
+    """A last day that is beyond the warning limit and within that for an alarm.
+
+    Attributes
+    ----------
+    date : str
+        The day.
+    shift : float
+        Readings minus measured clearances in mm, where the days before agree: positive if the sensor reads too much.
+    deviations : float
+        The same in standard deviations of what may be expected of a day.
+    """
+
+    date: str
+    shift: float
+    deviations: float
+
+    @property
+    def sentence(self) -> str:
+        """What is to be known of it."""
+        way = "more" if self.shift > 0 else "less"
+        return (
+            f"{self.date}: the sensor reads {abs(self.shift):.2g} mm {way} than by the days before, "
+            f"{abs(self.deviations):.1f} times what a day scatters by; beyond {WARNING_LIMIT:g} is one day in 20 by "
+            "chance; if the sensor has stepped, intervals may not hold until another day is measured"
+        )
+
+
 @dataclass(frozen=True, eq=False)
 class Health:
     """The health of a sensor.
@@ -73,6 +102,15 @@ class Health:
     charts: tuple[Chart, ...]
     alarms: tuple[Alarm, ...]
     first: int
+
+    @property
+    def notice(self) -> Notice | None:
+        """The last day, if its offset is beyond the warning limit and within that for an alarm."""
+        known = self.innovations
+        offset = float(known.offset[-1])
+        if len(known.days) <= self.first or not WARNING_LIMIT <= abs(offset) < STEP_LIMIT:
+            return None
+        return Notice(date_of(known.days[-1]), -float(known.shift[-1]), -offset)
 
 
 def health_of(measurements: Measurements, sensor_type: SensorType, voltages: Range, since: int | None = None) -> Health:

@@ -24,8 +24,8 @@ CERTAIN = 4.6
 LENGTHS = (0.25, 0.5, 2.0, 10.0)
 """Correlation lengths that are compared, relative to the type's; with the last one, an error is an offset."""
 
-POSSIBLE = -2.3
-"""The same from which on another model is possible: a tenth as probable."""
+POSSIBLE = -3.0
+"""The same from which on another model is possible: a twentieth as probable, what intervals of 95 % leave out."""
 
 LASTING = 3.0
 """Standard deviation of an error that stays, relative to what the type expects of the error of a day."""
@@ -45,7 +45,8 @@ def doubts_of(
     clearance, weights : ndarray, shape (n,)
         Clearance in mm of each row, and 0 for those that are left out.
     of_day : bool
-        Whether the calibration follows the curve of its day, which rests on how far an error of a day reaches.
+        Whether there are measurements of the day of the calibration: its intervals then rest on how far an error of a
+        day reaches, whether the polynomial follows that or not.
     """
     if len(model.rows.days) < FEWEST_DAYS:
         return ()

@@ -52,6 +52,8 @@ NEGLIGIBLE = 1e-3
 BISECTIONS = 48
 """Steps to a quantile of the posterior: to a double's precision."""
 
+_FACTOR = Decimal(SYSTEMATIC_FACTOR).ln()
+
 Index = npt.NDArray[np.int64]
 
 
@@ -138,6 +140,13 @@ class Scatters:
         best = int(np.argmax(self.weight))
         return Scatters(self.scatter[best : best + 1], self.ratio[best : best + 1], np.ones(1), np.ones(1))
 
+    def together(self, other: Scatters, share: float) -> Scatters:
+        """Return these pairs and those of another model, whose probability is `share`."""
+        parts = ((self, 1.0 - share), (other, share))
+        scatter, ratio = (np.concatenate((getattr(self, name), getattr(other, name))) for name in ("scatter", "ratio"))
+        weight = np.concatenate([part * one.weight for one, part in parts])
+        return Scatters(scatter, ratio, weight, np.concatenate([part * one.of_intervals for one, part in parts]))
+
     def mean_of(self, values: Values) -> Values:
         """Return the posterior mean of values whose last axis is the pair."""
         return _weighted(values, self.weight)
@@ -211,8 +220,9 @@ class Model:
         found = course(days, self.rows.gaps, self.drifts, stack)
         count = int(self.sums.count.sum())
         of_day = of_days.logarithm() * (len(scatters) * len(ratios) // len(rho))
+        of_scatter = {scatter: count * Decimal(scatter).ln() for scatter in scatters.tolist()}
         return [
-            -Decimal(quadratic) / 2 - root - day - count * Decimal(scatter).ln() + self._expected(scatter * ratio)
+            -Decimal(quadratic) / 2 - root - day - of_scatter[scatter] + self._expected(scatter * ratio)
             for (scatter, ratio), day, quadratic, root in zip(
                 itertools.product(scatters.tolist(), ratios.tolist()),
                 of_day,
@@ -234,7 +244,7 @@ class Model:
         """Return the logarithm of the prior of the systematic error, up to a constant; the smallest stands for none."""
         smallest = 0.03 * self.sensor_type.systematic
         off = (Decimal(max(systematic, smallest)) / Decimal(self.sensor_type.systematic)).ln()
-        return -((off / Decimal(SYSTEMATIC_FACTOR).ln()) ** 2) / 2
+        return -((off / _FACTOR) ** 2) / 2
 
     def course(self, at: Scatters, left_out: Values | None = None) -> Course:
         """Filter over the days for pairs of scatters; the stack is (k,), or (folds, k).

@@ -3,7 +3,7 @@
 The evidence of the model with one step of the voltage's offset, of the type's tolerance and from some day on, is
 compared with that of the model without. A step that is past doubt is told. Where it is only more probable than none,
 which one day of measurements often leaves open, it cannot be told, but intervals must hold in either case: they are the
-wider of both.
+wider of both. The curve is the mean of both by their probabilities.
 """
 
 from __future__ import annotations
@@ -34,13 +34,17 @@ alarm in 100 fits."""
 COARSE = 1.0
 """What the evidence may gain where the scatters are not those that are likeliest without a step."""
 
+LARGE = 3.0
+"""A step that is told may be as large as so many tolerances: the measurements since say how large it is."""
+
 STEP = 1.5
 """Ratio of neighbouring points of the grid of scatters."""
 
-FRESH, POSSIBLE = 3, math.log(2.0)
-"""Last days, and the same without that division, from which on a step is possible and intervals must hold in either
-case: twice as probable as none. What began earlier has had the days since to show. Of sensors without a step, one in
-eight fits has such a day."""
+FRESH, POSSIBLE, LATER = 3, 0.0, 1.0
+"""Last days on which a step is possible, so that intervals must hold in either case; the same without that division
+from which on it is: as probable as none on the last day; and what more it must be for each day since, which would have
+shown it. What began earlier has had the days to show. Of sensors without a step, about one fit in five has such a day
+(`python -m benchmarks.days`)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +77,40 @@ class Step:
         return self.evidence - math.log(self.days) > CERTAIN
 
     @property
+    def weight(self) -> float:
+        """Probability of a step on that day, beforehand as probable as none."""
+        return 1.0 / (1.0 + math.exp(-self.evidence))
+
+    def on(self, model: Model, plain: Posterior, date: int) -> Step:
+        """Return the same step with size and posterior for the day of ordinal `date`.
+
+        `model` and `plain` are those without a step; the parameters of `step_of`.
+        """
+        times = LARGE if self.told else 1.0
+        stepped = _with_step(model, model.rows.days.index(self.day), times)
+        found = stepped.posterior(stepped.scatters(), plain.curves, date)
+        size = times * float(found.scatters.mean_of(found.mean)[-1]) * model.sensor_type.offset
+        return replace(self, size=size, posterior=_collapsed(found, times))
+
+    def averaged(self, plain: Posterior) -> Posterior:
+        """Return what is known of the day of the calibration whether the sensor stepped or not.
+
+        Its pairs of scatters are those of both posteriors, by the probability of a step.
+        """
+        other = self.posterior
+        wider = other.factor.shape[1] - plain.factor.shape[1]  # the step's own column
+        factor = np.pad(plain.factor, ((0, 0), (0, wider), (0, 0)))
+        return replace(
+            plain,
+            scatters=plain.scatters.together(other.scatters, self.weight),
+            mean=np.concatenate((plain.mean, other.mean), axis=-1),
+            factor=np.concatenate((factor, other.factor), axis=-1),
+            offset=_joined(plain.offset, other.offset),
+            slope=_joined(plain.slope, other.slope),
+            curve_factor=_joined(plain.curve_factor, other.curve_factor),
+        )
+
+    @property
     def sentence(self) -> str:
         """What is to be known of it."""
         date = datetime.date.fromordinal(self.day).isoformat()
@@ -87,6 +125,10 @@ class Step:
         )
 
 
+def _joined(values: Values | None, more: Values | None) -> Values | None:
+    return None if values is None or more is None else np.concatenate((values, more), axis=-1)
+
+
 def step_of(model: Model, plain: Posterior, date: int) -> Step | None:
     """Return the most probable step if it is possible, else None.
 
@@ -99,10 +141,11 @@ def step_of(model: Model, plain: Posterior, date: int) -> Step | None:
     date : int
         Ordinal, not before the last measurement.
     """
-    rows, known = model.rows, model.sensor_type
+    rows = model.rows
     if len(rows.days) < FEWEST_DAYS:
         return None
     at = plain.scatters.likeliest
+    last = len(rows.days) - 1
     days = range(max(1, len(rows.days) - RECENT), len(rows.days))
     plainly = model.evidence(at.scatter, at.ratio)
     first = {k: _with_step(model, k).evidence(at.scatter, at.ratio) - plainly for k in days}
@@ -111,14 +154,14 @@ def step_of(model: Model, plain: Posterior, date: int) -> Step | None:
     own = plain.scatters.scatter
     scatters = SCATTERS[(own.min() / STEP <= SCATTERS) & (own.max() * STEP >= SCATTERS)]
     without = model.evidence(scatters, RATIOS)
-    for some in (days, days[-FRESH:]):
-        best = max(some, key=lambda k: first[k])
-        stepped = _with_step(model, best)
-        evidence = stepped.evidence(scatters, RATIOS) - without
-        if evidence > (CERTAIN + math.log(len(days)) if some == days else POSSIBLE):
-            found = stepped.posterior(stepped.scatters(), plain.curves, date)
-            size = float(found.scatters.mean_of(found.mean)[-1]) * known.offset
-            return Step(rows.days[best], len(days), size, evidence, _collapsed(found))
+    past_doubt = CERTAIN + math.log(len(days))
+    best = max(days, key=lambda k: first[k])
+    fresh = max(days[-FRESH:], key=lambda k: first[k] - LATER * (last - k))
+    for day, least in ((best, past_doubt), (fresh, POSSIBLE + LATER * (last - fresh))):
+        evidence = _with_step(model, day).evidence(scatters, RATIOS) - without
+        if evidence > least:
+            one = Step(rows.days[day], len(days), 0.0, evidence, plain)
+            return one.on(model, plain, date)
     return None
 
 
@@ -127,17 +170,17 @@ def _direction(known: SensorType) -> Values:
     return steps_of_the_voltage(known)[0]
 
 
-def _with_step(model: Model, day: int) -> Model:
-    """Return the model with one deviation more: a step from the day of this index on."""
+def _with_step(model: Model, day: int, times: float = 1.0) -> Model:
+    """Return the model with one deviation more: a step from the day of this index on, of so many tolerances."""
     rows = model.rows
-    step = np.where(rows.day >= day, applied(_direction(model.sensor_type)[None], rows.a)[0], 0.0)
+    step = np.where(rows.day >= day, times * applied(_direction(model.sensor_type)[None], rows.a)[0], 0.0)
     return Model.of(model.sensor_type, replace(rows, a=np.concatenate((rows.a, step[None]))), model.weights)
 
 
-def _collapsed(found: Posterior) -> Posterior:
+def _collapsed(found: Posterior, times: float) -> Posterior:
     """Return the posterior of the deviations with the step as part of them, for the day of the calibration."""
     size = len(TERMS)
-    join = np.concatenate((np.eye(size), _direction(found.sensor_type)[:, None]), axis=1)[..., None]
+    join = np.concatenate((np.eye(size), times * _direction(found.sensor_type)[:, None]), axis=1)[..., None]
     return replace(
         found,
         mean=applied(join, found.mean),

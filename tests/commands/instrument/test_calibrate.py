@@ -96,6 +96,26 @@ def test_add_tells_the_shift_and_a_step_of_the_voltage() -> None:
     assert "the offset stepped up" in as_json["warnings"][0]
 
 
+def test_a_shift_beyond_the_warning_limit_is_said_and_is_no_alarm() -> None:
+    good("add", "a.csv", *DAY)
+    write_csv(Path("b.csv"), [(d, round(V - 0.2, 4), T) for d, V, T in readings(60, seed=2) if V > 1.1])
+    second = good("add", "b.csv", "--date", "2024-03-08")
+    said = re.search(
+        r"^sosmith: warning: (2024-03-08: the sensor reads 0\.\d+ mm less than by .*)$", second.stderr, re.M
+    )
+    assert said is not None
+    assert "one day in 20 by chance; if the sensor has stepped, intervals may not hold" in said[1]
+    shown = good("health")
+    assert shown.stdout.startswith("Sensor sensor: no alarm; ")
+    assert said[1] in " ".join(shown.stdout.split())
+    notice = json.loads(good("health", "--json").stdout)["notice"]
+    assert (notice["date"], notice["sentence"]) == ("2024-03-08", said[1])
+    assert -0.4 < notice["reads_more_by_mm"] < -0.1
+    assert -4.5 < notice["deviations"] < -2.0
+    assert json.loads(good("health", "--since", "2024-03-08", "--json").stdout)["notice"] == notice
+    good("reference", "--reading", "2.2", "1.8", "21", "--date", "2024-03-09")
+
+
 def test_inches_are_refused_unless_they_are_said_to_be_right() -> None:
     write_csv(Path("a.csv"), [(d / 25.4, V, T) for d, V, T in readings(60)])
     result = run("add", "a.csv", *DAY)

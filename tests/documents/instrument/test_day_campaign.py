@@ -48,14 +48,16 @@ def test_no_test_tells_more_than_is_possible() -> None:
 
 
 def test_sensors_that_hold_too_little_without_a_word_are_counted() -> None:
+    quiet = {"warned": False, "step": False, "possible": False, "noticed": False, "beyond": [0, 9]}
     found = [
-        {"inside": [0.95, 0.90], "half_width": [0.1, 0.2], "warned": True, "step": True},
-        {"inside": [0.95, 0.90], "half_width": [0.1, 0.2], "warned": False, "step": False},
-        {"inside": None, "half_width": None, "warned": True, "step": False},
+        {"inside": [0.95, 0.90], "half_width": [0.1, 0.2], **quiet, "warned": True, "step": True, "possible": True},
+        {"inside": [0.95, 0.90], "half_width": [0.1, 0.2], **quiet, "beyond": [1, 9]},
+        {"inside": None, "half_width": None, **quiet, "warned": True, "beyond": [0, 0]},
     ]
     row = calibration_coverage.summed(calibration_coverage.CASES[0], found)
     assert (row["silent"], row["warned"], row["step"], row["refused"], row["count"]) == (1, 2, 1, 1, 3)
     assert row["inside"] == [0.95, 0.9]
+    assert (row["possible"], row["noticed"], row["beyond"]) == (1, 0, [1, 18])
 
 
 @pytest.mark.parametrize("name", ["gain +15 %", "gain -20 %", "error of a day an offset"])

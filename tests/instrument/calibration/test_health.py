@@ -8,7 +8,14 @@ import pytest
 
 from sosmith.gen.calibration.fit import Measurements
 from sosmith.instrument.calibration.acceptance import DEFAULT_RANGES
-from sosmith.instrument.calibration.health.charts import CHARTS, DECISION, MOST_OF_A_DAY, STEP_LIMIT, charts_of
+from sosmith.instrument.calibration.health.charts import (
+    CHARTS,
+    DECISION,
+    MOST_OF_A_DAY,
+    STEP_LIMIT,
+    WARNING_LIMIT,
+    charts_of,
+)
 from sosmith.instrument.calibration.health.innovations import Innovations, course_of
 from sosmith.instrument.calibration.health.monitoring import Health, health_of
 from sosmith.instrument.calibration.sensor_type import SENSOR_TYPES
@@ -145,10 +152,14 @@ def test_since_accepts_what_was_before(healthy: Measurements) -> None:
     )
 
 
-def charted(offset: list[float]) -> dict[str, tuple[int | None, int | None]]:
+def innovations_of(offset: list[float]) -> Innovations:
     x = np.array(offset)
-    found = Innovations(tuple(range(len(x))), np.ones(len(x), int), np.zeros(len(x), int), x, 0 * x, 0 * x)
-    charts = charts_of(found)
+    count = np.ones(len(x), int)
+    return Innovations(tuple(range(START, START + len(x))), count, 0 * count, x, 0 * x, 0 * x, 0.1 * x)
+
+
+def charted(offset: list[float]) -> dict[str, tuple[int | None, int | None]]:
+    charts = charts_of(innovations_of(offset))
     assert [chart.name for chart in charts] == list(CHARTS)
     return {chart.name: (chart.begin, chart.alarm) for chart in charts if chart.alarm is not None}
 
@@ -160,6 +171,34 @@ def test_charts_sum_what_one_day_cannot_tell() -> None:
     assert charted([0.0, *[-1.5] * days]) == {"offset drift": (1, days)}
     assert charted([0.0, *[-1.5] * (days - 1)]) == {}
     assert MOST_OF_A_DAY < DECISION
+
+
+def test_a_last_day_beyond_the_warning_limit_is_said() -> None:
+    def said(offset: list[float], first: int = 1) -> str:
+        known = innovations_of(offset)
+        notice = Health(known, charts_of(known, first), (), first).notice
+        return "" if notice is None else notice.sentence
+
+    assert said([0.0, 0.0, -2.5]) == (
+        "2024-03-03: the sensor reads 0.25 mm more than by the days before, 2.5 times what a day scatters by; beyond 2 "
+        "is one day in 20 by chance; if the sensor has stepped, intervals may not hold until another day is measured"
+    )
+    assert "the sensor reads 0.2 mm less than by the days before, 2.0 times" in said([0.0, WARNING_LIMIT])
+    assert said([0.0, WARNING_LIMIT - 0.01]) == said([0.0, -2.5, 0.0]) == said([2.5]) == ""
+    assert said([0.0, STEP_LIMIT]) == ""  # that is an alarm
+    assert said([0.0, 0.0, 2.5], first=3) == ""
+
+
+def test_the_shift_of_a_day_is_told_in_millimetres(healthy: Measurements, known: Innovations) -> None:
+    """What the days err by is in it, so that it is not the shift alone."""
+    last = np.array(healthy.days) == healthy.days[-1]
+    shifted = replace(healthy, clearance=healthy.clearance - 0.12 * last)
+    found = health(shifted)
+    assert found.innovations.shift[-1] - known.shift[-1] == pytest.approx(-0.12, abs=0.01)
+    assert found.notice is not None
+    assert (found.notice.date, found.notice.shift) == ("2024-03-26", -found.innovations.shift[-1])
+    assert found.notice.deviations == -found.innovations.offset[-1] > WARNING_LIMIT
+    assert health(healthy).notice is None
 
 
 def test_one_measurement_a_day_tells_no_gain_and_no_scatter() -> None:

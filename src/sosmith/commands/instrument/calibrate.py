@@ -440,8 +440,8 @@ def health_command(store: Path, sensor: str, since: str | None, plot: Path | Non
     """Say whether a sensor still behaves as its measurements so far and its type would predict.
 
     Each day's measurements are predicted from the days before. Control charts of the differences raise alarms for a
-    step of offset or gain, for drift, and for more scatter; a sentence says what explains the change best. Exits with 1
-    while an alarm stands.
+    step of offset or gain, for drift, and for more scatter; a sentence says what explains the change best. A last day
+    that is between the warning limit and that of an alarm is said, too. Exits with 1 while an alarm stands.
 
     \b
         sosmith calibrate health --sensor left --plot health.svg

@@ -160,7 +160,7 @@ class Added(View):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """A sentence for each alarm that the days of the file have raised; see `CalibrationStore.health`."""
+        """A sentence for each alarm that the days of the file raise, and for a last day beyond the warning limit."""
         return self.addition.warnings
 
     def tables(self) -> list[Table]:
@@ -185,7 +185,7 @@ class Referenced(View):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """A sentence for each target that does not count, and for each alarm of the sensor's health."""
+        """A sentence for each target that does not count, and for each alarm and notice of the sensor's health."""
         return (*self.morning.warnings, *self.added.warnings)
 
     def tables(self) -> list[Table]:
@@ -313,7 +313,7 @@ class Checked(View):
         return health_plot(self.sensor, self.health, file_format)
 
     def tables(self) -> list[Table]:
-        """Return the charts, with a sentence for each alarm."""
+        """Return the charts, with a sentence for each alarm and for a last day beyond the warning limit."""
         return [health_table(self.sensor, self.health)]
 
     def as_dict(self) -> dict[str, Any]:

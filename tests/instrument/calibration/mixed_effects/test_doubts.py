@@ -1,5 +1,7 @@
 """Errors that are not those of the type are told, in words; those of the type are not."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from tests.instrument.calibration.bayesian import FIRST, TRUE, fitted
@@ -58,4 +60,11 @@ def test_too_few_measurements_to_tell_over_which_clearance_a_day_errs() -> None:
         "the measurements are too few to tell over which clearance the errors of a day vary: if that is 0.5 mm, not 2 "
         "mm as of the type equation_5a, the curve of the day is less certain than its intervals say",
     )
-    assert fitted(rows, max(rows.days) + 1).doubts == ()  # the day's own curve is in no polynomial
+    assert fitted(rows, max(rows.days) + 1).doubts == ()  # nothing is known of the day's own curve
+
+
+def test_intervals_rest_on_that_where_the_polynomial_leaves_the_curve_of_the_day_out() -> None:
+    made = fitted(measured(4, scatter=0.3))
+    assert made.doubts
+    assert not made.plain
+    assert replace(made, plain=True).doubts == made.doubts

@@ -53,9 +53,36 @@ def test_where_a_step_is_only_possible_intervals_hold_in_either_case() -> None:
     centre = made.fit.polynomial(V, T)
     each = [one.half_width(V, T, centre, 0.95) for one in (made.posterior, step.posterior)]
     assert np.array_equal(of_posterior(stepped(0.25), made).half_width(V, T), np.maximum(*each))
-    assert np.all(each[1] > each[0])
     assert made.doubted is step.posterior
     assert np.all(reading_half_width(made, V, T, 0.01) > np.maximum(*each))
+
+
+def test_where_a_step_is_possible_the_curve_is_the_mean_of_both() -> None:
+    V, T = np.linspace(2.0, 8.0, 20), np.full(20, 50.0)
+    for date in (None, FIRST + DAYS):
+        made = fitted(stepped(0.2), date)
+        step = made.step
+        assert step is not None
+        assert 0.5 < step.weight < 0.999
+        assert step.weight == pytest.approx(math.exp(step.evidence) / (1 + math.exp(step.evidence)))
+        plain, other = (one.curve(V, T) for one in (made.posterior, step.posterior))
+        mean = (1 - step.weight) * plain + step.weight * other
+        assert made.averaged.curve(V, T) == pytest.approx(mean, abs=0.02)
+        if date is not None:  # else the polynomial has to follow the day's own curve
+            assert made.fit.polynomial(V, T) == pytest.approx(mean, abs=1e-9)
+        assert np.abs(other - plain).max() > 0.02
+
+
+def test_past_doubt_the_curve_and_intervals_are_those_with_the_step() -> None:
+    made = fitted(stepped(-1.0), FIRST + DAYS)
+    step = made.step
+    assert step is not None
+    assert step.told
+    assert made.either == (step.posterior,)
+    V, T = np.linspace(3.0, 7.0, 9), np.full(9, 50.0)
+    centre = made.fit.polynomial(V, T)
+    assert centre == pytest.approx(TRUE(V + 1.0, T), abs=0.35)
+    assert np.array_equal(reading_half_width(made, V, T), step.posterior.half_width(V, T, centre, 0.95))
 
 
 def test_the_curve_after_a_step_is_that_of_the_days_since() -> None:
