@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, ClassVar
 
 from sosmith.gen.architectures.architecture import Architecture
@@ -12,6 +12,7 @@ from sosmith.gen.fpga.boards import Board
 from sosmith.gen.word_lengths.objective import Objective, ShortProgram, unsuitable
 from sosmith.hdl.plan import folded_clocks
 from sosmith.hdl.plan.instructions import instruction_bits
+from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.folding import FoldingError, program
 from sosmith.model.dataflow.program import Program
 from sosmith.model.errors import ShortfallError
@@ -31,6 +32,15 @@ SPARE_INSTRUCTIONS = 4
 
 _TRIALS = 100
 """Orders of sums that are tried for a program with two products a clock, where words have to be waited for."""
+
+
+@lru_cache(maxsize=32)
+def _shortest(datapath: Datapath, digit_bits: int) -> Program:
+    """Return the shortest program with two products a clock; the same datapath is asked for again and again.
+
+    Its constants are fixed: `hardware.reload` leaves `hardware.multipliers` to the hardware.
+    """
+    return program(datapath, digit_bits, products=2, trials=_TRIALS)
 
 
 @dataclass(frozen=True)
@@ -67,13 +77,9 @@ class SharedUnit(Architecture):
             If the datapath cannot be folded.
         """
         try:
-            folded = program(
-                self.datapath.behind_decimator,
-                self.digit_bits,
-                spare_words=SPARE_WORDS * self.reload,
-                products=(products := self.products_with(self.blocks)),
-                trials=_TRIALS if products > 1 else 0,
-            )
+            if self.products_with(self.blocks) > 1:
+                return _shortest(self.datapath.behind_decimator, self.digit_bits)
+            folded = program(self.datapath.behind_decimator, self.digit_bits, spare_words=SPARE_WORDS * self.reload)
             for digit_bits in range(self.digit_bits - 1, 0, -1):
                 if not self.reload or instruction_bits(folded) <= BITS:  # one register holds an instruction
                     break
@@ -88,7 +94,7 @@ class SharedUnit(Architecture):
     @property
     def multiplier_blocks(self) -> int:
         """Multiplier blocks that it takes, without what stands before a decimator."""
-        return 0 if self.bit_serial else self.program.products
+        return 0 if self.bit_serial else self.products_with(self.blocks)
 
     def clocks_of(self, other: Program) -> int:
         """Clocks between samples of one channel at the highest rate with another program that is fixed."""

@@ -18,6 +18,19 @@ The unit is a pipeline that holds an instruction in each of its stages. Folded, 
                            +--- low digit (STORE), signed low digit (FINISH), w <------------------------+
                                 [given0], .. (GIVE) ---> m_axis_tdata <----------------------------------+
 
+With two products a clock, an instruction also has a second address and a second constant. The words have a second
+read port, and the sum of both products a pipeline stage of its own. A word to be moved waits for that, so that all
+writes are in the last stage, and an instruction follows the one that writes its word one clock later than otherwise::
+
+    stage 3          4                              5                    6
+
+    words -+-> [data]        * [factor]         --> [product] --------+
+           |                                                          + --> [products] --> + ---> added
+           +-> [second_data] * [second_factor]  --> [second_product] -+                    ^
+           |                      ^                                                      total
+           |                 second constant
+           +-> [passed4] ---------------------> [passed5] ----------------> [moved] ---> words
+
 An instruction in pipeline stage 1 has been read from the program memory, in 2 it addresses the words, in 3 its word has
 been read, in 4 it is multiplied, and in 5 it is added up. What is added is stored, given or dropped at once, and
 `total` is what is left: shifted by a digit, or 0. A word is written three stages after it is read, with MOVE and TAKE

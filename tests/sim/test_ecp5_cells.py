@@ -182,7 +182,7 @@ REFUSED = {
     "MULT18X18D cell_ (.SOURCEA(1'b1), .SOURCEB(1'b0));": "MULT18X18D must take A and B, not shifted operands as in",
     'TRELLIS_FF #(.SRMODE("ASYNC")) cell_ ();': "TRELLIS_FF must have a rising edge and a synchronous reset, unlike",
     'DP16KD #(.REGMODE_A("OUTREG")) cell_ ();': "DP16KD must have rising edges, no register at an output alone and no",
-    'DP16KD #(.REGMODE_B("OUTREG")) cell_ (.CLKB(clk), .OCEB(1\'b0));': "DP16KD must have output registers that are always",
+    'DP16KD #(.REGMODE_B("OUTREG")) cell_ (.CLKB(clk), .OCEB(1\'b0));': "DP16KD must have output registers that are",
     "DP16KD cell_ (.CLKB(clk), .RSTB(1'b1));": "DP16KD must have no reset and no chip select, unlike",
     "DP16KD cell_ (.CLKA(clk), .CSA1(1'b1));": "DP16KD must have no reset and no chip select, unlike",
     "DP16KD #(.DATA_WIDTH_B(36)) cell_ (.CLKB(clk), .WEB(1'b1));": "DP16KD must write 36 bits by port A, unlike",
