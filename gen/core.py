@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from sosmith.gen.architectures.architecture import Architecture
-from sosmith.gen.architectures.blocks import Blocks, blocks_for
+from sosmith.gen.architectures.blocks import blocks_for
 from sosmith.gen.architectures.budget import Budget
 from sosmith.gen.architectures.registry import candidates, fitting, reason_for
 from sosmith.gen.architectures.search import AskedRealization, Response, Search
@@ -289,7 +289,8 @@ def _calibration_hardware(
     datapath = None if response.pre_stage is None else response.pre_stage.calibration_datapath(response.codes)
     if datapath is None:
         return None, budget, {}
-    wanted, each = spec.hardware.architecture, replace(budget, decimate=1, hold=False)
+    wanted = spec.hardware.architecture
+    each = replace(budget, decimate=1, hold=False, blocks=budget.blocks.keeping_one())
     refused = ""
     for kind in candidates(wanted, budget.blocks, asked_by(spec)):
         try:
@@ -298,16 +299,9 @@ def _calibration_hardware(
             refused = f"before the decimator, {error}"
         else:
             why = reason_for(architecture, each, asked=wanted != AUTO, board=board, refused=refused)
-            left = replace(budget, blocks=_left(budget.blocks, architecture))
+            left = replace(budget, blocks=budget.blocks.without(architecture.multiplier_blocks))
             return architecture, left, {"calibration before the decimator": why}
     raise ShortfallError(refused)
-
-
-def _left(blocks: Blocks, calibration: Architecture) -> Blocks:
-    """Return the multiplier blocks that what stands before the decimator leaves."""
-    if blocks.available is None:
-        return blocks
-    return blocks._replace(available=max(0, blocks.available - calibration.multiplier_blocks))
 
 
 def refuse_decimated_channels(design: CoreDesign, where: str) -> None:

@@ -38,7 +38,8 @@ _NUMBER_BITS = 8
 def instruction_layout(program: Program) -> data.StructLayout:
     """Layout of an instruction of `program`; that of an opcode follows from its class."""
     bits = field_bits(program)
-    return data.StructLayout({**bits, "opcode": Opcode, "constant": signed(bits["constant"])})
+    constants = {name: signed(width) for name, width in bits.items() if name.endswith("constant")}
+    return data.StructLayout({**bits, "opcode": Opcode, **constants})
 
 
 _KINDS = {
@@ -101,6 +102,16 @@ class PipelinedInstruction:
     def constant(self) -> Value:
         """Its constant."""
         return self._net("constant", self.fields.constant)
+
+    @property
+    def second_address(self) -> Value:
+        """The address of its second word."""
+        return self._net("second_address", self.fields.second_address)
+
+    @property
+    def second_constant(self) -> Value:
+        """Its second constant."""
+        return self._net("second_constant", self.fields.second_constant)
 
     def has(self, *opcodes: Opcode) -> Value:
         """Whether its opcode is one of `opcodes`, which are one alone or all of a kind."""

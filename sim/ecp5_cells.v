@@ -25,12 +25,13 @@ module TRELLIS_FF (input CLK, LSR, CE, DI, M, output reg Q);
     else if (enable) Q <= DI;
 endmodule
 
-// Multiplier block without any of its registers, its operands from its own inputs.
+// Multiplier block with its registers for both operands, for the product, or without; its operands from its own inputs.
+// Registers are always enabled and never reset, and start at 0.
 module MULT18X18D (
   input A17, A16, A15, A14, A13, A12, A11, A10, A9, A8, A7, A6, A5, A4, A3, A2, A1, A0,
   input B17, B16, B15, B14, B13, B12, B11, B10, B9, B8, B7, B6, B5, B4, B3, B2, B1, B0,
   input C17, C16, C15, C14, C13, C12, C11, C10, C9, C8, C7, C6, C5, C4, C3, C2, C1, C0,
-  input SIGNEDA, SIGNEDB, SOURCEA, SOURCEB,
+  input SIGNEDA, SIGNEDB, SOURCEA, SOURCEB, CLK0, CE0, RST0,
   output P35, P34, P33, P32, P31, P30, P29, P28, P27, P26, P25, P24, P23, P22, P21, P20, P19, P18, P17, P16, P15, P14,
   P13, P12, P11, P10, P9, P8, P7, P6, P5, P4, P3, P2, P1, P0
 );
@@ -40,13 +41,19 @@ module MULT18X18D (
   parameter REG_PIPELINE_CLK = "NONE";
   parameter REG_OUTPUT_CLK = "NONE";
   parameter MULT_BYPASS = "DISABLED";
+  parameter [127:0] RESETMODE = "SYNC";
+  parameter [127:0] GSR = "ENABLED";
 
-  wire [17:0] a = {
+  wire [17:0] next_a = {
     A17, A16, A15, A14, A13, A12, A11, A10, A9, A8, A7, A6, A5, A4, A3, A2, A1, A0
   };
-  wire [17:0] b = {
+  wire [17:0] next_b = {
     B17, B16, B15, B14, B13, B12, B11, B10, B9, B8, B7, B6, B5, B4, B3, B2, B1, B0
   };
+  reg [17:0] held_a = 18'd0, held_b = 18'd0;
+  reg [35:0] held_product = 36'd0;
+  wire [17:0] a = REG_INPUTA_CLK == "CLK0" ? held_a : next_a;
+  wire [17:0] b = REG_INPUTB_CLK == "CLK0" ? held_b : next_b;
   // A 19th bit repeats the sign of a signed operand and is 0 for an unsigned one.
   wire signed [18:0] wide_a = {SIGNEDA & a[17], a};
   wire signed [18:0] wide_b = {SIGNEDB & b[17], b};
@@ -54,17 +61,26 @@ module MULT18X18D (
   assign {
     P35, P34, P33, P32, P31, P30, P29, P28, P27, P26, P25, P24, P23, P22, P21, P20, P19, P18, P17, P16, P15, P14,
     P13, P12, P11, P10, P9, P8, P7, P6, P5, P4, P3, P2, P1, P0
-  } = product[35:0];
+  } = REG_OUTPUT_CLK == "CLK0" ? held_product : product[35:0];
+
+  always @(posedge CLK0) begin
+    held_a <= next_a;
+    held_b <= next_b;
+    held_product <= product[35:0];
+    if (!CE0 || RST0) $fatal(1, "MULT18X18D must have registers that are always enabled and never reset, unlike %m");
+  end
 
   initial
-    if (REG_INPUTA_CLK != "NONE" || REG_INPUTB_CLK != "NONE" || REG_INPUTC_CLK != "NONE" ||
-        REG_PIPELINE_CLK != "NONE" || REG_OUTPUT_CLK != "NONE" || MULT_BYPASS != "DISABLED")
-      $fatal(1, "MULT18X18D must have no register and no bypass, unlike %m");
+    if ((REG_INPUTA_CLK != "NONE" && REG_INPUTA_CLK != "CLK0") ||
+        (REG_INPUTB_CLK != "NONE" && REG_INPUTB_CLK != "CLK0") || REG_INPUTC_CLK != "NONE" ||
+        REG_PIPELINE_CLK != "NONE" || (REG_OUTPUT_CLK != "NONE" && REG_OUTPUT_CLK != "CLK0") ||
+        MULT_BYPASS != "DISABLED" || RESETMODE != "SYNC" || (GSR != "ENABLED" && GSR != "DISABLED"))
+      $fatal(1, "MULT18X18D must have no other register and no bypass, unlike %m");
   always @(SOURCEA, SOURCEB)
     if (SOURCEA | SOURCEB) $fatal(1, "MULT18X18D must take A and B, not shifted operands as in %m");
 endmodule
 
-// Block RAM of 1,024 words of 18 bits without output registers. A port of 36 bits has the data pins of both ports:
+// Block RAM of 1,024 words of 18 bits, with or without output registers, which are always enabled. A port of 36 bits has the data pins of both ports:
 // A is the one that writes, B the one that reads. In words of 18 and 36 bits the lowest address bits enable bytes of
 // 9 bits. A port that reads what the other writes at the same edge gets the old word.
 module DP16KD (
@@ -136,21 +152,25 @@ module DP16KD (
 
   reg [17:0] memory[0:1023];
   reg [17:0] low, high, read_a, read_b; // read by a port of 36 bits, and by each port of fewer
+  reg [17:0] out_a = 18'd0, out_b = 18'd0; // behind them
+  wire [17:0] word_a = DATA_WIDTH_B == 36 ? low : read_a;
+  wire [17:0] word_b = DATA_WIDTH_B == 36 ? high : read_b;
   integer i;
 
   assign {
     DOA17, DOA16, DOA15, DOA14, DOA13, DOA12, DOA11, DOA10, DOA9, DOA8, DOA7, DOA6, DOA5, DOA4, DOA3, DOA2, DOA1,
     DOA0
-  } = DATA_WIDTH_B == 36 ? low : read_a;
+  } = REGMODE_A == "OUTREG" ? out_a : word_a;
   assign {
     DOB17, DOB16, DOB15, DOB14, DOB13, DOB12, DOB11, DOB10, DOB9, DOB8, DOB7, DOB6, DOB5, DOB4, DOB3, DOB2, DOB1,
     DOB0
-  } = DATA_WIDTH_B == 36 ? high : read_b;
+  } = REGMODE_B == "OUTREG" ? out_b : word_b;
 
   initial begin
-    if (REGMODE_A != "NOREG" || REGMODE_B != "NOREG" || CLKAMUX != "CLKA" || CLKBMUX != "CLKB" ||
+    if ((REGMODE_A != "NOREG" && REGMODE_A != "OUTREG") || (REGMODE_B != "NOREG" && REGMODE_B != "OUTREG") ||
+        (DATA_WIDTH_B == 36 ? REGMODE_A != REGMODE_B : REGMODE_A != "NOREG") || CLKAMUX != "CLKA" || CLKBMUX != "CLKB" ||
         CSDECODE_A != "0b000" || CSDECODE_B != "0b000")
-      $fatal(1, "DP16KD must have rising edges, no output register and no decoder, unlike %m");
+      $fatal(1, "DP16KD must have rising edges, no register at an output alone and no decoder, unlike %m");
     for (i = 0; i < 1024; i = i + 1) memory[i] = CONTENT[20*i +: 18];
     low = 18'($urandom);
     high = 18'($urandom);
@@ -172,6 +192,10 @@ module DP16KD (
   end
 
   always @(posedge CLKB) begin
+    out_a <= word_a;
+    out_b <= word_b;
+    if (REGMODE_B == "OUTREG" && (!OCEB || (DATA_WIDTH_B == 36 && !OCEA)))
+      $fatal(1, "DP16KD must have output registers that are always enabled, unlike %m");
     if (RSTB | CSB2 | CSB1 | CSB0) $fatal(1, "DP16KD must have no reset and no chip select, unlike %m");
     if (DATA_WIDTH_B == 36) begin
       if (WEB) $fatal(1, "DP16KD must write 36 bits by port A, unlike %m");

@@ -50,7 +50,7 @@ class Architecture(ABC):
         Width of a digit of the program, one bit less than a factor of the multiplier; less if an instruction must fit
         a register to be loadable.
     blocks : Blocks
-        Multiplier blocks that there are for the products of the parallel architecture.
+        Multiplier blocks that there are.
     samples_per_clock : int
         Samples in a beat of the streams; more than one in the parallel architecture only.
     look_ahead : bool
@@ -86,10 +86,11 @@ class Architecture(ABC):
 
     @classmethod
     @abstractmethod
-    def objective(cls, board: Board | None, *, adders: bool = False) -> Objective:
+    def objective(cls, board: Board | None, *, adders: bool = False, blocks: Blocks = NO_LIMIT) -> Objective:
         """Return what word lengths and a realization are chosen for.
 
-        `adders` says that no product by a constant may take a multiplier block, where each product has its own.
+        `adders` says that no product by a constant may take a multiplier block, where each product has its own;
+        `blocks`, which multiplier blocks there are.
         """
 
     @classmethod
@@ -97,6 +98,12 @@ class Architecture(ABC):
         """Width of a digit, where there is a program: by the multiplier block of the board if it takes one."""
         del board
         return DIGIT_BITS
+
+    @classmethod
+    def products_with(cls, blocks: Blocks) -> int:
+        """Return the products that a shared unit computes at a clock, with as many multiplier blocks."""
+        del blocks
+        return 1
 
     @property
     def name(self) -> str:

@@ -13,7 +13,11 @@ from sosmith.gen.specification.combinations import FOLDED
 
 @dataclass(frozen=True)
 class Folded(SharedUnit):
-    """One multiplier block runs a program, an instruction at each clock."""
+    """One or two multiplier blocks run a program, an instruction at each clock.
+
+    Two where the specification names as many or more, with `hardware.multipliers`: a sample then takes some two thirds
+    of the clocks.
+    """
 
     terms = FOLDED
     bit_serial = False
@@ -23,6 +27,11 @@ class Folded(SharedUnit):
         """Return True: if there is no multiplier block, synthesis makes one of LUT4."""
         del blocks
         return True
+
+    @classmethod
+    def products_with(cls, blocks: Blocks) -> int:
+        """Return the products at a clock: two if the specification names so many multiplier blocks."""
+        return 2 if (blocks.asked or 1) > 1 else 1
 
     @classmethod
     def digit_bits_on(cls, board: Board | None) -> int:

@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from sosmith.gen.architectures.architecture import Architecture
-from sosmith.gen.architectures.blocks import Blocks
+from sosmith.gen.architectures.blocks import NO_LIMIT, Blocks
 from sosmith.gen.architectures.fir_steps import FewSteps
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.specification.combinations import FOLDED
@@ -33,9 +33,9 @@ class FoldedFir(Architecture):
         return True
 
     @classmethod
-    def objective(cls, board: Board | None, *, adders: bool = False) -> Objective:
+    def objective(cls, board: Board | None, *, adders: bool = False, blocks: Blocks = NO_LIMIT) -> Objective:
         """Return the number of steps."""
-        del board, adders
+        del board, adders, blocks
         return FewSteps()
 
     @cached_property

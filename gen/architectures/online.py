@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from sosmith.gen.architectures.architecture import Architecture
-from sosmith.gen.architectures.blocks import Blocks
+from sosmith.gen.architectures.blocks import NO_LIMIT, Blocks
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.specification.combinations import ONLINE
 from sosmith.gen.word_lengths.cost import Cost
@@ -35,9 +35,9 @@ class Online(Architecture):
         return False
 
     @classmethod
-    def objective(cls, board: Board | None, *, adders: bool = False) -> Objective:
+    def objective(cls, board: Board | None, *, adders: bool = False, blocks: Blocks = NO_LIMIT) -> Objective:
         """Return the estimated area of the units for its rate."""
-        del board, adders
+        del board, adders, blocks
         return OnlineUnits()
 
     @cached_property

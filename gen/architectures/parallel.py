@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from sosmith.gen.architectures.architecture import Architecture
-from sosmith.gen.architectures.blocks import Blocks
+from sosmith.gen.architectures.blocks import NO_LIMIT, Blocks
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.specification.combinations import PARALLEL
 from sosmith.gen.word_lengths.cost import products_from_adders, scalings
@@ -34,9 +34,9 @@ class Parallel(Architecture):
         return True
 
     @classmethod
-    def objective(cls, board: Board | None, *, adders: bool = False) -> Objective:
+    def objective(cls, board: Board | None, *, adders: bool = False, blocks: Blocks = NO_LIMIT) -> Objective:
         """Return the estimated area of the operators."""
-        del board
+        del board, blocks
         return FEW_ADDERS if adders else SMALL_AREA
 
     @cached_property

@@ -152,7 +152,8 @@ class Search:
         ideal, asked = self.response.ideal, self.asked
         if ideal is None:
             return prove(self._plan_of(next(iter(REALIZATIONS)))), "none: a calibration has no filter sections"
-        objective = kind.objective(self.board, adders=self.budget.adders or self._looks_ahead)
+        adders = self.budget.adders or self._looks_ahead
+        objective = kind.objective(self.board, adders=adders, blocks=self.budget.blocks)
         selection = Selection(
             lambda name: self._plan_of(name).under(objective),
             lambda name: least_size(ideal, name, objective),

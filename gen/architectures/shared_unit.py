@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, ClassVar
 
 from sosmith.gen.architectures.architecture import Architecture
+from sosmith.gen.architectures.blocks import NO_LIMIT, Blocks
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.word_lengths.objective import Objective, ShortProgram, unsuitable
 from sosmith.hdl.plan import folded_clocks
 from sosmith.hdl.plan.instructions import instruction_bits
+from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.folding import FoldingError, program
 from sosmith.model.dataflow.program import Program
 from sosmith.model.errors import ShortfallError
@@ -28,10 +30,22 @@ SPARE_WORDS = 4
 SPARE_INSTRUCTIONS = 4
 """A replaceable program has spare instructions: one for each group of this many."""
 
+_TRIALS = 100
+"""Orders of sums that are tried for a program with two products a clock, where words have to be waited for."""
+
+
+@lru_cache(maxsize=32)
+def _shortest(datapath: Datapath, digit_bits: int) -> Program:
+    """Return the shortest program with two products a clock; the same datapath is asked for again and again.
+
+    Its constants are fixed: `hardware.reload` leaves `hardware.multipliers` to the hardware.
+    """
+    return program(datapath, digit_bits, products=2, trials=_TRIALS)
+
 
 @dataclass(frozen=True)
 class SharedUnit(Architecture):
-    """One multiplier and one accumulator run a program.
+    """One multiplier or two, and one accumulator, run a program.
 
     Attributes
     ----------
@@ -43,10 +57,15 @@ class SharedUnit(Architecture):
     checked = "the program computes the datapath's graphs, instruction by instruction"
 
     @classmethod
-    def objective(cls, board: Board | None, *, adders: bool = False) -> Objective:
+    def objective(cls, board: Board | None, *, adders: bool = False, blocks: Blocks = NO_LIMIT) -> Objective:
         """Return the length of the program."""
         del adders
-        return ShortProgram(cls.terms.name, cls.digit_bits_on(board), bit_serial=cls.bit_serial)
+        return ShortProgram(
+            cls.terms.name,
+            cls.digit_bits_on(board),
+            bit_serial=cls.bit_serial,
+            products=cls.products_with(blocks),
+        )
 
     @cached_property
     def program(self) -> Program:
@@ -58,6 +77,8 @@ class SharedUnit(Architecture):
             If the datapath cannot be folded.
         """
         try:
+            if self.products_with(self.blocks) > 1:
+                return _shortest(self.datapath.behind_decimator, self.digit_bits)
             folded = program(self.datapath.behind_decimator, self.digit_bits, spare_words=SPARE_WORDS * self.reload)
             for digit_bits in range(self.digit_bits - 1, 0, -1):
                 if not self.reload or instruction_bits(folded) <= BITS:  # one register holds an instruction
@@ -73,7 +94,7 @@ class SharedUnit(Architecture):
     @property
     def multiplier_blocks(self) -> int:
         """Multiplier blocks that it takes, without what stands before a decimator."""
-        return int(not self.bit_serial)
+        return 0 if self.bit_serial else self.products_with(self.blocks)
 
     def clocks_of(self, other: Program) -> int:
         """Clocks between samples of one channel at the highest rate with another program that is fixed."""

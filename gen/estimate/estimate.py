@@ -142,7 +142,7 @@ def on_board(architecture: Architecture, board: Board) -> Architecture:
     before = None if architecture.calibration is None else on_board(architecture.calibration, board)
     return replace(
         architecture,
-        blocks=blocks_for(architecture.blocks.available, board),
+        blocks=blocks_for(architecture.blocks.available, board)._replace(asked=architecture.blocks.asked),
         digit_bits=architecture.digit_bits_on(board),
         calibration=before,
     )

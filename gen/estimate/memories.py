@@ -75,11 +75,11 @@ def _lut_ram_cost(device: Device, deep: int, width: int) -> float:
     return deep * -(-width // step) * step + _COST_OF_CHOICE * chosen + _COST_OF_REGISTER
 
 
-def of_rom(device: Device, words: Sequence[int], width: int) -> Quantities:
-    """Count a memory that is never written: of block RAM or of LUT4."""
+def of_rom(device: Device, words: Sequence[int], width: int, *, block: bool = False) -> Quantities:
+    """Count a memory that is never written: of block RAM or of LUT4; `block` says that it is asked to be block RAM."""
     made: Quantities = Counter({"memory_bits": len(words) * width})
     blocks = block_rams(device, len(words), width)
-    if _block_cost(device, blocks) < len(words) * width / _ROM_BITS:
+    if block or _block_cost(device, blocks) < len(words) * width / _ROM_BITS:
         return made + Counter({"rams": blocks})
     return made + _rom(words, width) + Counter({"registers": width})
 

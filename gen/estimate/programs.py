@@ -17,7 +17,7 @@ from sosmith.gen.estimate.quantities import (
 )
 from sosmith.gen.fpga.boards import Device
 from sosmith.gen.word_lengths.cost import Multiplication, Operand
-from sosmith.hdl.plan.folded_clocks import FOLDED_DEPTH, SERIAL_DEPTH, memory_depth, word_slices
+from sosmith.hdl.plan.folded_clocks import memory_depth, pipeline_depth, word_slices
 from sosmith.hdl.plan.instructions import address_bits, encoded, instruction_bits
 from sosmith.hdl.plan.streams import channel_bits
 from sosmith.model.dataflow.graph import Op
@@ -39,9 +39,13 @@ def of_program(architecture: Architecture, device: Device) -> Quantities:
     made["shifts"] += 2 * word * serial
     if not serial:
         factor = Operand(word, signed=True)
-        made += of_product(Product(Multiplication(factor, factor)), device)
+        for _ in range(program.products):
+            made += of_product(Product(Multiplication(factor, factor)), device)
+    if program.products > 1:  # their sum, and a word that waits for it
+        made["accumulators"] += 2 * word + 1
+        made["registers"] += 2 * word + 1 + 2 * word
     made["channels"] += channel_bits(channels)
-    depth = SERIAL_DEPTH if serial else FOLDED_DEPTH
+    depth = pipeline_depth(program, serial=serial)
     made["registers"] += acc + word * (4 if serial else 3) + (depth - 1) * (instruction_bits(program) + 1)
     made["opcodes"] += len({i.opcode for i in program.instructions})
     return made
@@ -69,11 +73,12 @@ def _memories(architecture: Architecture, program: Program, device: Device) -> Q
         made["loaded"] += bits
     words, program_bits = word + check_bits(word, protect), bits + check_bits(bits, protect)
     for low, high in word_slices(depth, words):
-        made += of_memory(device, depth, high - low)
+        for _ in range(program.products):  # a word that is read beside another one lies in a memory of its own
+            made += of_memory(device, depth, high - low)
     if is_written:
         return made + of_memory(device, count, program_bits)
     guarded = [code | parity(code) << bits if protect != "none" else code for code in codes]
-    return made + of_rom(device, guarded, program_bits)
+    return made + of_rom(device, guarded, program_bits, block=program.products > 1)
 
 
 def _result(architecture: Architecture, program: Program) -> Quantities:

@@ -12,6 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from sosmith.gen.fpga.block_registers import with_block_registers
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.fpga.platform_plan import SEED, board_plan, text_of
 from sosmith.gen.fpga.tools import Tool, find_tool
@@ -165,6 +166,8 @@ def build(
         for command in commands:
             progress(_STEPS.get(command[0], "placement and routing"))
             _carry_out(tools[command[0]], command[1:], place, board)
+            if command[0] == "yosys":
+                _pack(place / f"{name}.json")
         report = json.loads((place / "report.json").read_text(encoding="utf-8"))
         bitstream_file = place / f"{name}.{_SUFFIX[board.device.family]}"
         clocks = tuple(
@@ -185,6 +188,13 @@ def build(
             versions={tool.name: tool.version for tool in tools.values()},
             log=_read(place / _LOG),
         )
+
+
+def _pack(netlist: Path) -> None:
+    """Move registers into the blocks beside them, where Yosys leaves them outside."""
+    if netlist.exists():  # none for what Amaranth hands on otherwise
+        packed = with_block_registers(json.loads(netlist.read_text(encoding="utf-8")))
+        netlist.write_text(json.dumps(packed), encoding="utf-8")
 
 
 def _translated(command: Sequence[str]) -> list[str]:

@@ -7,9 +7,13 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 
+from sosmith.gen.fpga.block_registers import cells_of, with_block_registers
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.fpga.yosys import run_yosys, yosys_version
 from sosmith.model.text_files import to_json, write_files
+
+_PACKING = "block registers 1"
+"""Version of `sosmith.gen.fpga.block_registers`."""
 
 
 @dataclass(frozen=True)
@@ -54,20 +58,18 @@ def synthesize(sv: Path, top: str, board: Board, folder: Path) -> Netlist:
     board : Board
         Target board; the netlist may exceed its resources.
     folder : Path
-        Folder for ``netlist.v`` and ``synthesis.json``.
+        Folder for ``netlist.v``, ``netlist.json`` and ``synthesis.json``.
 
     Raises
     ------
     ToolError
         If Yosys is missing or fails; shows its last lines.
     """
-    script = (
-        f"read_verilog -sv core.sv; {board.device.synthesis} -top {top}; tee -q -o stat.json stat -json; "
-        "write_verilog -noattr netlist.v"
-    )
+    script = f"read_verilog -sv core.sv; {board.device.synthesis} -top {top}; write_json netlist.json"
+    writing = "read_json netlist.json; write_verilog -noattr netlist.v"
     text = sv.read_bytes()
     version = yosys_version()
-    fingerprint = hashlib.sha256(text + f"{script}{version}".encode()).hexdigest()
+    fingerprint = hashlib.sha256(text + f"{script}{_PACKING}{version}".encode()).hexdigest()
     record, netlist = folder / "synthesis.json", folder / "netlist.v"
     if record.exists() and netlist.exists():
         earlier = json.loads(record.read_text(encoding="utf-8"))
@@ -76,7 +78,9 @@ def synthesize(sv: Path, top: str, board: Board, folder: Path) -> Netlist:
     record.unlink(missing_ok=True)  # leftovers of an interrupted run must not pass for a valid netlist
     write_files(folder, {"core.sv": text.decode()})
     run_yosys(script, folder)
-    counts = json.loads((folder / "stat.json").read_text(encoding="utf-8"))["design"]["num_cells_by_type"]
-    cells = {kind: count for kind, count in sorted(counts.items()) if not kind.startswith("$")}
+    packed = with_block_registers(json.loads((folder / "netlist.json").read_text(encoding="utf-8")))
+    write_files(folder, {"netlist.json": json.dumps(packed)})
+    run_yosys(writing, folder)
+    cells = {kind: count for kind, count in sorted(cells_of(packed).items()) if not kind.startswith("$")}
     write_files(folder, {"synthesis.json": to_json({"fingerprint": fingerprint, "cells": cells})})
     return Netlist(board, netlist, cells, version)

@@ -100,7 +100,10 @@ def _section(section: SectionFacts) -> dict[str, Any]:
 
 
 def _schedule(program: Program | None) -> dict[str, Any] | None:
-    """Program of the folded and serial architectures; each instruction as opcode, address, constant and target."""
+    """Program of the folded and serial architectures; each instruction as opcode, address, constant and target.
+
+    Where there are two products a clock, the second address and the second constant follow.
+    """
     if program is None:
         return None
     return {
@@ -112,5 +115,7 @@ def _schedule(program: Program | None) -> dict[str, Any] | None:
             {"name": p.name, "addresses": list(p.addresses), "frac": p.frac, "state": p.is_state}
             for p in program.locations
         ],
-        "instructions": [[opcode.mnemonic, *fields] for opcode, *fields in program.instructions],
+        "instructions": [
+            [opcode.mnemonic, *fields[: 1 + 2 * program.products]] for opcode, *fields in program.instructions
+        ],
     }

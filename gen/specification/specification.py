@@ -130,7 +130,7 @@ class HardwareSpec:
         "steady" if the filter starts from the steady state of its first sample, "zero" if from states of 0.
     multipliers : int or None
         Multiplier blocks that the parallel architecture may take, where the rest is made of adders; None for as many
-        as the board has, or as synthesis makes.
+        as the board has, or as synthesis makes. With 2 or more, the folded one has two products a clock, otherwise one.
     pipeline : str
         "plain", "look-ahead", or "auto" for look-ahead only where clock and sample rate ask for it.
     samples_per_clock : int

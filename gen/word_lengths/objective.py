@@ -165,11 +165,14 @@ class ShortProgram:
         Width of a digit.
     bit_serial : bool
         Whether an instruction takes a clock for each bit of its factor, instead of one.
+    products : int
+        Products at a clock, 1 or 2.
     """
 
     architecture: str
     digit_bits: int
     bit_serial: bool = False
+    products: int = 1
 
     negligible = 1 / 128  # bits of words that take no instruction
     few_digits = False
@@ -202,7 +205,7 @@ class ShortProgram:
         Infinite if it cannot be folded.
         """
         try:
-            folded = program(datapath, self.digit_bits)
+            folded = program(datapath, self.digit_bits, products=self.products)
         except FoldingError:
             return math.inf
         clocks = folded.serial_cycles if self.bit_serial else len(folded.instructions)
@@ -220,11 +223,11 @@ class ShortProgram:
             columns = [column for graph in graphs for column in columns_of(graph, digit_bits=256)]
         except FoldingError as error:
             raise ShortfallError(unsuitable(self.architecture, error)) from None
-        return sum(len(column.products) for column in columns)
+        return sum(-(-len(column.products) // self.products) for column in columns)
 
     def size_text(self, datapath: Datapath) -> str:
         """Return the length of the program, its memory and its accumulator in words."""
-        folded = program(datapath, self.digit_bits)
+        folded = program(datapath, self.digit_bits, products=self.products)
         length = (
             f"at most {folded.serial_cycles:,}" if self.bit_serial else f"{len(folded.instructions):,} instructions"
         )
@@ -233,7 +236,7 @@ class ShortProgram:
     def _clocks(self, column: Column) -> int:
         """Clocks of a column's instructions; one without products still takes one, which ends it."""
         if not self.bit_serial:
-            return max(1, len(column.products))
+            return max(1, -(-len(column.products) // self.products))
         clocks = [
             self.digit_bits + 1 if product.other is not None else serial_clocks(product.constant)
             for product in column.products

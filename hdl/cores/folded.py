@@ -18,6 +18,19 @@ The unit is a pipeline that holds an instruction in each of its stages. Folded, 
                            +--- low digit (STORE), signed low digit (FINISH), w <------------------------+
                                 [given0], .. (GIVE) ---> m_axis_tdata <----------------------------------+
 
+With two products a clock, an instruction also has a second address and a second constant. The words have a second
+read port, and the sum of both products a pipeline stage of its own. A word to be moved waits for that, so that all
+writes are in the last stage, and an instruction follows the one that writes its word one clock later than otherwise::
+
+    stage 3          4                              5                    6
+
+    words -+-> [data]        * [factor]         --> [product] --------+
+           |                                                          + --> [products] --> + ---> added
+           +-> [second_data] * [second_factor]  --> [second_product] -+                    ^
+           |                      ^                                                      total
+           |                 second constant
+           +-> [passed4] ---------------------> [passed5] ----------------> [moved] ---> words
+
 An instruction in pipeline stage 1 has been read from the program memory, in 2 it addresses the words, in 3 its word has
 been read, in 4 it is multiplied, and in 5 it is added up. What is added is stored, given or dropped at once, and
 `total` is what is left: shifted by a digit, or 0. A word is written three stages after it is read, with MOVE and TAKE
@@ -63,6 +76,7 @@ is high at edge 9 + 5 = 14.
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import NamedTuple
 
 from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, signed
@@ -73,7 +87,7 @@ from sosmith.hdl.check_bits import CheckBits
 from sosmith.hdl.instruction import PipelinedInstruction
 from sosmith.hdl.memory_ports import read_port, write_port
 from sosmith.hdl.pipelined_logic import limits
-from sosmith.hdl.plan.folded_clocks import FOLDED_DEPTH, SERIAL_DEPTH, memory_depth, overlaps, word_slices
+from sosmith.hdl.plan.folded_clocks import memory_depth, overlaps, pipeline_depth, word_slices
 from sosmith.hdl.plan.instructions import address_bits, encoded, instruction_bits
 from sosmith.hdl.plan.streams import channel_bits
 from sosmith.hdl.reload import ReloadPort
@@ -98,6 +112,9 @@ from sosmith.model.dataflow.program import (
 FUNCTIONS = ("sequencer", "program_memory", "word_memory", "multiply_accumulate", "result")
 """Modules of a core, in the order in which an instruction meets them."""
 
+_WORDS_READ = ("read", "second_read")
+"""The words that an instruction reads."""
+
 _NO_COLLISIONS = {"no_rw_check": 1}
 """Attribute of memories: no word is used that is read at the clock at which it is written.
 
@@ -105,6 +122,9 @@ _NO_COLLISIONS = {"no_rw_check": 1}
 a clock a simulator reads the old word and a block RAM anything; without the attribute, Yosys adds registers and a
 comparator to make both equal.
 """
+
+_IN_BLOCKS = {"ram_style": "block"}
+"""Attribute of a memory that is wide and short: as logic it would take several times the LUT4 of all the rest."""
 
 
 class _Control:
@@ -237,7 +257,7 @@ class FoldedCore(Shell):
         reload = self._reload(m, functions["sequencer"], control)
         position = self._sequence(functions["sequencer"], control, guard, reload)
         pipeline, fetched = self._fetch(functions["program_memory"], control, position, reload, guard)
-        read = Signal(signed(self._word))
+        read = [Signal(signed(self._word), name=name) for name in _WORDS_READ[: self.program.products]]
         added = Signal(signed(self.program.accumulator_bits))
         self._accumulate(functions["multiply_accumulate"], control.advance, pipeline, (read, added))
         remembered = self._remember(functions["word_memory"], control, (added, read), pipeline, guard)
@@ -281,9 +301,9 @@ class FoldedCore(Shell):
         """Accept a sample, as it `ends` or once it has been read; return when its flags are to be taken."""
         taken = Signal()
         if ends is None:
-            reading = self._reading(pipeline)
-            last_digit = reading.is_for(sum(location.digits for location in self.program.inputs) - 1)
-            m.d.sync += taken.eq(control.advance & reading.valid & reading.has(Opcode.TAKE) & last_digit)
+            read = pipeline[-2 if self.serial else -3]  # not before the flags of the sample before have been copied
+            last_digit = read.is_for(sum(location.digits for location in self.program.inputs) - 1)
+            m.d.sync += taken.eq(control.advance & read.valid & read.has(Opcode.TAKE) & last_digit)
         else:
             m.d.sync += taken.eq(ends)
         m.d.comb += self.s_axis_tready.eq(taken | control.dropped)
@@ -309,6 +329,11 @@ class FoldedCore(Shell):
         """Whether a sample is begun while the one before is in the pipeline."""
         reload = self.fingerprint is not None
         return overlaps(self.program, serial=self.serial, channels=self.channels, reload=reload, protect=self.protect)
+
+    @property
+    def _moves_early(self) -> bool:
+        """Whether a word is moved at the clock at which the instruction before would store one."""
+        return self.serial or self.program.products == 1
 
     @property
     def _word(self) -> int:
@@ -405,8 +430,9 @@ class FoldedCore(Shell):
             codes += [0] * ((1 << (len(codes) - 1).bit_length()) - len(codes))
             codes += [0] * len(codes)
         check = CheckBits(instruction_bits(self.program), self.protect)
+        attributes = _NO_COLLISIONS | ({} if self.program.products == 1 else _IN_BLOCKS)
         m.submodules.instructions = program = Memory(
-            shape=check.width, depth=len(codes), init=[check.word(code) for code in codes], attrs=_NO_COLLISIONS
+            shape=check.width, depth=len(codes), init=[check.word(code) for code in codes], attrs=attributes
         )
         fetch = read_port(program, "instructions")
         index, bank = self._program_address(m, position.counter, count, reload, guard)
@@ -425,7 +451,7 @@ class FoldedCore(Shell):
         pipeline = [PipelinedInstruction(m, "instruction1", word.data, valid, self.program)]
         with m.If(advance):
             m.d.sync += valid.eq(position.fetches)
-            for k in range(2, SERIAL_DEPTH + 1 if self.serial else FOLDED_DEPTH + 1):
+            for k in range(2, pipeline_depth(self.program, serial=self.serial) + 1):
                 code = Signal(len(word.data), name=f"instruction{k}", reset_less=True)
                 valid = Signal(name=f"valid{k}")
                 m.d.sync += [code.eq(pipeline[-1].code), valid.eq(pipeline[-1].valid)]
@@ -481,11 +507,11 @@ class FoldedCore(Shell):
         m.d.comb += [write.addr.eq(address), write.data.eq(data), write.en.eq(enable)]
 
     def _accumulate(
-        self, m: Module, advance: Signal, pipeline: list[PipelinedInstruction], values: tuple[Signal, Signal]
+        self, m: Module, advance: Signal, pipeline: list[PipelinedInstruction], values: tuple[list[Signal], Signal]
     ) -> None:
         """Multiply in the last pipeline stage but one, add up in the last."""
         reading, last = self._reading(pipeline), pipeline[-1]
-        read, added = values
+        (read, *second), added = values
         chosen = Signal(signed(self._word))
         total = self._total(m, added, advance, last)
         m.d.comb += chosen.eq(reading.constant)
@@ -498,11 +524,25 @@ class FoldedCore(Shell):
         if self.serial:
             self._multiply_serially(m, (total, added), (read, chosen), (advance, last.valid))
             return
-        # Nothing else reads these registers, so that they can be those inside the multiplier block.
-        data, factor = (Signal(signed(self._word), name=name, reset_less=True) for name in ("data", "factor"))
-        product = Signal(signed(2 * self._word), reset_less=True)
+        product = self._product(m, "", read, chosen)
+        if second:
+            other = self._product(m, "second_", second[0], reading.second_constant)
+            products = Signal(signed(2 * self._word + 1), reset_less=True)
+            m.d.sync += products.eq(product + other)
+            product = products
         m.d.comb += [advance.eq(1), added.eq(total + product)]
-        m.d.sync += [data.eq(read), factor.eq(chosen), product.eq(data * factor)]
+
+    def _product(self, m: Module, prefix: str, word: Value, factor_read: Value) -> Value:
+        """Return the product of a word that has been read and a factor, two clocks later.
+
+        Nothing else reads these registers, so that they can be those inside a multiplier block.
+        """
+        data, factor = (
+            Signal(signed(self._word), name=f"{prefix}{name}", reset_less=True) for name in ("data", "factor")
+        )
+        product = Signal(signed(2 * self._word), name=f"{prefix}product", reset_less=True)
+        m.d.sync += [data.eq(word), factor.eq(factor_read), product.eq(data * factor)]
+        return product
 
     def _moved(self, m: Module, instruction: PipelinedInstruction, read: Value) -> Value:
         """Return the word that MOVE and TAKE write, and 0 for all others."""
@@ -511,7 +551,11 @@ class FoldedCore(Shell):
         if self.serial:
             return word_to_move
         moved = Signal(self._word)  # 0 from a reset on, when words are cleared
-        m.d.sync += moved.eq(word_to_move)
+        if self._moves_early:
+            m.d.sync += moved.eq(word_to_move)
+        else:
+            passed = [word_to_move, *(Signal(self._word, name=f"passed{stage}") for stage in (4, 5)), moved]
+            m.d.sync += [later.eq(earlier) for earlier, later in pairwise(passed)]
         return moved
 
     def _total(self, m: Module, added: Signal, advance: Signal, last: PipelinedInstruction) -> Value:
@@ -539,7 +583,7 @@ class FoldedCore(Shell):
         self,
         m: Module,
         control: _Control,
-        values: tuple[Signal, Signal],
+        values: tuple[Signal, list[Signal]],
         pipeline: list[PipelinedInstruction],
         guard: FaultGuard | None,
     ) -> tuple[Value, Value]:
@@ -547,17 +591,20 @@ class FoldedCore(Shell):
 
         Return whether a wrong bit was corrected at this clock, and whether one was found that could not be.
         """
-        (added, read), advance, clearing = values, control.advance, control.clearing
-        moved = self._moved(m, self._reading(pipeline), read)
-        addressing, present, last = pipeline[-3 if self.serial else -4], pipeline[-2], pipeline[-1]
+        (added, reads), advance, clearing = values, control.advance, control.clearing
+        moved = self._moved(m, self._reading(pipeline), reads[0])
+        addressing, last = pipeline[0 if self.serial else 1], pipeline[-1]
+        present = pipeline[-2] if self._moves_early else last
         moves, stores, finishes = (Signal(name=name) for name in ("moves", "stores", "finishes"))
         m.d.comb += [
             moves.eq(present.valid & present.has(*EARLY_WRITES)),
             stores.eq(last.valid & last.has(*LATE_WRITES)),
             finishes.eq(last.valid & last.has(*FINISHES)),
         ]
-        address: Value = Cat(addressing.address, control.channel)
-        where: Value = Cat(Mux(moves, present.target, last.target), control.channel)
+        chosen = [addressing.address, addressing.second_address] if len(reads) > 1 else [addressing.address]
+        addresses: list[Value] = [Cat(each, control.channel) for each in chosen]
+        target = Mux(moves, present.target, last.target) if self._moves_early else last.target
+        where: Value = Cat(target, control.channel)
         sign = self._word - 1
         # One LUT4 for each bit, since the sum is late: nothing is moved while something is stored.
         what = Cat(Mux(stores, added[:sign], moved[:sign]), Mux(finishes, added[sign], moved[sign]))
@@ -566,21 +613,29 @@ class FoldedCore(Shell):
         check = CheckBits(self._word, self.protect)
         looks: Value = advance & self._reading(pipeline).valid
         if guard is not None:
-            address = Mux(guard.scrubs & self._is_word(guard.address), guard.address[: len(address)], address)
+            scrubs = guard.scrubs & self._is_word(guard.address)
+            addresses = [Mux(scrubs, guard.address[: len(each)], each) for each in addresses]
             looks = looks | guard.read
-        word = read if guard is None else Signal(check.width)
-        word_read = check.read(m, word, "read")
+        words = reads if guard is None else [Signal(check.width, name=f"{read.name}_word") for read in reads]
+        words_read = [check.read(m, word, read.name) for word, read in zip(words, reads, strict=True)]
+        # Each word that is read may come from a memory of its own, all of which are written alike.
+        corrected, failed = (
+            Cat(each.corrected for each in words_read).any(),
+            Cat(each.failed for each in words_read).any(),
+        )
         if guard is not None and self.protect == "correct":
+            address = addresses[0]
             scrubbed = Signal(len(address), reset_less=True)
-            rewrites = guard.read & word_read.corrected & ~clearing & (scrubbed != address)
+            rewrites = guard.read & corrected & ~clearing & (scrubbed != address)
             m.d.sync += scrubbed.eq(address)
             where = Mux(rewrites, scrubbed, where)
-            what = Mux(rewrites, word_read.data, what)
+            what = Mux(rewrites, words_read[0].data, what)
             enable = enable | rewrites
-        m.d.comb += word.eq(self._memory(m, check, read=(address, advance), write=(where, check.written(what), enable)))
+        contents = self._memory(m, check, read=(addresses, advance), write=(where, check.written(what), enable))
+        m.d.comb += [word.eq(content) for word, content in zip(words, contents, strict=True)]
         if guard is not None:
-            m.d.comb += read.eq(word_read.data)
-        return _fault_nets(m, "words", looks & word_read.corrected, looks & word_read.failed)
+            m.d.comb += [read.eq(word.data) for read, word in zip(reads, words_read, strict=True)]
+        return _fault_nets(m, "words", looks & corrected, looks & failed)
 
     def _is_word(self, address: Value) -> Value:
         """Whether there is a word at an address to scrub."""
@@ -588,29 +643,29 @@ class FoldedCore(Shell):
 
     def _reading(self, pipeline: list[PipelinedInstruction]) -> PipelinedInstruction:
         """Return the instruction whose word has just been read."""
-        return pipeline[-2 if self.serial else -3]
+        return pipeline[1 if self.serial else 2]
 
     def _memory(
-        self, m: Module, check: CheckBits, read: tuple[Value, Value], write: tuple[Value, Value, Value]
-    ) -> Value:
-        """Make the memory of all channels, cut into `word_slices`; return the word read."""
+        self, m: Module, check: CheckBits, read: tuple[list[Value], Value], write: tuple[Value, Value, Value]
+    ) -> list[Value]:
+        """Make the memory of all channels, cut into `word_slices`; return the words read."""
         words, depth = self.program.words, memory_depth(self.program, self.channels)
-        slices: list[Value] = []
+        slices: list[list[Value]] = [[] for _ in read[0]]
         for low, high in word_slices(depth, check.width):
             one = check.word(1) >> low & ((1 << (high - low)) - 1)
             init = [one if address % words == self.program.one else 0 for address in range(depth)]
             m.submodules[f"words{low}"] = ram = Memory(shape=high - low, depth=depth, init=init, attrs=_NO_COLLISIONS)
-            reader = read_port(ram, f"words{low}")
+            for name, address, parts in zip(_WORDS_READ, read[0], slices, strict=False):
+                reader = read_port(ram, f"{name.removesuffix('read')}words{low}")
+                m.d.comb += [reader.addr.eq(address), reader.en.eq(read[1])]
+                parts.append(reader.data)
             writer = write_port(ram, f"words{low}")
             m.d.comb += [
-                reader.addr.eq(read[0]),
-                reader.en.eq(read[1]),
                 writer.addr.eq(write[0]),
                 writer.data.eq(write[1][low:high]),
                 writer.en.eq(write[2]),
             ]
-            slices.append(reader.data)
-        return Cat(*slices)
+        return [Cat(*parts) for parts in slices]
 
     def _give(
         self,

@@ -5,16 +5,22 @@ from __future__ import annotations
 from sosmith.model.dataflow.program import Opcode, Program
 
 FOLDED_DEPTH, SERIAL_DEPTH = 5, 3
-"""Pipeline stages from the program memory to the accumulator."""
+"""Pipeline stages from the program memory to the accumulator; one more where two products are added up before it."""
 
 _SLICES = {256: 16, 512: 8, 1024: 4, 2048: 2}
 """Width of an iCE40's block RAM, by its number of words."""
 
 
+def pipeline_depth(program: Program, *, serial: bool) -> int:
+    """Pipeline stages from the program memory to the accumulator."""
+    return SERIAL_DEPTH if serial else FOLDED_DEPTH + program.products - 1
+
+
 def latency_cycles(program: Program, *, serial: bool, protect: str = "none") -> int:
     """Clocks from the edge that finds a sample to the edge that can hand its result on; in serial, an upper bound."""
     late = protect != "none"  # the first instruction is then read once there is a sample, since scrubbing uses the port
-    return late + (program.serial_cycles + SERIAL_DEPTH if serial else len(program.instructions) + FOLDED_DEPTH)
+    clocks = program.serial_cycles if serial else len(program.instructions)
+    return late + clocks + pipeline_depth(program, serial=serial)
 
 
 def taken_cycles(program: Program, *, serial: bool, protect: str = "none") -> int:
@@ -26,7 +32,7 @@ def taken_cycles(program: Program, *, serial: bool, protect: str = "none") -> in
         return latency_cycles(program, serial=serial, protect=protect)
     takes = [number for number, instruction in enumerate(program.instructions) if instruction.opcode is Opcode.TAKE]
     if not serial:
-        return takes[-1] + FOLDED_DEPTH - 1
+        return takes[-1] + pipeline_depth(program, serial=serial) - 1
     return sum(map(program.serial_cycles_of, program.instructions[: takes[-1] + 1])) + SERIAL_DEPTH - 1
 
 
@@ -38,7 +44,7 @@ def overlaps(program: Program, *, serial: bool, channels: int = 1, reload: bool 
     """
     plain = not serial and channels == 1 and not reload and protect == "none"
     takes = [number for number, instruction in enumerate(program.instructions) if instruction.opcode is Opcode.TAKE]
-    is_long = min(program.result_start, len(program.instructions) - takes[-1]) >= FOLDED_DEPTH
+    is_long = min(program.result_start, len(program.instructions) - takes[-1]) >= pipeline_depth(program, serial=serial)
     return plain and is_long
 
 

@@ -15,13 +15,9 @@ def address_bits(program: Program) -> int:
 
 def field_bits(program: Program) -> dict[str, int]:
     """Width of each field of an instruction, the lowest first, as the words and digits of `program` need it."""
-    address = address_bits(program)
-    return {
-        "opcode": max(Opcode).bit_length(),
-        "address": address,
-        "target": address,
-        "constant": program.digit_bits + 1,  # signed
-    }
+    address, constant = address_bits(program), program.digit_bits + 1  # signed
+    second = {"second_address": address, "second_constant": constant} if program.products > 1 else {}
+    return {"opcode": max(Opcode).bit_length(), "address": address, "target": address, **second, "constant": constant}
 
 
 def instruction_bits(program: Program) -> int:

@@ -42,7 +42,7 @@ As an example, ``y(n) = floor(3 / 4 y(n-1) + 4 x(n))`` with digits of 4 bits. x 
 the product of x begins in the column of y's low digit. Nothing needs a digit of y1 any more when one of y is stored,
 which takes its word and becomes the next y1:
 
->>> for number, (opcode, address, constant, target) in enumerate(folded.instructions):
+>>> for number, (opcode, address, constant, target, *_) in enumerate(folded.instructions):
 ...     print(f"{number}  {opcode.mnemonic:8} {address}  {constant:2}  {target}")
 0  take     3   0  2
 1  drop     0  12  0
@@ -67,8 +67,12 @@ Three samples, by the program and by the graph:
 
 from __future__ import annotations
 
+import random
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import nullcontext, suppress
+from copy import copy
 from dataclasses import replace
+from functools import cached_property
 from typing import NamedTuple
 
 from sosmith.model.dataflow.datapath import Datapath
@@ -86,12 +90,26 @@ from sosmith.model.dataflow.program import (
 )
 from sosmith.model.dataflow.scheduling import ONE, Column, Digit, Product, Scheduler, Sum
 
+_FEW = 3
+"""Products of a sum that may be computed again where it is needed early."""
+
+_SEED = 1
+"""Of the orders that are tried."""
+
 
 class FoldingError(ValueError):
     """The datapath cannot be computed by one multiply-accumulate unit."""
 
 
-def program(datapath: Datapath, digit_bits: int, *, spare_words: int = 0, like: Program | None = None) -> Program:
+def program(
+    datapath: Datapath,
+    digit_bits: int,
+    *,
+    spare_words: int = 0,
+    like: Program | None = None,
+    products: int = 1,
+    trials: int = 0,
+) -> Program:
     """Fold a datapath.
 
     Parameters
@@ -105,6 +123,10 @@ def program(datapath: Datapath, digit_bits: int, *, spare_words: int = 0, like: 
     like : Program or None
         A program that the new one must be able to take over from at any sample, in the same hardware and with its
         states: a location gets at least as many digits as the one of the same name.
+    products : int
+        Products at each clock, 1 or 2.
+    trials : int
+        Other orders of the sums that are tried for a shorter program; the same ones in every run.
 
     Raises
     ------
@@ -115,9 +137,11 @@ def program(datapath: Datapath, digit_bits: int, *, spare_words: int = 0, like: 
     least = 0 if like is None else like.words
     flat = _flattened(datapath)
     _share_delays(flat.nodes)
-    folded = _Folding(flat, digit_bits, kept, datapath.calibrated).program(least, spare_words)
-    while not folded.follows_itself:
-        folded = folded.with_wait()
+    folding = _Folding(flat, digit_bits, kept, datapath.calibrated)
+    foldings = [folding, *(folding.repeating(index) for index in (folding.repeats() if products > 1 else ()))]
+    made = [(one, folded) for one in foldings for folded in one.programs(least, spare_words, products)]
+    shorter = [one.shorter(folded, least, spare_words, trials // len(made)) for one, folded in made]
+    folded = min(shorter, key=lambda one: (len(one.instructions), one.words))
     if like is None:
         return folded
     _check_can_take_over(folded, like)
@@ -276,7 +300,11 @@ class _Folding:
     """Decides which values to store, and makes the sums that compute them."""
 
     def __init__(
-        self, flat: _Flat, digit_bits: int, kept: Mapping[str, int], calibrated: Sequence[tuple[int, int]]
+        self,
+        flat: _Flat,
+        digit_bits: int,
+        kept: Mapping[str, int],
+        calibrated: Sequence[tuple[int, int]],
     ) -> None:
         self._nodes, self._inputs, self._output, self._settling = flat
         self._calibrated = calibrated
@@ -291,7 +319,10 @@ class _Folding:
             self._stored |= apart
             self._fracs = self._find_fracs()
         self._totals: dict[int, _Total] = {}
+        self._order: list[int] = []
         self._forms = {index: self._form(index, kept) for index in sorted(self._stored)}
+        self._repeated: frozenset[int] = frozenset()
+        self._repeats = -1
 
     def _form(self, index: int, kept: Mapping[str, int]) -> _Form:
         node, frac = self._nodes[index], self._fracs[index]
@@ -301,8 +332,54 @@ class _Folding:
     def _name(self, index: int) -> str:
         return self._nodes[index].name or f"value{index}"
 
-    def program(self, least_words: int, spare_words: int) -> Program:
-        """Make the program for a memory of at least `least_words` words, and with some that are not used."""
+    def repeats(self) -> list[int]:
+        """Return the stored values whose sums may repeat those of others that they need, see `_repeatable`."""
+        repeated = {*self._repeatable()}
+        return [
+            index
+            for index in sorted(self._stored - {*self._inputs, *self._delays()})
+            if repeated.intersection(term.value for term in self._sum(index).weights)
+        ]
+
+    def repeating(self, index: int) -> _Folding:
+        """Return the same but that the sum of a stored value repeats others, see `_repeatable`."""
+        other = copy(self)
+        other.__dict__.pop("_sums", None)
+        other._repeats = index
+        return other
+
+    def programs(self, least_words: int, spare_words: int, products: int) -> Iterator[Program]:
+        """Make the program, if there is one; without sums that repeat others, there must be."""
+        with nullcontext() if self._repeats < 0 else suppress(FoldingError):
+            yield self.program(least_words, spare_words, products)
+
+    def shorter(self, folded: Program, least_words: int, spare_words: int, trials: int) -> Program:
+        """Return the shortest of some programs: each with one sum elsewhere in the order of the shortest one so far."""
+        rng = random.Random(_SEED)
+        order, ways = list(self._order), (True, False)
+        for trial in range(trials):
+            kept = list(order)
+            if trial:
+                kept.insert(rng.randrange(len(order)), kept.pop(rng.randrange(len(order))))
+            for makes_way in ways:
+                other = self.program(least_words, spare_words, folded.products, kept, makes_way=makes_way)
+                if (len(other.instructions), other.words) <= (len(folded.instructions), folded.words):
+                    folded, order = other, list(self._order)
+        return folded
+
+    def program(
+        self,
+        least_words: int,
+        spare_words: int,
+        products: int,
+        order: Sequence[int] | None = None,
+        *,
+        makes_way: bool = True,
+    ) -> Program:
+        """Make the program for a memory of at least `least_words` words, and with some that are not used.
+
+        Sums come in the given order, as far as they can; without one, in that of the datapath.
+        """
         states: dict[Digit, int] = {}
         for index in self._delays():
             states |= {Digit(index, k): len(states) + k for k in range(self._forms[index].digits)}
@@ -310,16 +387,16 @@ class _Folding:
         for index in self._delays():
             for source, digit in self._copied(index):
                 copies.setdefault(source, []).append(digit)
-        computed = self._computed()
+        computed = dict(self._sums)
         judged = [*self._judged()]
         settling = [] if self._settling is None else [self._flagged(self._settling)]
         result = self._result(computed, copies)
-        scheduler = Scheduler(states, copies, [*judged, *computed.values(), *settling, result])
+        scheduler = Scheduler(states, copies, [*judged, *computed.values(), *settling, result], products, makes_way)
         scheduler.take(Digit(index, k) for index in self._inputs for k in range(self._forms[index].digits))
         for one in judged:
             scheduler.compute(one)
         scheduler.note("range")
-        self._schedule(scheduler, computed)
+        self._schedule(scheduler, computed, order)
         for one in settling:
             scheduler.compute(one)
         scheduler.note("settling")
@@ -336,9 +413,12 @@ class _Folding:
             for index, form in sorted(self._forms.items(), key=lambda item: self._nodes[item[0]].op is not Op.DELAY)
             if Digit(index, 0) in where
         }
-        return Program(
+        folded = Program(
             digit_bits=self._bits,
-            instructions=tuple(i._replace(address=i.address % words) for i in scheduler.instructions),
+            instructions=tuple(
+                i._replace(address=i.address % words, second_address=i.second_address % words)
+                for i in scheduler.instructions
+            ),
             locations=tuple(locations.values()),
             inputs=tuple(locations[i] for i in self._inputs),
             output=Result(
@@ -348,13 +428,18 @@ class _Folding:
             words=words,
             schedule=tuple(scheduler.schedule),
             accumulator_bits=self._accumulator_bits(scheduler),
+            products=products,
         )
+        while not folded.follows_itself:
+            folded = folded.with_wait()
+        return folded
 
     def columns(self) -> list[Column]:
         """Return the columns of all values."""
-        return [column for one in self._computed().values() for column in one.columns]
+        return [column for one in self._sums.values() for column in one.columns]
 
-    def _computed(self) -> dict[int, Sum]:
+    @cached_property
+    def _sums(self) -> dict[int, Sum]:
         """Return the sums of all stored values but inputs, and states that take over a value as it is."""
         copied = {index for index in self._delays() if self._copied(index)}
         return {
@@ -438,11 +523,29 @@ class _Folding:
 
     def _value(self, index: int) -> _Total:
         """Return a node as multiples of stored digits and a constant."""
-        if index in self._stored:
-            return _Total({_Term(index, 0, self._forms[index].digits): 1}, 0, 0)
+        if index in self._stored and index not in self._repeated:
+            return self._whole(index)
         if index not in self._totals:
             self._totals[index] = self._definition(index)
         return self._totals[index]
+
+    def _whole(self, index: int) -> _Total:
+        """Return a stored value as its own digits."""
+        return _Total({_Term(index, 0, self._forms[index].digits): 1}, 0, 0)
+
+    def _repeatable(self) -> Iterator[int]:
+        """Find stored values that are sums of few digits, all of them there before the sample or taken with it.
+
+        A sum that needs such a value may add up the same digits instead, which are there earlier.
+        """
+        early = {*self._inputs, *self._delays()}
+        for index in sorted(self._stored - early - {self._output}):
+            if self._nodes[index].op in {Op.FLOOR, Op.FRACTION}:
+                continue
+            terms = self._definition(index).weights
+            count = sum(term.length * (self._forms[term.other].digits if term.other >= 0 else 1) for term in terms)
+            if count <= _FEW and early.issuperset(of for term in terms for of in (term.value, term.other) if of >= 0):
+                yield index
 
     def _definition(self, index: int) -> _Total:
         """Return a node as multiples of stored digits and a constant, from its operands."""
@@ -498,8 +601,19 @@ class _Folding:
 
     def _sum(self, index: int) -> _Total:
         """Return a stored value in terms of other stored values."""
+        if index != self._repeats or self._repeated:
+            return self._own_sum(index)
+        kept, self._totals, self._repeated = self._totals, {}, frozenset(self._repeatable())
+        repeating = self._own_sum(index)
+        self._totals, self._repeated = kept, frozenset()
+        return repeating
+
+    def _own_sum(self, index: int) -> _Total:
         node = self._nodes[index]
-        return self._value(node.operands[0]) if node.op in {Op.FLOOR, Op.DELAY} else self._definition(index)
+        if node.op not in {Op.FLOOR, Op.DELAY}:
+            return self._definition(index)
+        (source,) = node.operands
+        return self._whole(source) if source in self._stored else self._value(source)
 
     def _copied(self, index: int) -> list[tuple[Digit, Digit]]:
         """Return the digits that a state takes over, each with its own; none if they are not just those of a value."""
@@ -546,8 +660,10 @@ class _Folding:
             columns = [*self._columns(self._sum(self._output), form, -1)]
         return Sum(self._name(self._output), -1, tuple(columns))
 
-    def _schedule(self, scheduler: Scheduler, computed: Mapping[int, Sum]) -> None:
+    def _schedule(self, scheduler: Scheduler, computed: Mapping[int, Sum], order: Sequence[int] | None) -> None:
         """Compute values in the order of the datapath; while the next one would have to wait, another one if it can.
+
+        Or each as soon as it can be computed, the first of an order before the others.
 
         Raises
         ------
@@ -555,6 +671,8 @@ class _Folding:
             If there is no order in which each state is read before it is written.
         """
         left = dict(computed)
+        places = {} if order is None else {index: place for place, index in enumerate(order)}
+        self._order = []
         while left:
             needed = {i for i in left if self._nodes[i].op is not Op.DELAY}
             free = [
@@ -564,8 +682,11 @@ class _Folding:
             ]
             if not free:
                 raise FoldingError(f"{next(iter(left.values())).name!r} must not be needed after it is written")
-            if scheduler.stalls(left[free[0]]):
+            if order is not None:
+                free.sort(key=places.__getitem__)
+            elif scheduler.stalls(left[free[0]]):
                 free.sort(key=lambda i: scheduler.stalls(left[i]))
+            self._order.append(free[0])
             one = left.pop(free[0])
             scheduler.compute(one)
             scheduler.note(one.name)
@@ -663,11 +784,13 @@ class _Folding:
         """Return the width, by interval arithmetic with any values of the digits; at least that of a word."""
         low = high = least = most = 0
         operand = (0, 0)
-        for (opcode, _, constant, _), digit in zip(scheduler.instructions, scheduler.reads, strict=True):
-            word = self._range(digit)
+        for instruction, digits in zip(scheduler.instructions, scheduler.reads, strict=True):
+            opcode, constant, second = instruction.opcode, instruction.constant, instruction.second_constant
+            word, beside = map(self._range, digits)
             factors = operand if opcode in PRODUCTS else (constant, constant)
             ends = [a * b for a in word for b in factors]
-            low, high = low + min(ends), high + max(ends)
+            more = [a * second for a in beside]
+            low, high = low + min(ends) + min(more), high + max(ends) + max(more)
             if opcode is Opcode.OPERAND:
                 operand = word
             if opcode is not Opcode.TAKE:

@@ -11,6 +11,8 @@ with ``digit_bits = 2``, -7 is the digits 1, -2 (lowest first), since -7 = 1 + (
       states ..        values      t     operand
       words-1          always 1
 
+An instruction of a program with two products a clock also has a second address and a second constant.
+
 `sosmith.model.dataflow.folding` makes programs; `sosmith.hdl.cores.folded` runs them.
 """
 
@@ -26,7 +28,8 @@ class Opcode(IntEnum):
     """Operation of an instruction, and its code in hardware.
 
     ``m`` is the memory word at the instruction's address, ``target`` the one that it writes, ``acc`` the accumulator,
-    ``t`` the operand register. Every instruction but PRODUCT and its kind begins with ``acc += m * constant``.
+    ``t`` the operand register. Every instruction but PRODUCT and its kind begins with ``acc += m * constant``. Where
+    there are two products a clock, all begin with ``acc += (word at the second address) * (second constant)`` besides.
     """
 
     MULTIPLY = 0  # no more
@@ -65,16 +68,32 @@ CLEARS = frozenset({*FINISHES, Opcode.JUDGE, Opcode.TAKE})
 """Opcodes after which the accumulator is 0."""
 
 EARLY_WRITES = frozenset({Opcode.MOVE, Opcode.TAKE})
-"""Opcodes that write their word at the clock of the instruction before; they must not follow one of `LATE_WRITES`."""
+"""Opcodes that write a word as it is: with one product a clock, at the clock at which the instruction before would.
+
+They must not follow one of `LATE_WRITES` then. With two products, all write at the end of the pipeline.
+"""
 
 LATE_WRITES = frozenset({*STORES, *FINISHES})
 """Opcodes that write their word from the end of the pipeline."""
 
 STORED = 4
-"""Least number of instructions from one of `LATE_WRITES` to one that reads its word."""
+"""Least number of instructions from one of `LATE_WRITES` to one that reads its word, with one product a clock.
+
+With two there is one more, since their sum has a pipeline stage of its own.
+"""
 
 MOVED = 3
-"""Least number of instructions from one of `EARLY_WRITES` to one that reads its word."""
+"""Least number of instructions from one of `EARLY_WRITES` to one that reads its word, with one product a clock."""
+
+
+def distance_stored(products: int) -> int:
+    """Least number of instructions from one of `LATE_WRITES` to one that reads its word."""
+    return STORED + products - 1
+
+
+def distance_moved(products: int) -> int:
+    """Least number of instructions from one of `EARLY_WRITES` to one that reads its word."""
+    return MOVED if products == 1 else distance_stored(products)
 
 
 class Judged(IntEnum):
@@ -85,12 +104,14 @@ class Judged(IntEnum):
 
 
 class Instruction(NamedTuple):
-    """One step of a program."""
+    """One step of a program; the last two fields count where there are two products a clock."""
 
     opcode: Opcode
     address: int
     constant: int = 0
     target: int = 0
+    second_address: int = 0
+    second_constant: int = 0
 
 
 class Sample(NamedTuple):
@@ -170,6 +191,8 @@ class Program:
         Values in the order in which they are computed: name, first instruction, number of instructions.
     accumulator_bits : int
         Width of the accumulator, from the ranges of everything that is added to it.
+    products : int
+        Products at each clock, 1 or 2: as many multipliers, and words that an instruction reads.
     """
 
     digit_bits: int
@@ -181,6 +204,7 @@ class Program:
     words: int
     schedule: tuple[tuple[str, int, int], ...]
     accumulator_bits: int
+    products: int = 1
 
     @property
     def one(self) -> int:
@@ -190,7 +214,21 @@ class Program:
     @property
     def nothing(self) -> Instruction:
         """An instruction that changes nothing."""
-        return Instruction(Opcode.MULTIPLY, self.one)
+        return Instruction(Opcode.MULTIPLY, self.one, second_address=self.one if self.products > 1 else 0)
+
+    @property
+    def stored(self) -> int:
+        """Least number of instructions from one of `LATE_WRITES` to one that reads its word."""
+        return distance_stored(self.products)
+
+    @property
+    def moved(self) -> int:
+        """Least number of instructions from one of `EARLY_WRITES` to one that reads its word."""
+        return distance_moved(self.products)
+
+    def addresses_read(self, instruction: Instruction) -> tuple[int, ...]:
+        """Return the addresses of the words that an instruction reads."""
+        return (instruction.address, instruction.second_address)[: self.products]
 
     @property
     def result_start(self) -> int:
@@ -203,11 +241,13 @@ class Program:
         """Whether the first instruction may follow the last one at once: no word would be read or written too early."""
         readable: dict[int, int] = {}
         last = self.instructions[-1].opcode
-        for number, (opcode, address, _, target) in enumerate((*self.instructions, *self.instructions)):
-            if readable.get(address, 0) > number or (last in LATE_WRITES and opcode in EARLY_WRITES):
+        for number, instruction in enumerate((*self.instructions, *self.instructions)):
+            opcode = instruction.opcode
+            early = any(readable.get(address, 0) > number for address in self.addresses_read(instruction))
+            if early or (self.moved != self.stored and last in LATE_WRITES and opcode in EARLY_WRITES):
                 return False
             if opcode in LATE_WRITES or opcode in EARLY_WRITES:
-                readable[target] = number + (STORED if opcode in LATE_WRITES else MOVED)
+                readable[instruction.target] = number + (self.stored if opcode in LATE_WRITES else self.moved)
             last = opcode
         return True
 
@@ -284,9 +324,10 @@ class Program:
         code = 0
         flags = dict.fromkeys(Judged, False)
         acc = operand = 0
-        for opcode, address, constant, target in self.instructions:
+        for opcode, address, constant, target, second_address, second_constant in self.instructions:
             word = words[address]
             acc += word * (operand if opcode in PRODUCTS else constant)
+            acc += words[second_address] * second_constant
             if opcode is not Opcode.TAKE and not -limit <= acc < limit:
                 raise OverflowError(f"the accumulator must stay within {self.accumulator_bits} bits, not {acc}")
             if opcode is Opcode.TAKE:

@@ -14,6 +14,8 @@
   nothing needs the old one any more; otherwise, an instruction that multiplies the digit also moves it, once nothing
   needs the old one. Only where neither can be, there is a MOVE for nothing else.
 - Other digits share words when they are not needed at the same time.
+- Where there are two products a clock, one of a column is computed beside another one, unless its word is still in the
+  pipeline. Only the first of the two can be moved, or be a product of two words.
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from sosmith.model.dataflow.program import LATE_WRITES, MOVED, STORED, Instruction, Opcode
+from sosmith.model.dataflow.program import LATE_WRITES, Instruction, Opcode, distance_moved, distance_stored
 
 
 class Digit(NamedTuple):
@@ -77,7 +79,7 @@ class _State:
     """How far the program has come: what a trial of a sum must not change."""
 
     instructions: list[Instruction]
-    reads: list[Digit]
+    reads: list[tuple[Digit, Digit]]
     where: dict[Digit, int]
     readable: dict[int, int]
     uses: Counter[Digit]
@@ -110,13 +112,18 @@ class Scheduler:
         The states that take over a digit, which must all have the values that it has.
     sums : sequence of Sum
         Everything that will be computed.
+    products : int
+        Products at each clock, 1 or 2.
+    makes_way : bool
+        Whether a digit is stored in a state at once where something has to be moved from there first; otherwise it is
+        moved there later.
 
     Attributes
     ----------
     instructions : list of Instruction
         Those made so far. The address of the word that always holds 1 is -1.
-    reads : list of Digit
-        The digit that each of them reads.
+    reads : list of (Digit, Digit)
+        The digits that each of them reads; the second one is that of ONE without a second product.
     where : dict of Digit to int
         Address of each digit.
     schedule : list of (str, int, int)
@@ -128,6 +135,8 @@ class Scheduler:
     states: Mapping[Digit, int]
     copies: Mapping[Digit, Sequence[Digit]]
     sums: Sequence[Sum]
+    products: int = 1
+    makes_way: bool = True
     schedule: list[tuple[str, int, int]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -148,7 +157,7 @@ class Scheduler:
         return self._now.instructions
 
     @property
-    def reads(self) -> list[Digit]:
+    def reads(self) -> list[tuple[Digit, Digit]]:
         return self._now.reads
 
     @property
@@ -158,7 +167,7 @@ class Scheduler:
     def take(self, digits: Iterable[Digit]) -> None:
         """Take the digits of the sample."""
         for number, digit in enumerate(digits):
-            self._emit(Opcode.TAKE, ONE, number, self._place(digit, MOVED))
+            self._emit(Opcode.TAKE, ONE, number, self._place(digit, distance_moved(self.products)))
         self.note("input")
 
     def note(self, name: str) -> None:
@@ -174,8 +183,8 @@ class Scheduler:
         before = len(self.instructions)
         self.compute(one)
         stalls = sum(
-            i.opcode is Opcode.MULTIPLY and not i.constant and digit == ONE
-            for i, digit in zip(self.instructions[before:], self.reads[before:], strict=True)
+            i.opcode is Opcode.MULTIPLY and not i.constant and not i.second_constant and digits == (ONE, ONE)
+            for i, digits in zip(self.instructions[before:], self.reads[before:], strict=True)
         )
         self._now, self.words = kept, words
         return stalls
@@ -228,12 +237,38 @@ class Scheduler:
         while left:
             product = min(left, key=lambda one: self._rank(one, left))
             left.remove(product)
+            second = self._second(product, left)
+            if second is not None:
+                left.remove(second)
+                product, second = self._ordered(product, second)
             if left or product.other is not None:
-                self._add(product, column, last=not left)
+                self._add(product, column, second, last=not left)
             else:
-                self._end(product, column)
+                self._end(product, column, second)
         if not column.products and column.end is not Opcode.MULTIPLY:
             self._end(Product(ONE), column)
+
+    def _second(self, product: Product, left: Sequence[Product]) -> Product | None:
+        """Return the product to be computed beside another one of its column, without more waiting; None without."""
+        if self.products == 1:
+            return None
+        wait = max(map(self._wait, product.digits))
+        ready = [one for one in left if self._wait(one.other or one.digit) <= wait]  # an operand is read first
+        if product.other is not None:
+            ready = [one for one in ready if one.other is None]
+        return min(
+            ready, key=lambda one: (one.other is not None, self._moves(one), self._rank(one, left)), default=None
+        )
+
+    def _ordered(self, one: Product, other: Product) -> tuple[Product, Product]:
+        """Return two products with the one first that only a first product can be: of two words, or to be moved."""
+        if other.other is not None or (one.other is None and self._moves(other) and not self._moves(one)):
+            return other, one
+        return one, other
+
+    def _moves(self, product: Product) -> bool:
+        """Whether a product's digit has to be moved."""
+        return bool(self._now.pending.get(product.digit))
 
     def _rank(self, product: Product, left: Sequence[Product]) -> tuple[int, int]:
         """Sort the products left in a column: first what need not wait, and what lets a digit be moved."""
@@ -249,61 +284,76 @@ class Scheduler:
         sources = {other.digit for other in left}
         return (0 if any(digit in there for of, there in now.pending.items() if of in sources) else 2), 0
 
-    def _add(self, product: Product, column: Column, *, last: bool) -> None:
-        """Add a product that does not end its column, or one of two digits."""
+    def _add(self, product: Product, column: Column, second: Product | None, *, last: bool) -> None:
+        """Add a product that does not end its column, or one of two digits, and a second one beside it."""
         now = self._now
         if product.other is None:
             self._read(product.digit)
-            now.uses[product.digit] -= 1
+            self._use(product, second)
             there = self._movable(product.digit)
-            if there is None:
-                self._emit(Opcode.MULTIPLY, product.digit, product.constant)
-            else:
-                self._move(product.digit, there, product.constant)
-            self._release(product.digit)
+            if there is not None:
+                self._move(product.digit, there, product.constant, second)
+            elif second is not None or not self._move_beside(product):
+                self._emit(Opcode.MULTIPLY, product.digit, product.constant, second=second)
+            self._release_all(product, second)
             return
-        first, second = product.digits if product.digit == now.operand else reversed(product.digits)
+        first, other = product.digits if product.digit == now.operand else reversed(product.digits)
         if first != now.operand:
             self._read(first)
-            self._emit(Opcode.OPERAND, first)
-            now.operand = first
-        self._read(second)
+            if second is not None:
+                self._read(second.digit)
+                now.uses[second.digit] -= 1
+            self._emit(Opcode.OPERAND, first, second=second)
+            if second is not None:
+                self._release(second.digit)
+            now.operand, second = first, None
+        self._read(other)
         ends = {Opcode.STORE: Opcode.PRODUCT_STORE, Opcode.DROP: Opcode.PRODUCT_DROP}
         ends |= {Opcode.FINISH: Opcode.PRODUCT_FINISH}
         opcode = ends.get(column.end, Opcode.PRODUCT) if last else Opcode.PRODUCT
-        for digit in (first, second):
-            now.uses[digit] -= 1
+        self._use(product, second)
         target = 0
         if opcode is Opcode.PRODUCT_STORE or opcode is Opcode.PRODUCT_FINISH:
             self._make_way(column.digit)
             target = self._place(column.digit)
-        self._emit(opcode, second, 0, target)
-        for digit in (first, second):
-            self._release(digit)
+        self._emit(opcode, other, 0, target, second)
+        self._release_all(product, second)
         if last and opcode is Opcode.PRODUCT and column.end is not Opcode.MULTIPLY:
             self._end(Product(ONE), column)
 
-    def _end(self, product: Product, column: Column) -> None:
-        """Add the last product of a column, and end it."""
+    def _end(self, product: Product, column: Column, second: Product | None = None) -> None:
+        """Add the last product of a column, or the last two, and end it."""
         if column.end is Opcode.MULTIPLY:
-            self._add(product, column, last=False)
+            self._add(product, column, second, last=False)
             return
-        now = self._now
         target = column.part
-        now.uses[product.digit] -= 1
+        self._use(product, second)
         if column.end in {Opcode.STORE, Opcode.FINISH}:
             self._make_way(column.digit)
         self._read(product.digit)
+        if second is not None:
+            self._read(second.digit)
         if column.end in {Opcode.STORE, Opcode.FINISH}:
             target = self._place(column.digit)
-        self._emit(column.end, product.digit, product.constant, target)
-        self._release(product.digit)
+        self._emit(column.end, product.digit, product.constant, target, second)
+        self._release_all(product, second)
+
+    def _use(self, product: Product, second: Product | None) -> None:
+        """Count the uses of digits that the next instruction reads."""
+        for digit in (*product.digits, *(() if second is None else second.digits)):
+            self._now.uses[digit] -= 1
+
+    def _release_all(self, product: Product, second: Product | None) -> None:
+        """Free the words of digits that have been read."""
+        for digit in (*product.digits, *(() if second is None else second.digits)):
+            self._release(digit)
 
     # Words.
 
-    def _place(self, digit: Digit, distance: int = STORED) -> int:
+    def _place(self, digit: Digit, distance: int | None = None) -> int:
         """Give a digit that is stored by the next instruction its word; return the address."""
         now = self._now
+        distance = distance_stored(self.products) if distance is None else distance
         due = [] if digit in self.states else [*self.copies.get(digit, ())]
         free = next((there for there in due if self._is_free(there)), None)
         if digit in self.states:
@@ -336,19 +386,21 @@ class Scheduler:
     def _movable(self, digit: Digit) -> Digit | None:
         """Return a state that the next instruction can move a digit to."""
         now = self._now
-        if now.instructions and now.instructions[-1].opcode in LATE_WRITES:
+        if self.products == 1 and now.instructions and now.instructions[-1].opcode in LATE_WRITES:
             return None
         return next((there for there in now.pending.get(digit, ()) if self._is_free(there)), None)
 
-    def _move(self, digit: Digit, there: Digit, constant: int = 0) -> None:
+    def _move(self, digit: Digit, there: Digit, constant: int = 0, second: Product | None = None) -> None:
         now = self._now
         now.pending[digit].remove(there)
         address = self.states[there]
-        self._emit(Opcode.MOVE, digit, constant, address)
-        now.readable[address] = len(now.instructions) - 1 + MOVED
+        self._emit(Opcode.MOVE, digit, constant, address, second)
+        now.readable[address] = len(now.instructions) - 1 + distance_moved(self.products)
 
     def _make_way(self, digit: Digit) -> None:
         """Move what only has to be moved before a digit can be stored in its state."""
+        if not self.makes_way and digit not in self.states:
+            return
         for there in self.copies.get(digit, ()):
             if not self._now.uses[there] and self._now.pending.get(there) and self._can_flush(there):
                 self._flush(there)
@@ -382,8 +434,29 @@ class Scheduler:
 
     def _wait_for(self, instructions: int) -> None:
         for _ in range(instructions):
-            self._emit(Opcode.MULTIPLY, ONE)
+            if not self._move_beside(None):
+                self._emit(Opcode.MULTIPLY, ONE)
 
-    def _emit(self, opcode: Opcode, digit: Digit, constant: int = 0, target: int = 0) -> None:
-        self._now.instructions.append(Instruction(opcode, self._now.where[digit], constant, target))
-        self._now.reads.append(digit)
+    def _move_beside(self, product: Product | None) -> bool:
+        """Move a digit by an instruction that has nothing but one product, or nothing at all, if there is one to move.
+
+        Where there is one product a clock, digits are moved as they are multiplied.
+        """
+        if self.products == 1:
+            return False
+        for digit in sorted(self._now.pending, key=lambda one: self._now.uses[one] > 0):  # others move as they are read
+            there = None if self._wait(digit) else self._movable(digit)
+            if there is not None:
+                self._move(digit, there, second=product)
+                self._release(digit)
+                return True
+        return False
+
+    def _emit(
+        self, opcode: Opcode, digit: Digit, constant: int = 0, target: int = 0, second: Product | None = None
+    ) -> None:
+        beside = Product(ONE) if second is None else second
+        where = self._now.where
+        more = (where[beside.digit], beside.constant) if self.products > 1 else ()
+        self._now.instructions.append(Instruction(opcode, where[digit], constant, target, *more))
+        self._now.reads.append((digit, beside.digit))

@@ -149,6 +149,16 @@ def flattened(modules: Mapping[str, Module], clock: str) -> Netlist:
     return netlist
 
 
+def _apart(executed: tuple[Statement, ...]) -> list[tuple[Statement, ...]]:
+    """Split a process that does nothing but load registers, each as a whole and once: several processes do the same."""
+    loaded = {
+        statement.target.name
+        for statement in executed
+        if isinstance(statement, Load) and isinstance(statement.target, Bits) and statement.target.width is None
+    }
+    return [(statement,) for statement in executed] if len(loaded) == len(executed) else [executed]
+
+
 class _Flattening:
     """Adds modules to a netlist, one inside the other."""
 
@@ -161,7 +171,7 @@ class _Flattening:
         netlist = self._netlist
         statements: dict[str, tuple[Statement, ...]] = {}
         fields: dict[str, list[Bits]] = {}
-        for clock, executed in module.clocked:
+        for clock, executed in ((clock, part) for clock, whole in module.clocked for part in _apart(whole)):
             require(clock in clocks, f"registers must be clocked by {self._clock}, not {prefix}{clock}")
             targets = {_shown(target): target for target in _targets(executed)}
             require(len(targets) == 1, f"a process must load one register, not {', '.join(sorted(targets))}")

@@ -45,7 +45,8 @@ from sosmith.verify.program.text import NUMBER_BITS, Instruction, ProgramText, r
 STORED, MOVED = 4, 3
 """Least number of instructions from one that writes a word to one that reads it: so deep is the pipeline.
 
-MOVE and TAKE write one pipeline stage before STORE and FINISH.
+MOVE and TAKE write one pipeline stage before STORE and FINISH. With two products a clock, there is one stage more, and
+all write in the last one.
 """
 
 _SAMPLES = 32
@@ -141,7 +142,8 @@ def _proven(program: ProgramText, graph: Graph, certificate: Certificate) -> _Ru
 def _check_order(program: ProgramText) -> None:
     """Check what does not depend on values: TAKE comes first, words are read in time, the result comes last."""
     digits, taken = len(program.digits), 0
-    for number, (opcode, _, value, _) in enumerate(program.instructions):
+    for number, instruction in enumerate(program.instructions):
+        opcode, value = instruction.opcode, instruction.constant
         named = program.named(number)
         if taken < digits and opcode != "multiply":
             wanted = opcode == "take" and value % (1 << NUMBER_BITS) == taken
@@ -162,22 +164,22 @@ def _check_words(program: ProgramText) -> None:
     readable: dict[int, tuple[int, int]] = {}
     for number in range(2 * count):
         instruction = program.instructions[number % count]
-        _, address, _, target = instruction
         named = program.named(number % count)
-        if instruction.reads and address in readable:
-            stored, distance = readable[address]
+        for address in instruction.read:
+            stored, distance = readable.get(address, (-STORED, 0))
             require(
                 number >= stored + distance,
                 f"{named} must read its word {distance} or more instructions after it is stored, not {number - stored}",
             )
-        if instruction.is_early and number:
+        if instruction.is_early and number and program.products == 1:
             before = program.instructions[(number - 1) % count]
             require(
                 not before.writes or before.is_early,
                 f"{named} must not write at the same clock as {program.named((number - 1) % count)}",
             )
         if instruction.writes:
-            readable[target] = number, MOVED if instruction.is_early else STORED
+            at_once = instruction.is_early and program.products == 1
+            readable[instruction.target] = number, MOVED if at_once else STORED + program.products - 1
 
 
 def _located(wrong: _Run, certificate: Certificate) -> RejectedError | None:
@@ -326,8 +328,8 @@ class _Run:
     # Instructions.
 
     def _step(self, number: int, instruction: Instruction) -> None:
-        _, address, value, target = instruction
-        word, end = self._words[address], instruction.end
+        value, target = instruction.constant, instruction.target
+        word, end = self._words[instruction.address], instruction.end
         if end == "take":
             self._take(number, target, value)
             return
@@ -335,6 +337,8 @@ class _Run:
             self._add(word, self._operand.form, (self._operand.low, self._operand.high))
         elif value:
             self._add(word, constant(value), (value, value))
+        if second := instruction.second_constant:
+            self._add(self._words[instruction.second_address], constant(second), (second, second))
         if end == "operand":
             self._operand = word
         elif end == "move":

@@ -99,10 +99,10 @@ class Machine:
 
     def _execute(self, instruction: Instruction, words: _Integers, state: _Integers, digits: Sequence[int]) -> None:
         """Run an instruction; rows of `state` are accumulator, operand, and the digits given."""
-        _, address, constant, target = instruction
+        _, address, constant, target, second_address, second_constant = instruction
         program, end, (acc, operand, *given) = self._program, instruction.end, state
         bits, word = program.digit_bits, words[address].copy()
-        acc += word * (operand if instruction.multiplies_words else constant)
+        acc += word * (operand if instruction.multiplies_words else constant) + words[second_address] * second_constant
         if end == "take":
             words[target] = digits[min(constant % (1 << NUMBER_BITS), len(digits) - 1)]
         elif end == "operand":

@@ -9,7 +9,9 @@ r"""Reads the program of a folded or serial core from its SystemVerilog.
     reg [..] given0, given1, ..        result          signed, as wide  a bits       a bits    see OPCODES
                                                        as a word
 
-A word has ``digit_bits + 1`` bits, the sum of the slices' widths; 2a is what is left of an instruction. A channel has
+A word has ``digit_bits + 1`` bits, the sum of the slices' widths; 2a is what is left of an instruction. With two
+products a clock, an address of a bits and a constant stand between target and constant, those of the second word. A
+channel has
 ``2**a`` words. What a TAKE stores is found by evaluating the logic before the words' write port for its instruction,
 with the bits of `s_axis_tdata` as unknowns.
 """
@@ -58,6 +60,8 @@ class Instruction(NamedTuple):
     address: int
     constant: int
     target: int
+    second_address: int = 0
+    second_constant: int = 0
 
     @property
     def end(self) -> str:
@@ -65,11 +69,12 @@ class Instruction(NamedTuple):
         return self.opcode.removeprefix("product_")
 
     @property
-    def reads(self) -> bool:
-        """Whether its word counts: not if it is multiplied by 0."""
-        return self.opcode != "take" and (
-            self.constant != 0 or self.multiplies_words or self.opcode in {"move", "operand"}
-        )
+    def read(self) -> tuple[int, ...]:
+        """The addresses of its words that count: not of those that are multiplied by 0."""
+        if self.opcode == "take":
+            return ()
+        first = self.constant != 0 or self.multiplies_words or self.opcode in {"move", "operand"}
+        return (self.address,) * first + (self.second_address,) * (self.second_constant != 0)
 
     @property
     def writes(self) -> bool:
@@ -87,7 +92,9 @@ class Instruction(NamedTuple):
         return self.opcode.startswith("product")
 
     def __str__(self) -> str:
-        return f"{self.opcode}, address {self.address}, constant {self.constant}, target {self.target}"
+        second = f", second address {self.second_address}, second constant {self.second_constant}"
+        first = f"{self.opcode}, address {self.address}, constant {self.constant}, target {self.target}"
+        return first + (second if self.second_constant else "")
 
 
 @dataclass(frozen=True)
@@ -110,6 +117,8 @@ class ProgramText:
         Width of each part of the result, the lowest first.
     digits : tuple of list of Bit
         What TAKE stores for each digit number: the bits of the word, the lowest first. Higher numbers are as the last.
+    products : int
+        Products at each clock, 1 or 2.
     """
 
     codes: tuple[int, ...]
@@ -120,6 +129,7 @@ class ProgramText:
     accumulator_bits: int
     results: tuple[int, ...]
     digits: tuple[list[Bit], ...]
+    products: int = 1
 
     @cached_property
     def instructions(self) -> tuple[Instruction, ...]:
@@ -130,14 +140,19 @@ class ProgramText:
         """Decode an instruction; an opcode that does not exist multiplies."""
         opcode = code % (1 << _OPCODE_BITS)
         bits = self.words.bit_length() - 1
-        address, target = (code >> start & (self.words - 1) for start in (_OPCODE_BITS, _OPCODE_BITS + bits))
-        value = code >> (self.code_bits - self.digit_bits - 1)
-        return Instruction(
-            OPCODES[opcode] if opcode < len(OPCODES) else OPCODES[0],
-            address,
-            value - (value >> self.digit_bits << (self.digit_bits + 1)),
-            target,
+        address, target, second = (
+            code >> start & (self.words - 1) for start in range(_OPCODE_BITS, _OPCODE_BITS + 3 * bits, bits)
         )
+        name = OPCODES[opcode] if opcode < len(OPCODES) else OPCODES[0]
+        value = self._constant(code >> (self.code_bits - self.digit_bits - 1))
+        if self.products == 1:
+            return Instruction(name, address, value, target)
+        return Instruction(name, address, value, target, second, self._constant(code >> (_OPCODE_BITS + 3 * bits)))
+
+    def _constant(self, code: int) -> int:
+        """Return the lowest bits of an instruction's rest as a signed constant."""
+        value = code & ((2 << self.digit_bits) - 1)
+        return value - (value >> self.digit_bits << (self.digit_bits + 1))
 
     def part(self, target: int) -> int | None:
         """Return the part of the result that GIVE writes; None if there is no such part."""
@@ -174,14 +189,16 @@ def read_program(text: str, top: str | None = None) -> ProgramText:
     accumulator = [widths[name] for name in ("total_low", "total_high") if name in widths]
     require(bool(slices) and len(accumulator) == 2, "the core must have words and an accumulator beside its program")
     word_bits = sum(width for _, _, width in slices)
-    address_bits, odd = divmod(code_bits - _OPCODE_BITS - word_bits, 2)
+    products = 2 if _SECOND in widths else 1
+    address_bits, odd = divmod(code_bits - _OPCODE_BITS - products * word_bits, 1 + products)
     depth, words = len(slices[0][1]), 1 << max(address_bits, 0)
+    kinds = "two addresses and a constant" if products == 1 else "three addresses and two constants"
     require(
         address_bits > 0
         and not odd
         and depth % words == 0
         and all(len(first_word) == depth for _, first_word, _ in slices),
-        f"an instruction must have an opcode, two addresses and a constant as wide as a word, not {code_bits} bits "
+        f"an instruction must have an opcode, {kinds} as wide as a word, not {code_bits} bits "
         f"for {depth} words of {word_bits} bits",
     )
     for address in range(depth):
@@ -199,7 +216,8 @@ def read_program(text: str, top: str | None = None) -> ProgramText:
         channels=depth // words,
         accumulator_bits=sum(accumulator),
         results=_results(widths),
-        digits=_digits(source.text, widths, word_bits, _OPCODE_BITS + 2 * address_bits),
+        digits=_digits(source.text, widths, word_bits, code_bits - word_bits),
+        products=products,
     )
 
 
@@ -210,6 +228,11 @@ def _results(widths: Mapping[str, int]) -> tuple[int, ...]:
 
 
 _OUTPUT = "m_axis_tdata"
+_SECOND = "second_data"
+"""The register that a second word is multiplied from."""
+
+_PASSES = re.compile(r"moved|passed\d+")
+"""Registers that a word passes on its way to the memory."""
 
 
 def _held(module: Module, name: str) -> list[int]:
@@ -223,7 +246,7 @@ def _number_of(name: str) -> tuple[int, str]:
 
 
 def _digits(text: str, registers: Mapping[str, int], word_bits: int, shift: int) -> tuple[list[Bit], ...]:
-    """Return what a TAKE of each number stores, directly or through the register `moved`.
+    """Return what a TAKE of each number stores, directly or through `moved` and the registers before that.
 
     A register of one bit is 0, unless it says that there is an instruction: while words are cleared, one of them is 1.
     """
@@ -231,7 +254,7 @@ def _digits(text: str, registers: Mapping[str, int], word_bits: int, shift: int)
     slices = [int(low) for low in re.findall(r"^ *words(\d+)\[.*?\] <= ", text, re.MULTILINE)]
     require(len(set(slices)) == len(slices), "the words must have one write port")
     writes = [_written(text, rf"words{low}\[.*?\]") for low in sorted(slices)]
-    moved = _moved(text, word_bits) if "moved" in registers else []
+    passed = {name: _passed(text, word_bits, name) for name in registers if _PASSES.fullmatch(name)}
 
     def stored(number: int) -> list[Bit]:
         code = OPCODES.index("take") | number << shift
@@ -245,8 +268,11 @@ def _digits(text: str, registers: Mapping[str, int], word_bits: int, shift: int)
             if re.fullmatch(r"instruction\d+", name)
         }
         bits = [bit for write in writes for bit in write.bits(logic, bound)]
-        through = bits == [("moved", i) for i in range(word_bits)]
-        return [bit for write in moved for bit in write.bits(logic, bound)] if moved and through else bits
+        for _ in passed:
+            through = next((name for name in passed if bits == [(name, i) for i in range(word_bits)]), None)
+            if through is not None:
+                bits = [bit for write in passed[through] for bit in write.bits(logic, bound)]
+        return bits
 
     last = stored((1 << NUMBER_BITS) - 1)
     return (*takewhile(lambda digit: digit != last, map(stored, range(1 << NUMBER_BITS))), last)
@@ -265,16 +291,16 @@ class _Write(NamedTuple):
         return logic.value(self.otherwise if is_other else self.value, bound)
 
 
-def _moved(text: str, word_bits: int) -> list[_Write]:
-    """Return what is written to `moved`, the lowest bits first: at once, or in slices where some may be cleared."""
-    slices = re.findall(r"^ *(?:if \(.*\) )?moved\[(\d+)(?::(\d+))?\] <= ", text, re.MULTILINE)
+def _passed(text: str, word_bits: int, name: str) -> list[_Write]:
+    """Return what is written to a register, the lowest bits first: at once, or in slices where some may be cleared."""
+    slices = re.findall(rf"^ *(?:if \(.*\) )?{name}\[(\d+)(?::(\d+))?\] <= ", text, re.MULTILINE)
     if not slices:
-        return [_written(text, "moved")]
+        return [_written(text, name)]
     ends = sorted((int(low or high), int(high)) for high, low in slices)
     starts = [0, *(high + 1 for _, high in ends)]
     whole = starts == [*(low for low, _ in ends), word_bits]
-    require(whole, f"each of the {word_bits} bits of moved must be written at one place")
-    return [_written(text, rf"moved\[{high}(?::{low})?\]") for low, high in ends]
+    require(whole, f"each of the {word_bits} bits of {name} must be written at one place")
+    return [_written(text, rf"{name}\[{high}(?::{low})?\]") for low, high in ends]
 
 
 def _written(text: str, register: str) -> _Write:

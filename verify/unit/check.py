@@ -40,15 +40,18 @@ from sosmith.verify.progress import Progress
 from sosmith.verify.reader.inlined import inlined
 from sosmith.verify.reader.source import read_source
 from sosmith.verify.unit.contexts import Contexts
-from sosmith.verify.unit.control import DEST, FOLDED, SERIAL, Control, Event, Machine
-from sosmith.verify.unit.data import ADDED, READ, Data, Subject
+from sosmith.verify.unit.control import DEST, FOLDED, READS, SERIAL, TWO_PRODUCTS, Control, Event, Machine
+from sosmith.verify.unit.data import ADDED, Data, Subject
 from sosmith.verify.unit.going_on import Pace, pace
 from sosmith.verify.unit.order import check_order
 from sosmith.verify.unit.output import Output
 from sosmith.verify.unit.ternary import Values
 
 CLOCK = "aclk"
-_SPLIT = ("left", "shifted", "moved", "operand", "data", "factor", "product")
+_SPLIT = (
+    *("left", "shifted", "moved", "passed4", "passed5", "operand", "data", "factor", "product"),
+    *("second_data", "second_factor", "second_product", "products"),
+)
 
 
 @dataclass(frozen=True)
@@ -87,10 +90,11 @@ def check_unit(text: str, certificate: Certificate, *, serial: bool, top: str | 
     modules = inlined(read_source(text, name), name).modules
     netlist = flattened(modules, CLOCK)
     program = read_program(text, name)
-    stages = SERIAL if serial else FOLDED
+    stages = SERIAL if serial else (FOLDED, TWO_PRODUCTS)[program.products - 1]
+    require(not serial or program.products == 1, "a serial unit must have one product at a time, not two")
     control = Control(netlist, program, stages, _existing(netlist, program.channels))
     split = [name for name in _SPLIT if name in netlist.drivers]
-    contexts = Contexts(netlist, control, control.ternary, [ADDED, READ, *split])
+    contexts = Contexts(netlist, control, control.ternary, [ADDED, *READS[: program.products], *split])
     data = Data(netlist, program, control, contexts, stages)
     data.check_nets()
     output = Output(netlist, program, control, contexts, stages, certificate)

@@ -52,6 +52,11 @@ class Stages(NamedTuple):
 
 
 FOLDED, SERIAL = Stages(2, 3, 4, 5), Stages(1, 2, 2, 3)
+TWO_PRODUCTS = Stages(2, 3, 6, 6)
+"""Stages of a folded unit with two products a clock, where MOVE and TAKE write with all others."""
+
+READS = ("read", "second_read")
+"""The words that an instruction has read, of which a unit with one product a clock has one."""
 
 
 class Machine(NamedTuple):
@@ -178,8 +183,10 @@ class Control:
         The registers that decide what moves, and when.
     ternary : Ternary
         The nets, as far as they are known.
-    words, writes, reads : lists of str, Write and Read
-        The memories that words are cut into, and their ports.
+    words, writes : lists of str and Write
+        The memories that words are cut into, and their write ports.
+    reads : dict of str to list of Read
+        For each word that an instruction reads, the ports that it is read by, in the order of `words`.
     """
 
     def __init__(self, netlist: Netlist, program: ProgramText, stages: Stages, decisions: Sequence[str]) -> None:
@@ -188,7 +195,6 @@ class Control:
         require(self.cuts <= netlist.widths.keys(), f"a serial core must have a net {DONE}")
         self.words = _words(netlist)
         self.writes = [write_port(netlist.memories[name]) for name in self.words]
-        self.reads = [_only(read_ports(netlist, name), name) for name in self.words]
         fetch = _only(read_ports(netlist, "instructions"), "instructions")
         require(not netlist.memories["instructions"].statements, "the program must never be written")
         self.valid = [f"valid{k}" for k in range(1, stages.last + 1)]
@@ -196,15 +202,31 @@ class Control:
         for name in (*self.valid, *self.codes):
             require(name in netlist.registers, f"the unit must have a register {name}")
         self._dependence = Dependence(netlist, self.cuts)
+        self.reads = {name: self._ports(name, program.products) for name in READS[: program.products]}
+        reads = [read for ports in self.reads.values() for read in ports]
         moving = [Bits(READY), Bits(VALID), *(write.enable for write in self.writes)]
-        moving += [*(write.address for write in self.writes), *(read.address for read in self.reads)]
-        moving += [read.enable for read in self.reads if read.enable is not None]
+        moving += [*(write.address for write in self.writes), *(read.address for read in reads)]
+        moving += [read.enable for read in reads if read.enable is not None]
         self.registers = self._closure(moving, [*self.valid, *self.codes])
         self.ternary = Ternary(netlist, {"instructions": netlist.memories["instructions"].first})
         self.steps: list[Step] = []
         self.nodes: list[Node] = []
         self._clears = [instruction.end in _CLEARS for instruction in program.instructions]
         self._mask = program.words - 1
+
+    def _ports(self, word: str, products: int) -> list[Read]:
+        """Return the ports that a word is read by: of several, those that the net of its name depends on."""
+        ports = [read_ports(self._netlist, memory) for memory in self.words]
+        for memory, own in zip(self.words, ports, strict=True):
+            require(len(own) == products, f"{memory} must be read at {products} places, not at {len(own)}")
+        if products == 1:
+            return [own[0] for own in ports]
+        require(word in self._netlist.widths, f"the unit must have a net {word}")
+        of = self._dependence.of_net(word)
+        chosen = [[port for port in own if port.register in of] for own in ports]
+        for memory, own in zip(self.words, chosen, strict=True):
+            require(len(own) == 1, f"{word} must be read from {memory} at one place, not at {len(own)}")
+        return [own[0] for own in chosen]
 
     def _closure(self, values: Sequence[Expression], names: Sequence[str]) -> list[str]:
         """Return the registers that values and registers depend on, at whatever clock."""
@@ -410,20 +432,24 @@ class Control:
         where = f"at instruction {machine.position}"
         event = Event(advance, False, False, False, False, False, False)
         writer, reader = self.writer(machine, event), self.instruction(machine, self._stages.address)
-        for name, write, read in zip(self.words, self.writes, self.reads, strict=True):
+        for name, write in zip(self.words, self.writes, strict=True):
             wanted = int(writer is not None)
             require(self._value(write.enable, values) == (wanted, 1), f"{name} must be written {wanted} times {where}")
             if writer is not None:
                 address = self._address(write.address, values)
                 require(address == writer.target, f"{name} must be written at {writer.target} {where}, not {address}")
-            enabled = (1, 1) if read.enable is None else self._value(read.enable, values)
-            require(
-                enabled == (1, 1) if advance else enabled == (0, 1),
-                f"{name} must be read just when the pipeline moves, {where}",
-            )
-            if reader is not None:
-                address = self._address(read.address, values)
-                require(address == reader.address, f"{name} must be read at {reader.address} {where}, not {address}")
+        addresses = (None, None) if reader is None else (reader.address, reader.second_address)
+        for ports, wanted_address in zip(self.reads.values(), addresses, strict=False):
+            for name, read in zip(self.words, ports, strict=True):
+                enabled = (1, 1) if read.enable is None else self._value(read.enable, values)
+                require(
+                    enabled == (1, 1) if advance else enabled == (0, 1),
+                    f"{name} must be read just when the pipeline moves, {where}",
+                )
+                if wanted_address is not None:
+                    address = self._address(read.address, values)
+                    right = address == wanted_address
+                    require(right, f"{name} must be read at {wanted_address} {where}, not {address}")
 
     def _address(self, value: Expression, values: Values) -> int | None:
         """Return the address within the words of a channel; None if it is unknown."""

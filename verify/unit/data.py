@@ -5,6 +5,7 @@ over is a form of what the others hold, and must be the one that the instruction
 
     folded    data = word read           product = data * factor     total + product = added, modulo its width
               factor = constant, or the operand
+              with two products a clock, all three twice, and their sum in a register
     serial    shifted, left = the two factors; while there are digits left, total + shifted * left stays the same
 
 `added` is then what `sosmith.verify.program.check` has added up after an instruction. The accumulator is kept in two
@@ -15,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from sosmith.verify.graph import require
 from sosmith.verify.parallel.equality import same_word
@@ -24,10 +26,11 @@ from sosmith.verify.program.normal_form import Form, constant, plus
 from sosmith.verify.program.text import NUMBER_BITS, Instruction, ProgramText
 from sosmith.verify.reader.syntax import Expression
 from sosmith.verify.unit.contexts import DATA, Contexts, Slice, unknown
-from sosmith.verify.unit.control import DEST, DONE, SERIAL, Control, Event, Machine, Stages
+from sosmith.verify.unit.control import DEST, DONE, READS, SERIAL, Control, Event, Machine, Stages
 from sosmith.verify.unit.ternary import Values
 
-ADDED, READ = "added", "read"
+ADDED, READ, SECOND_READ = "added", *READS
+_SECOND = "second_"
 _LOW, _HIGH, _CARRIED = "total_low", "total_high", "carried"
 _CARRIES, _CLEARS = frozenset({"store", "drop", "give"}), frozenset({"finish", "judge", "take"})
 
@@ -94,13 +97,14 @@ class Data:
         RejectedError
             If one of them is another value.
         """
-        forms = Forms()
-        read: Form = {}
-        for name, port in zip(self._control.words, self._control.reads, strict=True):
-            low, width = int(name[5:]), self._netlist.memories[name].width
-            read = plus(read, forms.variable(port.register, 0, (1 << width) - 1), 1 << low)
-        word = self._contexts.logic(forms, {}, {}, opened=READ).net(READ)
-        require(same_word(forms, word, read, self._word), f"{READ} must be the word read, not another value")
+        for net, ports in self._control.reads.items():
+            forms = Forms()
+            read: Form = {}
+            for name, port in zip(self._control.words, ports, strict=True):
+                low, width = int(name[5:]), self._netlist.memories[name].width
+                read = plus(read, forms.variable(port.register, 0, (1 << width) - 1), 1 << low)
+            word = self._contexts.logic(forms, {}, {}, opened=net).net(net)
+            require(same_word(forms, word, read, self._word), f"{net} must be the word read, not another value")
 
     # Kinds.
 
@@ -168,12 +172,16 @@ class Data:
 
         The slices that a word is read in are its bits, as `check_nets` proves.
         """
-        widths = {ADDED: self._width, READ: self._word, "moved": self._word, "operand": self._word}
-        widths |= {"data": self._word, "factor": self._word, "product": 2 * self._word}
+        names = ("moved", "passed4", "passed5", "operand", *self._control.reads)
+        widths = {ADDED: self._width, "products": 2 * self._word + 1} | dict.fromkeys(names, self._word)
+        for prefix in ("", _SECOND):
+            own = {"data": self._word, "factor": self._word, "product": 2 * self._word}
+            widths |= {prefix + name: width for name, width in own.items()}
         contents = {name: self._signed(forms, name, width) for name, width in widths.items()}
-        for name, port in zip(self._control.words, self._control.reads, strict=True):
-            above = forms.floor(shifted(contents[READ], -int(name[5:])))
-            contents[port.register] = forms.unsigned(above, self._netlist.memories[name].width)
+        for net, ports in self._control.reads.items():
+            for name, port in zip(self._control.words, ports, strict=True):
+                above = forms.floor(shifted(contents[net], -int(name[5:])))
+                contents[port.register] = forms.unsigned(above, self._netlist.memories[name].width)
         return contents
 
     @staticmethod
@@ -201,16 +209,19 @@ class Data:
                 return "nothing"
             return ("take", reading.constant % (1 << NUMBER_BITS)) if reading.opcode == "take" else "move"
 
-        def product(forms: Forms, kind: Kind, now: Form) -> Form:
+        def product(forms: Forms, kind: Kind, now: Form, prefix: str = "") -> Form:
             contents = self._held(forms)
-            return forms.times(contents["data"], contents["factor"])
+            return forms.times(contents[f"{prefix}data"], contents[f"{prefix}factor"])
+
+        two = self._program.products > 1
+        added_up = "products" if two else "product"
 
         def check_added(kind: Kind, values: Values) -> None:
             for carried in (0, 1):
                 forms = Forms()
                 total, contents = self._accumulator(forms, carried)
                 added = self._contexts.logic(forms, values, {**self._held(forms), **contents}, opened=ADDED).net(ADDED)
-                wanted = plus(total, self._signed(forms, "product", 2 * self._word))
+                wanted = plus(total, self._held(forms)[added_up])
                 self._require_added(forms, added, wanted)
 
         return [
@@ -221,8 +232,32 @@ class Data:
                 lambda forms, kind, now: self._factor_form(forms, kind),
             ),
             self._register("product", always, product),
-            self._register("moved", kind_of_moved, moved),
+            self._register("passed4" if two else "moved", kind_of_moved, moved),
+            *(self._second(always, product) if two else ()),
             Subject(ADDED, self._opened(ADDED), always, check_added),
+        ]
+
+    def _second(self, always: Callable[[Machine, Event], Kind], product: Callable[..., Form]) -> list[Subject]:
+        """Return the subjects of the second product, of the sum of both, and of a word that waits for that."""
+
+        def kind_of_factor(machine: Machine, event: Event) -> Kind:
+            reading = self._at(machine, self._stages.reading)
+            return None if reading is None else ("constant", reading.second_constant)
+
+        def same(name: str) -> Callable[[Forms, Kind, Form], Form]:
+            return lambda forms, kind, now: self._held(forms)[name]
+
+        def both(forms: Forms, kind: Kind, now: Form) -> Form:
+            contents = self._held(forms)
+            return plus(contents["product"], contents[f"{_SECOND}product"])
+
+        return [
+            self._register(f"{_SECOND}data", always, same(SECOND_READ)),
+            self._register(f"{_SECOND}factor", kind_of_factor, lambda forms, kind, now: self._factor_form(forms, kind)),
+            self._register(f"{_SECOND}product", always, partial(product, prefix=_SECOND)),
+            self._register("products", always, both),
+            self._register("passed5", always, same("passed4")),
+            self._register("moved", always, same("passed5")),
         ]
 
     def _opened(self, name: str) -> list[Expression]:
@@ -283,7 +318,6 @@ class Data:
     def _write(self, number: int) -> Subject:
         """Return the subject of what is written to a memory, and to which channel's words."""
         name, port = self._control.words[number], self._control.writes[number]
-        read = self._control.reads[number]
         low, width = int(name[5:]), self._netlist.memories[name].width
 
         def check(kind: Kind, values: Values) -> None:
@@ -302,7 +336,7 @@ class Data:
             )
 
         if self._program.channels > 1:
-            for address in (port.address, read.address):
+            for address in (port.address, *(ports[number].address for ports in self._control.reads.values())):
                 self._check_channel(name, address)
         return Subject(name, [port.data], self._kind_of_write, check)
 

@@ -90,7 +90,7 @@ class Manifest:
             "accumulator_bits": program.accumulator_bits,
             "states": verdict.memory.kept,
             "words": program.words,
-            "instructions": [[each.opcode, each.address, each.constant, each.target] for each in program.instructions],
+            "instructions": [[*each[: 2 + 2 * program.products]] for each in program.instructions],
         }
         places = schedule["places"]
         _compare("schedule", {**schedule, "places": []}, wanted | {"places": []})

@@ -76,20 +76,24 @@ def some(datapath: Datapath, count: int, channels: int, seed: int = 1) -> list[S
 
 @pytest.mark.sweep(2)
 @pytest.mark.parametrize(
-    ("serial", "channels", "protect"),
+    ("serial", "channels", "protect", "products"),
     [
-        (False, 1, "none"),
-        (False, 1, "detect"),
-        (False, 3, "none"),
-        (False, 5, "correct"),
-        (True, 1, "none"),
-        (True, 3, "correct"),
+        (False, 1, "none", 1),
+        (False, 1, "detect", 1),
+        (False, 3, "none", 1),
+        (False, 5, "correct", 1),
+        (True, 1, "none", 1),
+        (True, 3, "correct", 1),
+        (False, 1, "none", 2),
+        (False, 1, "detect", 2),
+        (False, 3, "none", 2),
+        (False, 5, "correct", 2),
     ],
 )
-def test_every_sample_at_any_pace(serial: bool, channels: int, protect: str) -> None:
+def test_every_sample_at_any_pace(serial: bool, channels: int, protect: str, products: int) -> None:
     """Samples of channels that do not exist are dropped."""
     datapath = mixer()
-    made = program(datapath, 3)
+    made = program(datapath, 3, products=products)
     dut = Probed(datapath, made, serial=serial, channels=channels, protect=protect)
     samples = some(datapath, 40, channels if channels == 1 else 1 << (channels - 1).bit_length())
     expected = Model(datapath, made, channels).results(made, samples)

@@ -73,16 +73,46 @@ def test_a_wrong_constant_is_noticed() -> None:
 
 
 @pytest.mark.sweep(2)
+@pytest.mark.parametrize("products", [1, 2])
 @pytest.mark.parametrize("realization", FOLDABLE)
-def test_what_is_read_was_stored_long_enough_before(realization: str) -> None:
-    made = program(example_design("flange_wear_locomotive.toml", realization=realization).datapath, 15)
+def test_what_is_read_was_stored_long_enough_before(realization: str, products: int) -> None:
+    """With two products a clock all words are written at the end of the pipeline, which has one stage more."""
+    datapath = example_design("flange_wear_locomotive.toml", realization=realization).datapath
+    made = program(datapath, 15, products=products, trials=4 * (products - 1))
     readable = {}
-    for k, (opcode, address, _, target) in enumerate(made.instructions):
+    for k, (opcode, address, _, target, second_address, second_constant) in enumerate(made.instructions):
         assert k >= readable.get(address, 0)
-        if opcode in WRITES:
+        assert k >= readable.get(second_address, 0) or not second_constant
+        assert products > 1 or (second_address, second_constant) == (0, 0)
+        if opcode in WRITES and products == 1:
             readable[target] = k + (MOVED if opcode in EARLY_WRITES else STORED)
             assert k == 0 or opcode in LATE_WRITES or made.instructions[k - 1].opcode not in LATE_WRITES
+        elif opcode in WRITES:
+            readable[target] = k + STORED + 1
     assert made.instructions[-1].opcode is Opcode.GIVE
+
+
+@pytest.mark.parametrize("digit_bits", [15, 17])
+@pytest.mark.parametrize("example", ["audio_lowpass.toml", "flange_wear_bench.toml"])
+def test_two_products_a_clock_compute_the_same_in_fewer_clocks(example: str, digit_bits: int) -> None:
+    datapath = example_design(example, realization="df1_ef1").datapath
+    one, two = program(datapath, digit_bits), program(datapath, digit_bits, products=2)
+    tried = program(datapath, digit_bits, products=2, trials=24)
+    codes = stimulus(datapath, 60)
+    assert run(two, datapath, codes) == run(tried, datapath, codes) == datapath.compute_exact(codes)
+    assert len(tried.instructions) <= len(two.instructions) < 0.9 * len(one.instructions)
+    assert any(i.second_constant for i in two.instructions)
+    assert tried == program(datapath, digit_bits, products=2, trials=24)
+
+
+def test_a_wrong_second_constant_is_noticed() -> None:
+    datapath = example_design("audio_lowpass.toml", realization="df1_ef2").datapath
+    made = program(datapath, 15, products=2)
+    number = next(k for k, i in enumerate(made.instructions) if abs(i.second_constant) > 1000)
+    wrong = [*made.instructions]
+    wrong[number] = wrong[number]._replace(second_constant=wrong[number].second_constant // 2)
+    codes = stimulus(datapath, 60)
+    assert run(replace(made, instructions=tuple(wrong)), datapath, codes) != datapath.compute_exact(codes)
 
 
 @pytest.mark.parametrize("digit_bits", [10, 15])

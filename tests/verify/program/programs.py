@@ -8,6 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
+from sosmith.gen.architectures.blocks import Blocks
 from sosmith.gen.architectures.registry import ARCHITECTURES
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.output.certificate import certificate
@@ -35,8 +36,8 @@ def specified(text: str) -> Specification:
     return from_tree(tomllib.loads(text, parse_float=Decimal), Path("small.toml"))
 
 
-def made(design: CoreDesign, architecture: str, channels: int = 1) -> Made:
-    core = ARCHITECTURES[architecture](design.datapath, channels)
+def made(design: CoreDesign, architecture: str, channels: int = 1, products: int = 1) -> Made:
+    core = ARCHITECTURES[architecture](design.datapath, channels, blocks=Blocks(products, asked=products))
     assert core.program is not None
     text = to_verilog(to_rtlil(core.component(), design.datapath.name))
     read = json.loads(certificate_text(certificate(design.quantized, design.spec.max_error)))
@@ -44,8 +45,10 @@ def made(design: CoreDesign, architecture: str, channels: int = 1) -> Made:
 
 
 @cache
-def small(spec: str, architecture: str = "folded", realization: str = "df1_ef1", channels: int = 1) -> Made:
-    return made(design_core(specified(spec), realization=realization), architecture, channels)
+def small(
+    spec: str, architecture: str = "folded", realization: str = "df1_ef1", channels: int = 1, products: int = 1
+) -> Made:
+    return made(design_core(specified(spec), realization=realization), architecture, channels, products)
 
 
 def changed(core: Made, number: int, code: int) -> str:

@@ -17,18 +17,21 @@ from sosmith.verify.graph import RejectedError
 
 
 @pytest.mark.parametrize(
-    ("spec", "architecture", "channels"),
+    ("spec", "architecture", "channels", "products"),
     [
-        (STEADY, "folded", 1),
-        (STEADY, "serial", 1),
-        (INSTRUMENT, "folded", 1),
-        (STEADY_INSTRUMENT + WORN, "serial", 2),
-        (SEVERAL, "folded", 3),
+        (STEADY, "folded", 1, 1),
+        (STEADY, "serial", 1, 1),
+        (INSTRUMENT, "folded", 1, 1),
+        (STEADY_INSTRUMENT + WORN, "serial", 2, 1),
+        (SEVERAL, "folded", 3, 1),
+        (STEADY, "folded", 1, 2),
+        (INSTRUMENT, "folded", 1, 2),
+        (SEVERAL, "folded", 3, 2),
     ],
-    ids=["folded", "serial", "settling", "wear", "several limits"],
+    ids=["folded", "serial", "settling", "wear", "several limits", "two products", "two, settling", "two, limits"],
 )
-def test_small_cores(spec: str, architecture: str, channels: int) -> None:
-    core = unit(spec, architecture, channels)
+def test_small_cores(spec: str, architecture: str, channels: int, products: int) -> None:
+    core = unit(spec, architecture, channels, products=products)
     found, program = core.check(), core.core.program
     assert found.states > len(program.instructions)
     serial = architecture == "serial"
@@ -46,11 +49,61 @@ def test_words_in_slices(architecture: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("channels", [1, 2, 5])
-@pytest.mark.parametrize("architecture", ["folded", "serial"])
+@pytest.mark.parametrize(("architecture", "products"), [("folded", 1), ("folded", 2), ("serial", 1)])
 @pytest.mark.parametrize("realization", ["df1", "df1_ef2", "df2t", "delta", "state_space"])
 @pytest.mark.parametrize("spec", [PLAIN, STEADY_INSTRUMENT, WIDE], ids=["plain", "instrument", "wide"])
-def test_every_realization(spec: str, realization: str, architecture: str, channels: int) -> None:
-    assert unit(spec, architecture, channels, realization).check().cases > 20
+def test_every_realization(spec: str, realization: str, architecture: str, channels: int, products: int) -> None:
+    core = unit(spec, architecture, channels, realization, products)
+    assert core.check().cases > 20
+    assert core.core.check().instructions == len(core.core.program.instructions)
+
+
+TWO_BREAKS = {
+    "a narrower sum": (
+        r"\+ \$signed\(second_product\);",
+        r"+ $signed(second_product[30:0]);",
+        "products must be as asked after a clock, not another value",
+    ),
+    "no sign of the second factor": (
+        r"\$signed\(second_data\) \* \$signed\(second_factor\)",
+        r"second_data * second_factor",
+        "second_product must be as asked after a clock, not another value",
+    ),
+    "the words the other way round": (
+        r"assign second_read = (\w+);",
+        r"assign second_read = \g<1>_2;",
+        r"words0 must be read at \d+ at instruction \d+, not \d+|second_read must be read from .*",
+    ),
+    "the first word twice": (
+        r"assign instruction2_second_address = instruction2\[\d+:\d+\];",
+        r"assign instruction2_second_address = instruction2[7:4];",
+        r"words0 must be read at \d+ at instruction \d+, not \d+",
+    ),
+    "another second constant": (
+        r"second_factor <= [^;]+;",
+        "second_factor <= second_data;",
+        r"second_factor must be constant -?\d+ after a clock, not another value",
+    ),
+    "a word that passes too fast": (
+        r"else moved <= passed5;",
+        r"else moved <= passed4;",
+        "moved must be as asked after a clock, not another value",
+    ),
+    "a word that is moved without an instruction": (
+        r"assign moves = valid6 & instruction6_moves;",
+        r"assign moves = instruction6_moves;",
+        r"words0 must be written \d times at instruction \d+|valid1 must be .*",
+    ),
+}
+
+
+@pytest.mark.parametrize("change", TWO_BREAKS)
+def test_what_is_not_a_unit_with_two_products_is_rejected(change: str) -> None:
+    core, (old, new, sentence) = unit(STEADY, products=2), TWO_BREAKS[change]
+    wrong, count = re.subn(old, new, core.text)
+    assert count == 1
+    with pytest.raises(RejectedError, match=f"^(?:{sentence})$"):
+        core.check(wrong)
 
 
 # What is not the unit is rejected.

@@ -36,8 +36,8 @@ def stated(core: Made) -> Certificate:
 class Unit:
     """A core with what its certificate says of it."""
 
-    def __init__(self, spec: str, architecture: str, channels: int, realization: str) -> None:
-        self.core = small(spec, architecture, realization, channels)
+    def __init__(self, spec: str, architecture: str, channels: int, realization: str, products: int) -> None:
+        self.core = small(spec, architecture, realization, channels, products)
         self.certificate = stated(self.core)
         self.text, self.channels, self._serial = self.core.text, channels, architecture == "serial"
 
@@ -81,5 +81,7 @@ class Unit:
 
 
 @cache
-def unit(spec: str, architecture: str = "folded", channels: int = 1, realization: str = "df1_ef1") -> Unit:
-    return Unit(spec, architecture, channels, realization)
+def unit(
+    spec: str, architecture: str = "folded", channels: int = 1, realization: str = "df1_ef1", products: int = 1
+) -> Unit:
+    return Unit(spec, architecture, channels, realization, products)

@@ -205,7 +205,8 @@ def _hardware_rows(architecture: Architecture) -> list[tuple[str, str]]:
         sizes = f"{cost.adder_bits}, {cost.register_bits}"
         return [latency, ("multipliers", cost.multiplier_sizes), ("adder bits, state and register bits", sizes)]
     word = program.digit_bits + 1
-    multiplier = "none, shifts and additions" if architecture.multiplier_blocks == 0 else f"1 of {word} x {word}"
+    count = architecture.multiplier_blocks
+    multiplier = f"{count} of {word} x {word}" if count else "none, shifts and additions"
     memory = f"{program.words:,} words of {word} bits a channel, {program.states:,} of them states"
     accumulator = f"{program.accumulator_bits} bits"
     return [

@@ -1,0 +1,53 @@
+"""Registers that move into multipliers and block RAMs of an ECP5, and those that must stay."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from sosmith.gen.fpga.block_registers import cells_of, with_block_registers
+from sosmith.gen.fpga.boards import find_board
+from sosmith.gen.fpga.yosys import run_yosys
+
+PORTS = "input clk, rst, en, input [17:0] x, y, input [7:0] from, output reg [35:0] p, output [17:0] other"
+BOTH = "a <= x; b <= y;"
+CASES = {
+    "all of a multiplier": (f"{BOTH} p <= $signed(a) * $signed(b);", "0", {"A", "B", "P"}),
+    "a product with an enable": (f"{BOTH} if (en) p <= $signed(a) * $signed(b);", "0", {"A", "B"}),
+    "a product with a reset": (f"{BOTH} if (rst) p <= 0; else p <= $signed(a) * $signed(b);", "0", {"A", "B"}),
+    "a factor with an enable": ("if (en) a <= x; b <= y; p <= $signed(a) * $signed(b);", "0", {"P"}),
+    "a factor that something else reads": (f"{BOTH} p <= $signed(a) * $signed(b);", "a", {"P"}),
+    "a factor without a register": ("b <= y; p <= $signed(x) * $signed(b);", "0", {"P"}),
+    "a square": ("a <= x; p <= $signed(a) * $signed(a);", "0", {"A", "B", "P"}),
+    "a word": ("w <= words[from]; p <= w;", "0", {"DO"}),
+    "a word with a reset": ("w <= words[from]; if (rst) p <= 0; else p <= w;", "0", set()),
+    "a word that is read at some clocks": ("if (en) w <= words[from]; p <= w;", "0", set()),
+    "a word that something else reads": ("w <= words[from]; p <= w;", "w[17:0]", set()),
+}
+_NAMES = {"REG_INPUTA_CLK": "A", "REG_INPUTB_CLK": "B", "REG_OUTPUT_CLK": "P", "REGMODE_B": "DO"}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_register_moves_if_nothing_else_is_asked_of_it(case: str, tmp_path: Path) -> None:
+    clocked, other, wanted = CASES[case]
+    text = f"""module top ({PORTS});
+reg [17:0] a, b; reg [35:0] w; integer i;
+(* ram_style = "block" *) reg [35:0] words [0:255];
+initial for (i = 0; i < 256; i = i + 1) words[i] = i * 36'd4241838687;
+assign other = {other};
+always @(posedge clk) begin {clocked} end
+endmodule
+"""
+    (tmp_path / "top.sv").write_text(text, encoding="utf-8")
+    synthesis = find_board("ulx3s_25f").device.synthesis
+    run_yosys(f"read_verilog -sv top.sv; {synthesis} -top top; write_json top.json", tmp_path)
+    netlist = json.loads((tmp_path / "top.json").read_text(encoding="utf-8"))
+    before = cells_of(netlist).get("TRELLIS_FF", 0)
+    packed = with_block_registers(netlist)
+    parameters = [cell["parameters"] for cell in packed["modules"]["top"]["cells"].values()]
+    moved = {_NAMES[k] for each in parameters for k, v in each.items() if k in _NAMES and v in {"CLK0", "OUTREG"}}
+    assert moved == wanted
+    bits = {"A": 18, "B": 18 * ("square" not in case), "P": 36, "DO": 36}
+    assert before - cells_of(packed).get("TRELLIS_FF", 0) == sum(bits[name] for name in wanted)
