@@ -275,7 +275,8 @@ class Search:
     def _places(self, k: int, form: SectionFormat) -> list[tuple[str, ...]]:
         """Return what keeps a bit more at once in section k: a quantizer, or all that products have."""
         products = self._estimates[k].products
-        return [*((name,) for name in form.fracs if name not in products), tuple(n for n in products if n in form.fracs)]
+        alone = [(name,) for name in form.fracs if name not in products]
+        return [*alone, tuple(name for name in products if name in form.fracs)]
 
     def _most_saved(self, choice: Choice, bits: int) -> float:
         """Return how much the error falls if the best places keep so many bits more in all, whatever their size."""
