@@ -67,7 +67,7 @@ def test_a_filter_without_a_decimator(family: str, low: Fraction) -> None:
 
 BROKEN = [
     ("slope of the CIC filter", "slope = stages * arb.pi()", "slope = -stages * arb.pi()"),
-    ("no slope", "(abs(factor.slope) * ball(length / 2))", "(abs(factor.slope) * 0)"),
+    ("no slope", "(abs(self.slope) * ball(length / 2))", "(abs(self.slope) * 0)"),
     ("half the frequency", "(acb(-2 * q)", "(acb(-q)"),
     ("above the multiple", "((band - q) / factor)", "((band + q) / factor)"),
     ("poles as zeros", "power * slope)", "slope)"),

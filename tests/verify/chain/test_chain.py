@@ -6,6 +6,7 @@ import hashlib
 import json
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from typing import Any
 import pytest
 
 import sosmith
+from sosmith.gen.chain import design as chain_design
 from sosmith.model.errors import ShortfallError, SpecificationError
 from sosmith.verify.certificate_file import entries_text
 from sosmith.verify.chain.chain_file import ChainCertificate, read_chain, sealed_chain
@@ -200,6 +202,21 @@ def test_other_words_are_refused(folder: Path) -> None:
         ShortfallError, match=r"^the filter of stage low must be as the specification of the chain says"
     ):
         proven(folder)
+
+
+def test_a_port_between_stages_that_limits_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each core is proven by itself; that nothing is limited between them is proven of the chain alone."""
+    wide = chain_design._Budget._port
+
+    def narrow(self: Any, *arguments: Any) -> Any:
+        port = wide(self, *arguments)
+        return replace(port, bits=port.bits - 2)
+
+    monkeypatch.setattr(chain_design._Budget, "_port", narrow)
+    sosmith.design_chain(TREE).generate(tmp_path)
+    certificate = sosmith.ChainCertificate.load(tmp_path / CERTIFICATE)
+    with pytest.raises(ShortfallError, match=r"^the port behind stage slow must hold magnitudes of .*, not end at .*$"):
+        certificate.verify()
 
 
 def test_a_certificate_without_a_file_has_no_stages_beside_it() -> None:
