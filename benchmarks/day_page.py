@@ -340,7 +340,7 @@ def _coverage(rows: list[dict[str, Any]]) -> list[str]:
         "error of a day, and on its first day often cannot be told from one. Where it is as probable as none, that is",
         f"said (of sensors as their type for {plain['possible']} of {plain['count']}), the curve is the mean of both",
         "by their probabilities, and intervals hold in either case; past doubt, both are those with the step.",
-        f"The warning limit, by chance, {beyond} of {days} days of sensors as their type are beyond, {rate}.",
+        f"Beyond the warning limit are, by chance, {beyond} of {days} days of sensors as their type, {rate}.",
         "[health.md](health.md) says how soon later days tell a step.",
         "The warning of a sensor as its type is that so few measurements do not say how far an error of a day reaches.",
         "",

@@ -168,7 +168,7 @@ def measured(parts: list[str], earlier: dict[str, Any], folder: Path, processes:
     found = dict(earlier)
     for part in parts:
         found[part] = _summed(part, {task: rows[task] for task in tasks_of(part)})
-    return found
+    return {part: found[part] for part in FIRST_SEEDS if part in found}
 
 
 def _summed(part: str, rows: dict[Task, Any]) -> Any:
