@@ -42,6 +42,20 @@ def test_certificate_and_files_are_proven(seed: int, tmp_path: Path) -> None:
     assert float(proof.budget["filter rounding"]) * 2**40 < float(proof.lsb)  # nothing is rounded but the output
 
 
+def test_an_error_next_to_a_number_of_the_claims_grid_is_proven() -> None:
+    """The tap's error is 4095/16384 LSB but for 2.6e-54, which a bound that is not exact exceeds."""
+    one = {
+        "name": "one",
+        "sample_rate": 1000,
+        "input": {"x": {"bits": 12, "range": [0.0, 5.0]}},
+        "filter": {"taps": [1.7]},
+        "output": {"bits": 19, "range": [-16.0, 16.0], "signed": True},
+    }
+    certificate = sosmith.design(one).certificate
+    claimed = certificate.verify().budget["filter coefficients"]
+    assert float(claimed) == 4095 / 16384 / 16384
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("simulator", ["verilator", "icarus"])
 @pytest.mark.parametrize("seed", SEEDS)

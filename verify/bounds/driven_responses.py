@@ -59,7 +59,9 @@ class Denominator:
         return inverse(self.polynomial) if self._short is None else self._short
 
     def norm(self, numerator: fmpq_poly, *, rough: bool = False) -> Fraction:
-        """Upper bound of the sum of magnitudes; if `rough`, it need not be close."""
+        """Upper bound of the sum of magnitudes, exact without poles; if `rough`, it need not be close."""
+        if not self.polynomial.degree():
+            return sum((abs(fraction(tap / self.polynomial[0])) for tap in numerator.coeffs()), Fraction(0))
         if self.step > 1:
             parts = (fmpq_poly(numerator.coeffs()[k :: self.step]) for k in range(self.step))
             return sum((self.phase.norm(part, rough=rough) for part in parts if part), Fraction(0))

@@ -15,7 +15,7 @@ from sosmith.verify.multirate.connections import BEHIND, CoreConnections
 from sosmith.verify.parallel.netlist import Netlist
 
 _LEAVING = _, _FLAGS, _DEST = "m_axis_tdata", "m_axis_tuser", "m_axis_tdest"
-_LEAST, _MOST = 3, 8
+_MOST = 8
 _PLACES = {"rail": 0, "outside": 1, "judged": 0, "m_axis_tuser": 0}
 
 
@@ -43,8 +43,8 @@ def check_passed(netlist: Netlist, connections: CoreConnections, word: str, chan
     count = sum(1 for bit in flags if bit)
     require(len(flags) == _MOST, f"{_FLAGS} must have {_MOST} bits, not {len(flags)}")
     require(
-        count >= _LEAST and not any(flags[count:]) and len({*flags[:count]}) == count,
-        f"{_FLAGS} must have {_LEAST} or more flags, each once, and zeros above",
+        count > 0 and not any(flags[count:]) and len({*flags[:count]}) == count,
+        f"{_FLAGS} must have its flags from bit 0 on, each once, and zeros above",
     )
     for place, bit in enumerate(flags[:count]):
         name = logic.sources[bit].kind

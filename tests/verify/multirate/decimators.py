@@ -29,10 +29,12 @@ class Case(NamedTuple):
     output_bits: int = 8
     channels: int = 1
     core: str = "filter"
+    wide: bool = False
 
     @property
     def text(self) -> str:
         signed, low = str(self.signed).lower(), -1 if self.signed else 0
+        ends = f"[{4 * low}.0, 4.0]" if self.wide else f"[{low}.0, 1.0]"
         return f"""
 name = "plain"
 sample_rate = 1000.0
@@ -48,7 +50,7 @@ hold = {str(self.hold).lower()}
 [output]
 bits = {self.output_bits}
 signed = {signed}
-range = [{low}.0, 1.0]
+range = {ends}
 unit = ""
 max_error = {self.error}
 [hardware]
