@@ -92,7 +92,7 @@ class _Writer:
     def statements(self) -> list[str]:
         """Compute what is needed in the order of its nodes, then store the words and what is handed on."""
         plan = self._plan
-        for signal in sorted(plan.needed, key=lambda each: plan.sums.nodes[each]):
+        for signal in sorted(self._used(), key=lambda each: plan.sums.nodes[each]):
             self._write(signal)
         text = list(self._written.values())
         text += [f"state->s{number} = {plan.name(plan.stored(each))};" for each, number in self._words.items()]
@@ -100,6 +100,17 @@ class _Writer:
         if not self._words:
             text.append("(void)state;")
         return text
+
+    def _used(self) -> set[Signal]:
+        """Return what leads to words or to what is handed on: the next stage may take less than all outputs."""
+        used: set[Signal] = set()
+        waiting = [*self._plan.handed_on, *map(self._plan.stored, self._words)]
+        while waiting:
+            each = waiting.pop()
+            if each not in used:
+                used.add(each)
+                waiting += self._plan.sources(each)
+        return used
 
     def _write(self, signal: Signal) -> None:
         """Declare a signal, and before it what it is computed from."""

@@ -31,6 +31,15 @@ from sosmith.verify.reader.syntax import (
 Content = Callable[[str], Form]
 """What a register or an input holds, as a word of its width."""
 
+KnownBits = Callable[[str, int, int], Form | None]
+"""Bits of a net, by its name, the lowest of them and their number; None if they are not known."""
+
+
+def none_known(_name: str, _low: int, _width: int) -> Form | None:
+    """Know no bits."""
+    return None
+
+
 _ONE_BIT = frozenset({"==", "!=", "<", ">", "<=", ">=", "!"})
 _ARITHMETIC = frozenset({"+", "-", "*"})
 
@@ -65,7 +74,9 @@ class Evaluation:
     cuts : set of str
         Nets whose value is asked for like that of a register.
     fields : callable
-        Gives bits of a net from one on, so many, where they are known by themselves; otherwise None.
+        Gives bits of an input from one on, so many, where that is simpler than to cut them out; otherwise None.
+    parts : callable
+        Gives bits of any net, where they are known whatever drives it; otherwise None.
     """
 
     def __init__(
@@ -77,10 +88,12 @@ class Evaluation:
         *,
         word: Callable[[str, Form], Form] | None = None,
         cuts: Set[str] = frozenset(),
-        fields: Callable[[str, int, int], Form | None] = lambda name, low, width: None,
+        fields: KnownBits = none_known,
+        parts: KnownBits = none_known,
     ) -> None:
         self._netlist, self._forms, self._content, self._shortened = netlist, forms, content, shortened
         self._word, self._cuts, self._fields = word, cuts, fields
+        self._parts = parts
         self._known: dict[tuple[str, int, int], Form] = {}
         self._open: set[tuple[str, int, int]] = set()
 
@@ -147,7 +160,7 @@ class Evaluation:
         return yes[0], self._chosen(select, yes[1], no[1])
 
     def _net(self, name: str, low: int, width: int) -> Form:
-        part = self._fields(name, low, width)
+        part = self._parts(name, low, width)
         if part is not None:
             return part
         if name in self._netlist.inlets and width < self._netlist.widths[name]:
@@ -159,7 +172,8 @@ class Evaluation:
             known = name in self._cuts or name in self._netlist.registers or self._netlist.ports.get(name) == "input"
             none = "bits of x must not be used" if name.startswith("?") else f"{name} must be driven to be used"
             require(known, none)
-            return self._cut(self._content(name), low)
+            part = self._fields(name, low, width)
+            return self._cut(self._content(name), low) if part is None else part
         total: Form = {}
         done = low
         for driver in drivers:

@@ -38,7 +38,7 @@ from sosmith.verify.parallel.channels import DEST
 from sosmith.verify.parallel.control import RESET, Buffer, Case, Control, UndecidedError, about, cases
 from sosmith.verify.parallel.dependence import Dependence
 from sosmith.verify.parallel.equality import same_word
-from sosmith.verify.parallel.evaluation import Content, Evaluation
+from sosmith.verify.parallel.evaluation import Content, Evaluation, KnownBits, none_known
 from sosmith.verify.parallel.forms import Forms, shifted
 from sosmith.verify.parallel.graph_codes import GraphCodes
 from sosmith.verify.parallel.netlist import Netlist
@@ -197,11 +197,10 @@ class Pipeline:
             return unknown if state is None else state
 
         def fields(name: str, low: int, width: int) -> Form | None:
-            if name == DATA:
-                return self._field(low, width) if position == self._source else None
-            return self._part_taken_over(_Part(name, low, width), position, case)
+            return self._field(low, width) if name == DATA and position == self._source else None
 
-        return self.logic(content, word, fields=fields, others=self._following_at(position).keys())
+        parts, others = partial(self._part_taken_over, position, case), self._following_at(position).keys()
+        return self.logic(content, word, fields=fields, parts=parts, others=others)
 
     def seen_from(self, position: int, case: Case, frame: int) -> Content:
         """Return what registers and inputs hold for the sample at a position; `frame` numbers what is not known."""
@@ -236,10 +235,10 @@ class Pipeline:
             if f"{name}_next" in self._netlist.drivers and position < state.behind
         }
 
-    def _part_taken_over(self, part: _Part, position: int, case: Case) -> Form | None:
+    def _part_taken_over(self, position: int, case: Case, *part: str | int) -> Form | None:
         """Return a part of a net that a state is about to take over as it is, for a sample before the state."""
         for name, state in self.states.items():
-            if self._loads.get(name) == part and part.name not in self.states and position < state.behind:
+            if self._loads.get(name) == part and part[0] not in self.states and position < state.behind:
                 following = self._following(state, position, case)
                 self._followed |= set() if following is None else {f"{name}_next"}
                 return following
@@ -270,14 +269,14 @@ class Pipeline:
         word: Callable[[str, Form], Form] | None = None,
         *,
         opened: str = "",
-        fields: Callable[[str, int, int], Form | None] = lambda name, low, width: None,
+        fields: KnownBits = none_known,
+        parts: KnownBits = none_known,
         others: Set[str] = frozenset(),
     ) -> Evaluation:
         """Return the logic where registers, inputs, `others` hold what `content` says, memories what `word` does."""
         cuts = (self._control.cuts - {opened}) | others
-        return Evaluation(
-            self._netlist, self.forms, content, self._graph.shortened, word=word, cuts=cuts, fields=fields
-        )
+        given = (self._netlist, self.forms, content, self._graph.shortened)
+        return Evaluation(*given, word=word, cuts=cuts, fields=fields, parts=parts)
 
     def content_of(self, name: str) -> Form:
         """Return what a register holds while there is a sample at its position.

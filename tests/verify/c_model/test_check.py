@@ -35,9 +35,16 @@ TEXTS = {
     "split": STEADY.replace("bits = 8", "bits = 24").replace(
         "order = 2, cutoff = 20.0", "order = 4, cutoff = 10.41667"
     ),
+    "taken": """
+name = "taken"
+sample_rate = 100.0
+input.x = { bits = 8, signed = true, range = [-1.0, 1.0] }
+filter = { family = "bessel", kind = "lowpass", method = "impulse_invariant", order = 3, cutoff = 6.5728888 }
+output = { bits = 21, signed = true, range = [-1.0, 1.0], unit = "", max_error = 1.9073486328125e-06 }
+""",
     "wide": WIDE.replace("bits = 12", "bits = 32").replace("bits = 24", "bits = 32").replace("0.0005", '"faithful"'),
 }
-REALIZATIONS = {"delta": "delta", "split": "df1", "wide": "df1_ef2"}
+REALIZATIONS = {"delta": "delta", "split": "df1", "taken": "df1_ef2", "wide": "df1_ef2"}
 
 
 class Model(NamedTuple):
@@ -82,6 +89,8 @@ def test_what_is_written_is_proven(name: str, model: Callable[[str], Model]) -> 
     assert found.nodes > 20
     if name == "wide":
         assert "__int128" in model(name).source
+    for each in re.findall(r"const \w+ (n\d+_\w+) = ", model(name).source):
+        assert len(re.findall(rf"\b{each}\b", model(name).source)) > 1  # or a compiler warns
     if name == "split":  # a product in two parts, which add up to more than it on the way
         assert re.search(r"n1_\d+s\d+ = ", model(name).source)
         assert not re.search(r"n2_\d+s\d+ = ", model(name).source)
