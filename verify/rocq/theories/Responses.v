@@ -19,22 +19,10 @@ Lemma taps_plus l : forall u v k, taps l (fun j => u j + v j)%R k = (taps l u k 
 Proof. induction l as [|c l IH]; intros u v k; simpl; [ring|]. rewrite IH; ring. Qed.
 Lemma taps_multiple l : forall x u k, taps l (fun j => x * u j)%R k = (x * taps l u k)%R.
 Proof. induction l as [|c l IH]; intros x u k; simpl; [ring|]. rewrite IH; ring. Qed.
-Lemma taps_late l : forall u k, taps l (fun j => u (j - 1)) k = taps l u (k - 1).
-Proof. induction l as [|c l IH]; intros u k; simpl; [reflexivity|]. rewrite IH. reflexivity. Qed.
 Lemma taps_add a : forall b u k, taps (add a b) u k = (taps a u k + taps b u k)%R.
 Proof. induction a as [|x a IH]; intros [|y b] u k; simpl; try ring. rewrite plus_IZR, IH; ring. Qed.
 Lemma taps_scale c b : forall u k, taps (scale c b) u k = (IZR c * taps b u k)%R.
 Proof. induction b as [|y b IH]; intros u k; simpl; [ring|]. fold (scale c b). rewrite mult_IZR, IH; ring. Qed.
-Lemma taps_mul a : forall b u k, taps (mul a b) u k = taps a (taps b u) k.
-Proof.
-  induction a as [|x a IH]; intros b u k; simpl; [reflexivity|].
-  rewrite taps_add, taps_scale. simpl. rewrite IH. ring.
-Qed.
-Lemma taps_swap a : forall b u k, taps a (taps b u) k = taps b (taps a u) k.
-Proof.
-  induction a as [|c a IH]; intros b u k; simpl; [symmetry; apply taps_zero|].
-  rewrite (taps_plus b (fun j => IZR c * u j)%R (fun j => taps a u (j - 1))), taps_multiple, taps_late, <- IH. reflexivity.
-Qed.
 Lemma taps_bound l : forall u k M, (0 <= M)%R -> (forall j, j <= k -> (Rabs (u j) <= M)%R) ->
   (Rabs (taps l u k) <= IZR (norm1 l) * M)%R.
 Proof.

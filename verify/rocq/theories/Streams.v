@@ -31,11 +31,6 @@ Proof.
   induction b as [|y b IH]; intros u n; simpl; [ring|].
   rewrite mult_IZR. destruct n; [ring|]. fold (scale c b). rewrite IH; ring.
 Qed.
-Lemma conv_mul a : forall b u n, conv (mul a b) u n = conv a (conv b u) n.
-Proof.
-  induction a as [|x a IH]; intros b u n; simpl; [reflexivity|].
-  rewrite conv_add, conv_scale. simpl. destruct n; [ring|]. rewrite IH; ring.
-Qed.
 
 (* They are linear in the sequence, and see only its first n + 1 values. *)
 Lemma conv_ext l : forall u v n, (forall k, (k <= n)%nat -> u k = v k) -> conv l u n = conv l v n.
@@ -54,11 +49,6 @@ Proof. induction l as [|c l IH]; intros n; simpl; [ring|]. destruct n; [ring|]. 
 Fixpoint total (N : list (list Z)) (u : list sequence) (n : nat) : R :=
   match N, u with c :: N', x :: u' => conv c x n + total N' u' n | _, _ => 0 end.
 
-Lemma conv_total l : forall N u n, conv l (total N u) n = total (map (mul l) N) u n.
-Proof.
-  induction N as [|c N IH]; intros [|x u] n; simpl; try apply conv_zero.
-  rewrite (conv_plus l (conv c x) (total N u)), IH, conv_mul. reflexivity.
-Qed.
 
 (* |l * u| <= |l| M where |u| <= M. *)
 Lemma conv_bound l : forall u n M, 0 <= M -> (forall k, (k <= n)%nat -> Rabs (u k) <= M) ->
