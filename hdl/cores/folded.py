@@ -126,6 +126,12 @@ comparator to make both equal.
 _IN_BLOCKS = {"ram_style": "block"}
 """Attribute of a memory that is wide and short: as logic it would take several times the LUT4 of all the rest."""
 
+_STAYS_APART = {"keep": 1}
+"""Attribute of a register that Yosys 0.70 (`ice40_dsp`) would take into both of the MAC16 that it lies between.
+
+One of them then misses in its netlist.
+"""
+
 
 class _Control:
     """What a core is doing.
@@ -540,7 +546,9 @@ class FoldedCore(Shell):
         data, factor = (
             Signal(signed(self._word), name=f"{prefix}{name}", reset_less=True) for name in ("data", "factor")
         )
-        product = Signal(signed(2 * self._word), name=f"{prefix}product", reset_less=True)
+        product = Signal(
+            signed(2 * self._word), name=f"{prefix}product", reset_less=True, attrs=_STAYS_APART if prefix else {}
+        )
         m.d.sync += [data.eq(word), factor.eq(factor_read), product.eq(data * factor)]
         return product
 

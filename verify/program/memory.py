@@ -1,7 +1,8 @@
 """Which words of a program hold which values of the graph, and when: what a map of its memory must say.
 
-A place is true if there is a moment in a sample at which its words hold the digits of the value that it names. A map is
-whole if it has a place for all words of a state, of an input, and of each value that the program stores.
+A place is true if each of its words holds its digit of the value that it names at some moment of a sample: a low digit
+may have been read, and its word be used again, for the next one too. A map is whole
+if it has a place for all words of a state, of an input, and of each value that the program stores.
 """
 
 from __future__ import annotations
@@ -88,16 +89,8 @@ class Memory:
         require(not missing, f"schedule.places of the manifest must have {', '.join(missing)}")
 
     def _holds(self, name: str, addresses: tuple[int, ...], frac: int) -> bool:
-        """Whether words hold the digits of a value at some moment."""
+        """Whether words hold the digits of a value, each at some moment."""
         if not addresses or len(addresses) > 64 or abs(frac) > 4096:
             return False
-        wanted = dict(zip(addresses, self.digits(self.nodes[name], frac, len(addresses)), strict=True))
-        if len(wanted) < len(addresses):
-            return False
-        right: set[int] = set()
-        for address, form in self.written:
-            if address in wanted:
-                right = right | {address} if form == wanted[address] else right - {address}
-                if len(right) == len(wanted):
-                    return True
-        return False
+        wanted = zip(addresses, self.digits(self.nodes[name], frac, len(addresses)), strict=True)
+        return all((address, form) in self.written for address, form in wanted)

@@ -24,7 +24,7 @@ _OBEYED = re.compile(
 """Words in comments that tools obey, or may: the first word of a comment, or any after it."""
 _ATTRIBUTE = re.compile(r" *\(\* (\w+ = (?:32'd1|\"block\")) \*\)")
 _ATTRIBUTES = {
-    "keep = 32'd1": re.compile(r" *wire .*"),
+    "keep = 32'd1": re.compile(r" *(?:wire .*|reg (?:\[\d+:0\] )?second_product = .*)"),
     "no_rw_check = 32'd1": re.compile(r" *reg (?:\[\d+:0\] )?(?:instructions|words\d+|\w+_memory) \[\d+:0\];"),
     'ram_style = "block"': re.compile(r" *reg (?:\[\d+:0\] )?\w+ \[\d+:0\];"),
 }
