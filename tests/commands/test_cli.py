@@ -322,7 +322,7 @@ def test_the_table_of_combinations_is_the_same_in_all_forms(sosmith: Command) ->
     assert rows == [each._asdict() for each in Specification.combinations()]
     text = sosmith("combinations", "--markdown").stdout
     assert (
-        "| multipliers 0 | ok | refused | ok | not yet | decimate by FIR (not yet); reload in parallel (refused) |\n"
+        "| multipliers 0 | ok | refused | ok | not yet | ok | decimate by FIR (not yet); reload in parallel (refused) |\n"
         in text
     )
     assert "- folded with multipliers 0: its program needs one\n" in text
