@@ -174,10 +174,10 @@ def test_a_flip_flop_without_its_reset_is_found(folder: Path, monkeypatch: pytes
 
 def test_a_use_of_a_cell_that_its_model_has_not_is_refused(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     break_netlist(
-        lambda text: text.replace("\n  MULT18X18D ", '\n  MULT18X18D #(\n    .REG_OUTPUT_CLK("CLK0")\n  ) ', 1),
+        lambda text: text.replace("\n  MULT18X18D ", '\n  MULT18X18D #(\n    .REG_PIPELINE_CLK("CLK0")\n  ) ', 1),
         monkeypatch,
     )
-    with pytest.raises(ToolError, match="MULT18X18D must have no register and no bypass, unlike little"):
+    with pytest.raises(ToolError, match="MULT18X18D must have no other register and no bypass, unlike little"):
         run(little("parallel", folder), "ulx3s_25f", folder, samples=80)
 
 

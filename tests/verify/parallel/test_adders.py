@@ -39,7 +39,7 @@ def test_a_wrong_sum_is_rejected() -> None:
 
 def test_the_design_takes_adders_and_says_so() -> None:
     design = design_core(specified(WITHOUT), realization="df1_ef2")
-    assert design.architecture.blocks == Blocks(0)
+    assert design.architecture.blocks == Blocks(0, asked=0)
     assert design.architecture.cost.multiplications == ()
     assert design.reasons["architecture"] == (
         "parallel: asked for in the specification; without multiplier blocks, 3 products by constants made of adders"
