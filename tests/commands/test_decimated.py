@@ -86,6 +86,7 @@ realization = "df1_ef2"
 """A cutoff so low that no word lengths do without the decimator."""
 
 
+@pytest.mark.slow
 def test_a_filter_that_is_only_possible_behind_a_decimator(tmp_path: Path) -> None:
     path = tmp_path / "drift.toml"
     path.write_text(FAR_BELOW, encoding="utf-8")

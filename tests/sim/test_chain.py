@@ -17,7 +17,7 @@ FEW = (3,)
 CASES = [pytest.param(seed, marks=[] if seed in FEW else pytest.mark.slow) for seed in SEEDS]
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("simulator", ["icarus", "verilator"])
 @pytest.mark.parametrize("seed", CASES)
 def test_the_hardware_equals_the_models(seed: int, simulator: str, tmp_path: Path) -> None:

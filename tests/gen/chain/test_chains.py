@@ -18,6 +18,7 @@ SAMPLES = 900
 CASES = [pytest.param(seed, marks=[] if seed in FEW else pytest.mark.slow) for seed in SEEDS]
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("seed", CASES)
 def test_a_chain_keeps_to_what_it_claims(seed: int, tmp_path: Path) -> None:
     chain = sosmith.design_chain(draw(seed))
