@@ -122,6 +122,7 @@ class Search:
         self._ranges: dict[tuple[object, ...], dict[str, tuple[int, int]]] = {}
         self._known: dict[tuple[object, ...], tuple[float, Range, dict[str, int]]] = {}
         self._saved: dict[tuple[object, ...], list[float]] = {}
+        self._merely: tuple[Choice, float, Choice] | None = None
 
     @property
     def work(self) -> int:
@@ -143,6 +144,7 @@ class Search:
         other._objective = objective
         other._inputs = other._sized_inputs()
         other._known = {}
+        other._merely = None
         return other
 
     def _sized_inputs(self) -> list[_Input]:
@@ -193,22 +195,25 @@ class Search:
         allowed : float
             Allowed sum of the errors of input stage, coefficients and rounding, in output LSBs.
         """
-        ways = [start]
+        ways = []
         if len(self._inputs) > 1:
             ways.append(self._trimmed_once(start, allowed, calibration=False))
-        ends = [self._trimmed_closer(way, allowed) for way in ways]
+        ends = [self._closely_trimmed(self.merely_trimmed(start, allowed), allowed)]
+        ends += [self._closely_trimmed(self._trimmed_once(way, allowed), allowed) for way in ways]
         return min(ends, key=lambda choice: (self.size(choice), self.error(choice)))
 
     def merely_trimmed(self, start: Choice, allowed: float) -> Choice:
         """Return formats trimmed without a look at what costs nothing; parameters as of `trimmed`."""
-        return self._trimmed_once(start, allowed)
+        if self._merely is None or self._merely[0] is not start or self._merely[1] != allowed:
+            self._merely = start, allowed, self._trimmed_once(start, allowed)
+        return self._merely[2]
 
     def with_free_bits(self, choice: Choice) -> Choice:
         """Return formats with a smaller error, for a negligible size."""
         return self._closer(choice, more=self._objective.negligible)
 
-    def _trimmed_closer(self, start: Choice, allowed: float) -> Choice:
-        choice = self._trimmed_once(start, allowed)
+    def _closely_trimmed(self, choice: Choice, allowed: float) -> Choice:
+        """Trim a trimmed choice further: by what is closer and costs nothing, as long as there is any."""
         while True:
             closer = self._closer(choice)
             if closer is choice:
