@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import gc
+import os
 import signal
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -69,9 +71,24 @@ def _signals() -> Iterator[None]:
         signal.signal(number, handler)
 
 
+SEARCHING = ("word_lengths", "realizations", "proof", "test_core.py")
+"""Below ``tests/gen``: tests that change what the search for formats does, or that are about it."""
+
+
+@pytest.fixture(scope="session")
+def _formats(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder of this run alone, one for all of its processes, for the formats that the search comes to."""
+    own = tmp_path_factory.getbasetemp()
+    folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "formats"
+    folder.mkdir(exist_ok=True)
+    return folder
+
+
 @pytest.fixture(autouse=True)
-def _formats_are_searched(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Keep no trimmed formats within a test: it may have changed what the search does. Its commands do, as any."""
+def _formats_are_kept(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch, _formats: Path) -> None:
+    """Search for the formats of a design once a run, as a user's commands do, but anew where the search is tested."""
     kept = sys.modules.get("sosmith.gen.realizations.kept_formats")
     if kept is not None:
-        monkeypatch.setattr(kept, "cache_folder", lambda: None)
+        within = request.path.relative_to(request.config.rootpath).parts[1:3]
+        anew = len(within) == 2 and within[0] == "gen" and within[1] in SEARCHING
+        monkeypatch.setattr(kept, "cache_folder", lambda: None if anew else _formats)

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from tests.gen.designs import EXAMPLES
 
-from sosmith.gen import search
+from sosmith.gen.architectures import search
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.realizations.registry import SECTIONS
 from sosmith.gen.specification.specification import Specification, from_tree, load
