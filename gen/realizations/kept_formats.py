@@ -13,7 +13,7 @@ import hashlib
 import json
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
@@ -31,7 +31,7 @@ class Choice:
 
     def with_format(self, k: int, form: SectionFormat) -> Choice:
         """Return a copy with another format of section k."""
-        return replace(self, formats=(*self.formats[:k], form, *self.formats[k + 1 :]))
+        return Choice(self.input_stage, (*self.formats[:k], form, *self.formats[k + 1 :]))
 
 
 LIMIT = 4096
