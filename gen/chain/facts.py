@@ -31,7 +31,7 @@ def _stages(design: ChainDesign) -> Table:
                 stage.spec.name,
                 f"{stage.spec.kind} at {_frequency(stage.spec.rate)}"
                 + (f", decimates by {factor}" if factor > 1 else ""),
-                f"{hardware}, {count(architecture.multiplier_blocks, 'multiplier block')}",
+                f"{hardware}, {count(architecture.multiplier_blocks, 'multiplier')}",
                 plain_number(float(architecture.clocks_per_sample)),
                 str(stage.output.bits),
             )

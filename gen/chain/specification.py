@@ -122,7 +122,7 @@ class StageSpec:
             | {"unit": output.unit}
             | ({} if max_error is None else {"max_error": decimal(max_error)}),
             "hardware": {"clock": decimal(chain.base.hardware.clock)}
-            | {key: hardware[key] for key in _OF_HARDWARE if key in hardware and key != "realization"}
+            | {key: hardware[key] for key in (*_OF_HARDWARE, "keep") if key in hardware}
             | dict(self.hardware),
         }
         return from_tree(tree, chain.base.path.parent / f"{chain.base.path.name}: stage {self.name}")
@@ -231,6 +231,12 @@ def _checked(tree: dict[str, Any], path: Path, text: str | None) -> ChainSpec:
         common["calibration"] = {key: stages[0][key] for key in _KEYS["polynomial"] if key in stages[0]}
     base = from_tree(common | {"filter": _WIRE}, path)
     check_chain(base)
+    if base.hardware.realization != AUTO:
+        raise UnfitError(
+            "left out with [[stage]], as every stage has its own",
+            literal(base.hardware.realization),
+            where="hardware.realization",
+        )
     read, rate, findings = [], base.sample_rate, []
     for k, stage in enumerate(stages):
         try:
@@ -370,7 +376,7 @@ def _by_bands(given: Mapping[str, Any]) -> bool:
 
 
 def _cic(table: Mapping[str, Any], where: str, factor: int) -> list[Decimal]:
-    """Taps of moving sums of `factor` samples one behind the other, whose gain at zero frequency is 1."""
+    """Taps of moving sums of `factor` samples in series, whose gain at zero frequency is 1."""
     if "order" not in table:
         raise UnfitError("given for a CIC filter", "missing", where=f"{where}.order")
     try:

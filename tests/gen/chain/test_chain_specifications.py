@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 import sosmith
+from sosmith.gen.chain.specification import ANY_INPUT, ANY_OUTPUT
 from sosmith.model.errors import SpecificationError
 
 TREE: dict[str, Any] = {
@@ -139,6 +140,10 @@ REFUSED: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
         "not yet available: hardware.reload must be false with [[stage]], as the bound of a chain holds for fixed "
         "coefficients, and the registers are those of one core, not true",
     ),
+    "realization": (
+        hardware(realization="df1"),
+        "hardware.realization must be left out with [[stage]], as every stage has its own, not 'df1'",
+    ),
     "protect": (
         hardware(protect="detect"),
         "not yet available: hardware.protect must be 'none' with [[stage]], as the flag fault is of a stage's own "
@@ -155,6 +160,11 @@ REFUSED: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
         "gets single samples, not beats of several, not 2",
     ),
 }
+
+
+def test_names_are_kept_in_every_stage() -> None:
+    chain = loaded(hardware(keep=True)).checked
+    assert all(stage.ordinary(chain, (ANY_INPUT,), ANY_OUTPUT).hardware.keep for stage in chain.stages)
 
 
 @pytest.mark.parametrize("name", REFUSED)
