@@ -136,8 +136,8 @@ def generate_command(
 ) -> None:
     """Write SystemVerilog, RTLIL, a manifest, a certificate and a bit-true C model for SPEC.
 
-    Prints the paths of the files to stdout, one per line. Two runs write identical files. A chain of stages has the
-    files of each stage as well.
+    Prints the paths of the files to stdout, one per line. Two runs write identical files. For a chain of stages,
+    the files of each stage are written as well.
 
     \b
         sosmith generate my.toml -o my_core
