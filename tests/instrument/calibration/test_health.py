@@ -181,7 +181,8 @@ def test_a_last_day_beyond_the_warning_limit_is_said() -> None:
 
     assert said([0.0, 0.0, -2.5]) == (
         "2024-03-03: the sensor reads 0.25 mm more than the days before predict, 2.5 standard deviations of a day; one "
-        "day in 20 is beyond 2 by chance; if the sensor has stepped, intervals may not hold until another day is measured"
+        "day in 20 is beyond 2 by chance; if the sensor has stepped, intervals may not hold until another day is "
+        "measured"
     )
     assert "the sensor reads 0.2 mm less than the days before predict, 2.0 standard" in said([0.0, WARNING_LIMIT])
     assert said([0.0, WARNING_LIMIT - 0.01]) == said([0.0, -2.5, 0.0]) == said([2.5]) == ""
