@@ -59,7 +59,7 @@ def _budget(design: ChainDesign) -> Table:
         (name, "", "", shown.number(float(value)), f"{float(value) / step:.4f}")
         for name, value in (("sum", design.bound), ("allowed", base.max_error))
     ]
-    head = ("stage", shown.titled("error at most"), "gain to the end", shown.titled("adds"), "in LSB")
+    head = ("stage", shown.titled("error at most"), "gain to the end", shown.titled("adds"), "LSB")
     title = "End-to-end error budget, proven for all inputs in range"
     return Table(title, rows, head, {"sum": "bold"}, numbers=(1, 2, 3, 4))
 
