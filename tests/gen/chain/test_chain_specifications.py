@@ -195,3 +195,15 @@ def test_an_error_that_is_too_small_is_refused() -> None:
     tree["output"] |= {"bits": 32, "max_error": 2.4e-10}
     with pytest.raises(sosmith.ShortfallError, match=r"stage \w+: .*"):
         sosmith.design_chain(tree)
+
+
+def test_a_clock_that_is_too_slow_is_refused_with_the_stage() -> None:
+    tree = copy.deepcopy(TREE)
+    tree["hardware"] = {"clock": 9000.0}
+    with pytest.raises(sosmith.ShortfallError) as refused:
+        sosmith.design_chain(tree)
+    assert str(refused.value) == (
+        "specification: stage slow: none of the 3 realizations meets the specification: with fir_symmetric, the folded "
+        "architecture takes 13 clocks for 4 samples: at a clock of 9,000 Hz the sample rate must be at most 2,769.23 "
+        "Hz, not 8,000 Hz"
+    )
