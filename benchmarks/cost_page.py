@@ -370,12 +370,13 @@ another without a register. With several channels the loop is pipelined across t
 
 ## Two products a clock
 
-Folded cores beside those that `multipliers = 2` makes of the same specification
-([hardware.md](hardware.md#two-products-a-clock)), for the same proven bound:
+`folded` with one multiplier and with `multipliers = 2` ([hardware.md](hardware.md#two-products-a-clock)), from the same
+specification and with the same proven bound:
 
 {two_products_table(record)}
 
-On the ECP5 the registers around the multipliers and behind the program memory are those of the blocks.
+On the ECP5 the registers at the multipliers and at the output of the program memory are inside the blocks
+([hardware.md](hardware.md#registers-inside-blocks)).
 
 ## Digit by digit
 

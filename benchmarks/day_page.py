@@ -64,10 +64,10 @@ def _head() -> list[str]:
         "# The day's own error",
         "",
         "Written by `python -m benchmarks.days --document`, which measures all of it on the project's own emulation,",
-        "goes on where it was interrupted, and measures anew what the code has changed for. By none of its seeds was",
-        "anything chosen: sets of seeds that were looked at while building, three of bench and service and two of",
-        "sensors that are not as their type, gave way to new ones. Accuracy is the paper's equation 7. +- is the",
-        "standard error of the mean.",
+        "goes on where it was interrupted, and measures anew what the code has changed for. None of its",
+        "seeds was used to choose anything: sets that were looked at during development, three of bench and service",
+        "and two of sensors that are not as their type, were replaced by new ones. Accuracy is the paper's equation 7.",
+        "+- is the standard error of the mean.",
         "",
         "The arithmetic errs by less than a micrometre; a day errs by 0.12 to 0.2 mm, which the measurements of other",
         "days cannot know. Two things help: reference targets in the morning, and the average over the days.",
@@ -179,7 +179,7 @@ def _service(rows: list[dict[str, Any]], still: list[dict[str, Any]]) -> list[st
         f"loaded: accuracy, share inside, and the largest difference in points. Sets refused: {refused}.",
         "",
         "Without targets, intervals of the filter hold more than they say: they allow for the drift of the type, and",
-        "the sensors of the bench do not age. With a type that does not drift, either, those of the same axles hold",
+        "the sensors of the bench do not age. With a type without drift, those for the same axles hold",
         f"{_held(still, 'filter')} % by the filter and {_held(still, 'filter and sum')} % by filter and sum.",
         "What is shared no number of days averages away.",
         "",
@@ -313,8 +313,8 @@ def _coverage(rows: list[dict[str, Any]]) -> list[str]:
         + "; ".join(f"{row['case']} ({row['silent']} of {row['count']})" for row in low)
         + "."
         if low
-        else f"In every row, intervals hold at least {100 * ENOUGH:g} % on both days, or every sensor of which they do "
-        "not is warned of."
+        else f"In every row, intervals hold at least {100 * ENOUGH:g} % on both days on average, or every sensor whose "
+        "intervals hold less is warned of."
     )
     plain = next(row for row in rows if row["case"] == "as its type")
     beyond, days = plain["beyond"]
@@ -325,9 +325,9 @@ def _coverage(rows: list[dict[str, Any]]) -> list[str]:
         f"{EACH} measurements on each of {DAYS_BEFORE} days, which scatter by 0.3 mm, of a sensor of the type",
         "equation 5a with one thing wrong; errors of the days of 0.12 mm over 2 mm. The shares of true clearances",
         "inside the 95 % intervals, on the last of these days, whose curve is followed, and on the day after. Warned",
-        "of: by the fit, by an alarm of the sensor's health, or by its notice. *Step told*: the fit says that it",
-        "stepped; *possible*: it may have, or has. *Noticed*: the last day's shift is beyond the warning limit of",
-        f"{WARNING_LIMIT:g} standard deviations and within that of an alarm.",
+        "of: by the fit, by an alarm of the sensor's health, or by its notice. *Step told*: the fit says that the",
+        "sensor stepped; *possible*: that it stepped or may have. *Noticed*: the shift of the last day is beyond the",
+        f"warning limit of {WARNING_LIMIT:g} standard deviations, but not beyond the limit of an alarm.",
         f"*Silent*: sensors of whose readings less than {100 * ENOUGH:g} % are inside on one of the days, and of which",
         "nothing is said. The error of one day is common to all of its readings, so that some of these are among",
         "sensors of which 95 % hold on average.",
@@ -337,10 +337,11 @@ def _coverage(rows: list[dict[str, Any]]) -> list[str]:
         "A step is looked for on each of the last ten days: the evidence of one, divided by their number, must be a",
         "hundred times that of none before it is told, which a sensor of the type does at most once in 100 fits",
         f"(Markov's inequality; here {plain['step']} of {plain['count']}). One of 0.3 V is 0.2 mm, less than twice the",
-        "error of a day, and on its first day often cannot be told from one. Where it is as probable as none, that is",
-        f"said (of sensors as their type for {plain['possible']} of {plain['count']}), the curve is the mean of both",
-        "by their probabilities, and intervals hold in either case; past doubt, both are those with the step.",
-        f"Beyond the warning limit are, by chance, {beyond} of {days} days of sensors as their type, {rate}.",
+        "error of a day, and on its first day often cannot be told from one. Where a step is as probable as none, a",
+        f"warning says so (for {plain['possible']} of {plain['count']} sensors as their type), the curve is the mean",
+        "of those with and without the step, weighted by their probabilities, and intervals hold in either case. Where",
+        "there is no doubt, curve and intervals are those with the step. By chance,",
+        f"{beyond} of {days} days of sensors as their type are beyond the warning limit, {rate}.",
         "[health.md](health.md) says how soon later days tell a step.",
         "The warning of a sensor as its type is that so few measurements do not say how far an error of a day reaches.",
         "",

@@ -294,10 +294,10 @@ The picture is of an emulated sensor that is turned on day 60.
   less {allowance:g}; the alarm is at {decision:g}.
 - **Scatter**: the same for the scatter, upwards.
 
-Within the limit of a step there is a warning limit. Where the offset of the last day is {warning:g} standard deviations
-or more, a notice says by how many mm the sensor reads differently, that one day in 20 is beyond the limit by chance
-([how many did](days.md#sensors-that-are-not-as-their-type)), and that after a step intervals may not hold until another
-day is measured. It is no alarm, and the exit status is 0.
+Below the limit of a step there is a warning limit. If the offset of the last day is {warning:g} standard deviations or
+more, a notice says by how many mm the sensor reads differently, that one day in 20 is beyond the limit by chance
+([how many were](days.md#sensors-that-are-not-as-their-type)), and that, if the sensor has stepped, intervals may not
+hold until another day is measured. A notice is no alarm: the exit status is 0.
 
 Readings at the sensor's rail do not count, nor do measurements off the plane of their own day; `add` tells how many
 are off the curve that it fits to all days, which may be others. The first day is held against the type only, and

@@ -1,4 +1,4 @@
-"""Co-simulation of a chain: the top with all cores, against the integer models of the stages one behind the other."""
+"""Co-simulation of a chain: the top with all cores, against the integer models of the stages in series."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Chains: proven designs one behind the other, each with its own rate, and one bound from end to end."""
+"""Chains: proven designs in series, each at its own rate, with one end-to-end bound."""

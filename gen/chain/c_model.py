@@ -1,4 +1,4 @@
-"""The C model of a chain: the models of its stages, one behind the other."""
+"""The C model of a chain: the models of its stages, in series."""
 
 from __future__ import annotations
 

@@ -262,12 +262,15 @@ class _Budget:
         return Port(name=ANY_OUTPUT.name, bits=bits, signed=True, lsb=step, zero=Fraction(0), unit=self.last.unit)
 
     def _core(self, spec: Specification, stage: StageSpec) -> CoreDesign:
-        return design_core(
-            spec,
-            core="calibration" if stage.core == "calibration" else None,
-            board=self.board,
-            progress=lambda step: self.progress(f"stage {stage.name}: {step}"),
-        )
+        try:
+            return design_core(
+                spec,
+                core="calibration" if stage.core == "calibration" else None,
+                board=self.board,
+                progress=lambda step: self.progress(f"stage {stage.name}: {step}"),
+            )
+        except ShortfallError as error:
+            raise ShortfallError(f"stage {stage.name}: {error}") from None
 
     def _coarser(self, chain: ChainDesign, k: int) -> ChainDesign | None:
         """Design the chain with one bit less behind a stage; None if the whole then errs by too much."""

@@ -1,18 +1,19 @@
-"""Tables of a chain: its stages, its error budget and what folds."""
+"""Tables of a chain: its stages, its error budget and its aliasing."""
 
 from __future__ import annotations
 
 import math
+from fractions import Fraction
 
 from sosmith.gen.chain.design import ChainDesign
 from sosmith.gen.facts.design_tables import ErrorUnit
 from sosmith.gen.facts.table import Fact, Table
 from sosmith.gen.filter.largest_gain import Peak
-from sosmith.gen.quantity import count, frequency, plain_number, scale
+from sosmith.gen.quantity import count, decibels, frequency, plain_number, scale
 
 
 def chain_tables(design: ChainDesign) -> list[Table]:
-    """Say what the stages are, what the bound is made of, and what folds."""
+    """Say what the stages are, what the bound is made of, and how much aliases."""
     tables = [_stages(design), _budget(design)]
     if design.folding is not None:
         tables.append(_folding(design, design.folding))
@@ -28,15 +29,15 @@ def _stages(design: ChainDesign) -> Table:
         rows.append(
             (
                 stage.spec.name,
-                f"{stage.spec.kind} at {frequency(float(stage.spec.rate))}"
-                + (f", one of {factor}" if factor > 1 else ""),
-                f"{hardware}, {count(architecture.multiplier_blocks, 'multiplier block')}",
+                f"{stage.spec.kind} at {_frequency(stage.spec.rate)}"
+                + (f", decimates by {factor}" if factor > 1 else ""),
+                f"{hardware}, {count(architecture.multiplier_blocks, 'multiplier')}",
                 plain_number(float(architecture.clocks_per_sample)),
                 str(stage.output.bits),
             )
         )
     head = ("stage", "what it is", "hardware", "clocks a sample", "bits out")
-    return Table(f"{design.name}: chain", rows, head, numbers=(3, 4))
+    return Table(f"{design.name}: stages", rows, head, numbers=(3, 4))
 
 
 def _budget(design: ChainDesign) -> Table:
@@ -58,8 +59,8 @@ def _budget(design: ChainDesign) -> Table:
         (name, "", "", shown.number(float(value)), f"{float(value) / step:.4f}")
         for name, value in (("sum", design.bound), ("allowed", base.max_error))
     ]
-    head = ("stage", shown.titled("error at most"), "gain to the end", shown.titled("adds"), "in LSB")
-    title = "Error budget from end to end, proven for all inputs in range"
+    head = ("stage", shown.titled("error at most"), "gain to the end", shown.titled("adds"), "LSB")
+    title = "End-to-end error budget, proven for all inputs in range"
     return Table(title, rows, head, {"sum": "bold"}, numbers=(1, 2, 3, 4))
 
 
@@ -67,26 +68,33 @@ def _folding(design: ChainDesign, folding: Peak) -> Table:
     rate = design.spec.base.sample_rate
     rows = [
         Fact(
-            "Samples for each result",
+            "Input samples for each result",
             str(design.factor),
-            sentence=f"results at {frequency(float(rate / design.factor))}",
+            sentence=f"output rate {_frequency(rate / design.factor)}",
         ),
         Fact(
-            f"Anything above {frequency(float(rate / (2 * design.factor)))}",
+            f"From above {_frequency(rate / (2 * design.factor))}",
             _decibels(folding),
-            sentence=f"reached at {frequency(float(folding.at * rate))}",
+            sentence=f"reached at {_frequency(folding.at * rate)}",
         ),
     ]
     if design.passing is not None and design.spec.edge is not None:
         rows.append(
             Fact(
-                f"Into the pass band, up to {frequency(float(design.spec.edge))}",
+                f"Into the pass band, up to {_frequency(design.spec.edge)}",
                 _decibels(design.passing),
-                sentence=f"reached at {frequency(float(design.passing.at * rate))}",
+                sentence=f"reached at {_frequency(design.passing.at * rate)}",
             )
         )
-    return Table("What folds, proven: the largest gain from end to end", rows)
+    return Table("Aliasing: largest end-to-end gain, proven", rows)
 
 
 def _decibels(peak: Peak) -> str:
-    return f"{20 * math.log10(peak.gain):.2f} dB"
+    return decibels(20 * math.log10(peak.gain))
+
+
+def _frequency(value: Fraction) -> str:
+    """Frequency with its unit: the rates of a chain lie far apart, and below 1 MHz kHz reads best."""
+    if 1000 <= value < 1_000_000:
+        return f"{float(value / 1000):.6g} kHz"
+    return frequency(float(value))

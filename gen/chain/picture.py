@@ -1,4 +1,4 @@
-"""A chain as a picture: its gain from end to end, that of each stage, and the limit of what folds, as SVG or PNG."""
+"""A chain as a picture: its end-to-end gain, that of each stage, and the limit of its aliasing, as SVG or PNG."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def chain_plot(design: ChainDesign, file_format: str) -> bytes:
             most = level(np.array([float(design.folding.gain)]))[0]
             axes.axvspan(edge, float(frequency[-1]), facecolor=_RED, alpha=0.08, lw=0)
             axes.plot(
-                [edge, float(frequency[-1])], [most, most], color=_RED, lw=1.2, ls="--", label="limit of what folds"
+                [edge, float(frequency[-1])], [most, most], color=_RED, lw=1.2, ls="--", label="proven aliasing limit"
             )
         axes.set(xlabel="frequency at the input", ylabel="gain (dB)")
         axes.set_title(f"Chain {design.name}", loc="left")

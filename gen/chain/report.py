@@ -138,7 +138,7 @@ def _db(gain: float) -> float | None:
 
 
 def _response_figure(design: ChainDesign) -> Figure:
-    """Draw the gain of the whole from the input on, and where frequencies begin to fold."""
+    """Draw the gain of the whole from the input on, and where aliasing begins."""
     frequency = frequencies(design)
     whole = level(np.abs(chain_gain(design, frequency)))
 
@@ -148,20 +148,19 @@ def _response_figure(design: ChainDesign) -> Figure:
         if design.folding is not None:
             edge = float(design.spec.base.sample_rate) / (2 * design.factor)
             axes.axvspan(edge, float(frequency[-1]), facecolor=COLOUR["limit"], alpha=0.12, lw=0)
-            axes.axhline(
-                float(level(np.array([float(design.folding.gain)]))[0]), color=COLOUR["limit"], lw=1.4, ls="--"
-            )
+            most = level(np.array([float(design.folding.gain)]))[0]
+            axes.plot([edge, float(frequency[-1])], [most, most], color=COLOUR["limit"], lw=1.4, ls="--")
         axes.set_ylabel("gain in dB")
         axes.set_xlabel("frequency at the input")
         frequency_axis(axes, frequency)
 
-    legend = [("hardware", "", "exact response from end to end")]
-    caption = "Gain of a sine at the input to what comes out of it."
+    legend = [("hardware", "", "exact end-to-end response")]
+    caption = "Gain from a sine at the input to the sine at the output."
     if design.folding is not None:
-        legend.append(("limit", "dashed", "proven limit of what folds"))
-        caption += " In the shaded band it comes out at a lower frequency."
+        legend.append(("limit", "dashed", "proven aliasing limit"))
+        caption += " In the shaded band the output is an alias, at a lower frequency."
     return Figure(
-        title="The chain's response",
+        title="Gain of the chain",
         drawing=draw("chain", "Gain against frequency", NARROW, PANEL_HEIGHT, paint),
         caption=caption,
         legend=legend,
@@ -183,7 +182,7 @@ def _stages_figure(design: ChainDesign) -> Figure:
 
     height = max(PANEL_HEIGHT, 110 * len(filters))
     return Figure(
-        title="Its stages",
+        title="Gain of each stage",
         drawing=draw("stages", "Gain of each stage against frequency", NARROW, height, paint),
-        caption="Gain of each stage in dB for a sine at the input of the chain, folded by the stages before it.",
+        caption="Gain of each stage for a sine at the input of the chain, aliased by the stages before it.",
     )

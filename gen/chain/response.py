@@ -1,4 +1,4 @@
-"""The exact response of stages one behind the other, at the rate of the first: gains to the end, and what folds.
+"""The exact response of stages in series, at the rate of the first: gains to the end, and aliasing.
 
 A stage filters, hands on every R-th of its results, or both. By the noble identity, filtering after that is the same as
 filtering with ``z**R`` before it. So stages together are one filter at the rate of the first of them, of which every
@@ -58,7 +58,7 @@ def factor_of(parts: Sequence[Part]) -> int:
 
 
 def peak_gain(parts: Sequence[Part]) -> Fraction:
-    """Sum of the magnitudes of the response of parts one behind the other, rounded up a little."""
+    """Sum of the magnitudes of the response of parts in series, rounded up a little."""
     response, step = IMPULSE, 1
     for part in parts:
         for numerator, denominator in part.sections:

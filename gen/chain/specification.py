@@ -17,7 +17,17 @@ from sosmith.gen.specification.choices import AUTO, FIR_FAMILIES, MAX_DECIMATION
 from sosmith.gen.specification.combinations import check_chain
 from sosmith.gen.specification.specification import STAGE, Specification, from_tree, parsed, text_of, to_json
 from sosmith.gen.specification.toml_text import toml_text
-from sosmith.gen.specification.values import UnfitError, choice, identifier, literal, number, together, whole
+from sosmith.gen.specification.values import (
+    IDENTIFIER,
+    UnfitError,
+    choice,
+    identifier,
+    literal,
+    number,
+    one_of,
+    together,
+    whole,
+)
 from sosmith.model.errors import SpecificationError
 from sosmith.model.port import Port
 from sosmith.model.suggestion import did_you_mean
@@ -112,7 +122,7 @@ class StageSpec:
             | {"unit": output.unit}
             | ({} if max_error is None else {"max_error": decimal(max_error)}),
             "hardware": {"clock": decimal(chain.base.hardware.clock)}
-            | {key: hardware[key] for key in _OF_HARDWARE if key in hardware and key != "realization"}
+            | {key: hardware[key] for key in (*_OF_HARDWARE, "keep") if key in hardware}
             | dict(self.hardware),
         }
         return from_tree(tree, chain.base.path.parent / f"{chain.base.path.name}: stage {self.name}")
@@ -221,6 +231,12 @@ def _checked(tree: dict[str, Any], path: Path, text: str | None) -> ChainSpec:
         common["calibration"] = {key: stages[0][key] for key in _KEYS["polynomial"] if key in stages[0]}
     base = from_tree(common | {"filter": _WIRE}, path)
     check_chain(base)
+    if base.hardware.realization != AUTO:
+        raise UnfitError(
+            "left out with [[stage]], as every stage has its own",
+            literal(base.hardware.realization),
+            where="hardware.realization",
+        )
     read, rate, findings = [], base.sample_rate, []
     for k, stage in enumerate(stages):
         try:
@@ -247,8 +263,10 @@ def _checked(tree: dict[str, Any], path: Path, text: str | None) -> ChainSpec:
 
 
 def _kind(stage: Mapping[str, Any], k: int) -> str:
+    if "kind" not in stage:
+        raise UnfitError(one_of(KINDS), "missing", where=f"stage[{k}].kind")
     try:
-        return choice(KINDS)(stage.get("kind", "missing"))
+        return choice(KINDS)(stage["kind"])
     except UnfitError as unfit:
         raise unfit.inside(f"stage[{k}].kind") from None
 
@@ -267,14 +285,16 @@ def _stage(table: Mapping[str, Any], kind: str, k: int, rate: Fraction) -> Stage
                 f"an unknown one{did_you_mean(key, known)}",
                 where=f"{where}.{key}",
             )
+    if "name" not in table:
+        raise UnfitError(IDENTIFIER, "missing", where=f"{where}.name")
     try:
-        name = identifier(table.get("name", "missing"))
+        name = identifier(table["name"])
     except UnfitError as unfit:
         raise unfit.inside(f"{where}.name") from None
     if kind == "polynomial" and k > 0:
         raise UnfitError(
-            "another kind behind the first stage, as a polynomial makes of an error another one for each value",
-            "polynomial",
+            "another kind after the first stage, as the gain of a polynomial differs from value to value",
+            literal(kind),
             where=f"{where}.kind",
         )
     factor = _factor(table, kind, where)
@@ -294,7 +314,7 @@ def _factor(table: Mapping[str, Any], kind: str, where: str) -> int:
         raise UnfitError("given for a CIC filter", "missing", where=f"{where}.decimate")
     if table.get("decimate") == AUTO:
         raise UnfitError(
-            "a whole number in a stage, as the rates of the stages behind it follow from it",
+            "a whole number in a stage, as the rates of the stages after it follow from it",
             literal(AUTO),
             where=f"{where}.decimate",
         )
@@ -309,7 +329,7 @@ def _factor(table: Mapping[str, Any], kind: str, where: str) -> int:
 def _check_rate(rate: Fraction, where: str) -> None:
     if not _is_decimal(rate):
         raise UnfitError(
-            "at a rate that is a decimal number, in which its edges can be compared",
+            "at a rate that is a finite decimal in Hz, so that its edges compare exactly",
             f"at {literal(rate)} Hz",
             where=where,
         )
@@ -356,9 +376,11 @@ def _by_bands(given: Mapping[str, Any]) -> bool:
 
 
 def _cic(table: Mapping[str, Any], where: str, factor: int) -> list[Decimal]:
-    """Taps of moving sums of `factor` samples one behind the other, whose gain at zero frequency is 1."""
+    """Taps of moving sums of `factor` samples in series, whose gain at zero frequency is 1."""
+    if "order" not in table:
+        raise UnfitError("given for a CIC filter", "missing", where=f"{where}.order")
     try:
-        order = whole(1, 12)(table.get("order"))
+        order = whole(1, 12)(table["order"])
     except UnfitError as unfit:
         raise unfit.inside(f"{where}.order") from None
     if factor & (factor - 1):
@@ -367,8 +389,8 @@ def _cic(table: Mapping[str, Any], where: str, factor: int) -> list[Decimal]:
         )
     if order * (factor - 1) + 1 > MAX_TAPS:
         raise UnfitError(
-            f"such that order * (decimate - 1) is below {MAX_TAPS}, as a CIC filter is built as the FIR filter that it "
-            "is; two stages one behind the other decimate further",
+            f"such that order * (decimate - 1) is below {MAX_TAPS}, as a CIC filter is built as an FIR filter; two "
+            "stages in series decimate further",
             literal(factor),
             where=f"{where}.decimate",
         )
@@ -389,7 +411,7 @@ def _edge(table: Mapping[str, Any], kind: str) -> Fraction | None:
 def _check_names(names: list[str]) -> None:
     for k, name in enumerate(names):
         if name in names[:k]:
-            raise UnfitError("another name than those of the stages before", literal(name), where=f"stage[{k}].name")
+            raise UnfitError("different from the names of the stages before", literal(name), where=f"stage[{k}].name")
         for other in names:
             if name.startswith(f"{other}_"):
                 raise UnfitError(
@@ -405,7 +427,7 @@ def _check_steps(chain: ChainSpec) -> None:
     fits = not ratio.numerator & (ratio.numerator - 1) and not ratio.denominator & (ratio.denominator - 1)
     if all(stage.needs_powers_of_two for stage in chain.stages) and not fits:
         raise UnfitError(
-            "such that one LSB of the input is a power of two of those of the output, as all stages are FIR filters "
+            "such that the ratio of the LSBs of input and output is a power of two, as all stages are FIR filters "
             "that decimate",
             literal([chain.base.output.lsb * code for code in _ends(chain.base.output)]),
             where="output.range",

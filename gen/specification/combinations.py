@@ -244,18 +244,18 @@ ONLINE = Terms(
 TERMS = {terms.name: terms for terms in (PARALLEL, FOLDED, SERIAL, ONLINE)}
 """All architectures by name; `sosmith.gen.architectures.registry` has a class for each."""
 
-_OF_ONE_CORE = "the bound of a chain holds for constants that stay, and registers are those of one core"
+_OF_ONE_CORE = "the bound of a chain holds for fixed coefficients, and the registers are those of one core"
 CHAIN = Terms(
     "chain",
     {
         RELOAD: Refusal(Verdict.LATER, _OF_ONE_CORE),
         PROTECT: Refusal(
-            Verdict.LATER, "a fault is a flag of a stage's own results, which the next stage does not hand on"
+            Verdict.LATER, "the flag fault is of a stage's own results, which the next stage does not pass on"
         ),
-        SEVERAL: Refusal(Verdict.LATER, "a stage behind one that decimates has no beats of several samples"),
-        LOOK_AHEAD: Refusal(Verdict.LATER, "a chain has no rule yet for which of its stages need it"),
+        SEVERAL: Refusal(Verdict.LATER, "a stage after one that decimates gets single samples, not beats of several"),
+        LOOK_AHEAD: Refusal(Verdict.LATER, "there is no rule yet for which stages of a chain need it"),
         ZERO: Refusal(
-            Verdict.LATER, "the flag settling is of a stage's own results, which the next stage does not hand on"
+            Verdict.LATER, "the flag settling is of a stage's own results, which the next stage does not pass on"
         ),
     },
 )

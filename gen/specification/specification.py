@@ -277,7 +277,7 @@ def from_tree(tree: dict[str, Any], path: Path) -> Specification:
     try:
         if STAGE in tree:
             raise UnfitError(
-                "left out here, as a chain is for design, generate, simulate and verify alone",
+                "left out here, as only design, generate, simulate and verify take a chain",
                 literal(tree[STAGE]),
                 where=STAGE,
                 later=True,

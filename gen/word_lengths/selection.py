@@ -81,7 +81,8 @@ class Selection:
         Raises
         ------
         ShortfallError
-            If none meets the specification; gives the reason of `BEST_KEPT`, by name if the reasons differ.
+            If none meets the specification; gives the reason of `BEST_KEPT`, or of the first that suits the
+            architecture, by name if the reasons differ.
         """
         failures: dict[str, str] = {}
         floors = self._floors(failures)
@@ -90,7 +91,8 @@ class Selection:
         while promising := self._promising(floors, math.inf if best is None else best[0], failures):
             best = self._smallest(promising, best, accept, failures)
         if best is None:
-            best_kept = BEST_KEPT if BEST_KEPT in failures else next(iter(failures))
+            suited = [name for name in failures if name not in unsuited] or [*failures]
+            best_kept = BEST_KEPT if BEST_KEPT in suited else suited[0]
             with_best = "" if len(set(failures.values())) == 1 else f"with {best_kept}, "
             raise ShortfallError(
                 f"none of the {len(failures)} realizations meets the specification: {with_best}{failures[best_kept]}"

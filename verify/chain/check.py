@@ -274,7 +274,7 @@ def _scope(
     for name in next(iter(stages.values())).scope:
         scope[name] = _together({stage: each.scope[name] for stage, each in stages.items()})
     gains = "each stage's error and its gain to the end bound the whole, and no port between stages limits what passes"
-    folds = "; no frequency that folds has more than the gains that are claimed" if chain.folding is not None else ""
+    folds = "; no alias has more than the gains that are claimed" if chain.folding is not None else ""
     chained = {"chain": ScopePart(State.PROVEN, gains + folds)}
     if specified:
         chained["stages"] = ScopePart(State.PROVEN, "each stage is the one that the words of the chain ask for")

@@ -90,6 +90,8 @@ def load_report(path: Path) -> dict[str, Any]:
     content = read_json(file, what="a report.json, or a folder that holds one,", parse_constant=_refuse_constant)
     if content is None:
         raise SpecificationError(f"{file} must be a report.json of sosmith, not text that is no JSON")
+    if isinstance(content, dict) and content.get("core") == "chain":
+        raise SpecificationError(f"{file} must be the report of a single core, not that of a chain of stages")
     problem = _problem(content)
     if problem:
         raise SpecificationError(f"{file} must be a report.json of sosmith, not JSON {problem}")

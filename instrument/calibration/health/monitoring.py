@@ -76,8 +76,8 @@ class Notice:
         """What is to be known of it."""
         way = "more" if self.shift > 0 else "less"
         return (
-            f"{self.date}: the sensor reads {abs(self.shift):.2g} mm {way} than by the days before, "
-            f"{abs(self.deviations):.1f} times what a day scatters by; beyond {WARNING_LIMIT:g} is one day in 20 by "
+            f"{self.date}: the sensor reads {abs(self.shift):.2g} mm {way} than the days before predict, "
+            f"{abs(self.deviations):.1f} standard deviations of a day; one day in 20 is beyond {WARNING_LIMIT:g} by "
             "chance; if the sensor has stepped, intervals may not hold until another day is measured"
         )
 

@@ -28,7 +28,7 @@ def refuse(**options: Any) -> None:
     for name, value in options.items():
         if value is not None and value is not False:
             raise SpecificationError(
-                f"--{name.replace('_', '-')} must be left out with a chain of stages, as it is about a single core"
+                f"--{name.replace('_', '-')} must be left out with a chain of stages, as it is for a single core only"
             )
 
 
@@ -40,7 +40,7 @@ def show_chain(
 
     with show_progress() as step:
         chain = design_chain(asked, board=board, progress=step)
-        step("what folds", 0, 0)
+        step("aliasing", 0, 0)
         tables = [] if as_json else chain.tables(details=details)
         if plot is not None:
             step("drawing", 0, 0)

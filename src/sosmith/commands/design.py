@@ -80,7 +80,8 @@ def design_command(
     """Show the design of SPEC: order, realization, architecture, cost and error budget.
 
     With --board, it is built for that board as `sosmith build` does, which takes some tens of seconds the first time,
-    and the cells are those that it takes there, with the serial link.
+    and the cells are those that it takes there, with the serial link. A chain of stages is not built: --board only
+    says which multipliers there are, and --details shows the cost of each stage.
 
     \b
         sosmith design my.toml
@@ -136,8 +137,8 @@ def generate_command(
 ) -> None:
     """Write SystemVerilog, RTLIL, a manifest, a certificate and a bit-true C model for SPEC.
 
-    Prints the paths of the files to stdout, one per line. Two runs write identical files. A chain of stages has the
-    files of each stage as well.
+    Prints the paths of the files to stdout, one per line. Two runs write identical files. For a chain of stages,
+    the files of each stage are written as well.
 
     \b
         sosmith generate my.toml -o my_core

@@ -83,7 +83,7 @@ def verify(
     follow exactly, or anything that it is held against disagrees, and with 4 if nothing is wrong but a part of what was
     asked for is not proven: the table says which, and why.
 
-    The certificate of a chain names those of its stages, which lie beside it and are proven with it.
+    The certificate of a chain names those of its stages, which must lie in the same folder and are proven with it.
 
     \b
         sosmith verify my_core/my.certificate.json

@@ -36,7 +36,7 @@ def test_a_chain_from_the_specification_to_the_proof(sosmith: Command) -> None:
     Path("rx.toml").write_text(CHAIN, encoding="utf-8")
     shown = sosmith("design", "rx.toml", "--plot", "rx.svg")
     assert (shown.status, Path("rx.svg").exists()) == (0, True)
-    assert "Error budget from end to end" in shown.stdout
+    assert "End-to-end error budget" in shown.stdout
     tree = json.loads(sosmith("design", "rx.toml", "--json").stdout)
     assert [stage["name"] for stage in tree["stages"]] == ["slow", "out"]
     assert tree["folding"]["anywhere"]["gain"] > 0
@@ -76,7 +76,7 @@ def test_options_of_a_single_core_are_refused(sosmith: Command) -> None:
         refused = sosmith(command[0], "rx.toml", *command[1:])
         assert refused.status == 2
         assert refused.messages == [
-            f"sosmith: error: {command[1]} must be left out with a chain of stages, as it is about a single core"
+            f"sosmith: error: {command[1]} must be left out with a chain of stages, as it is for a single core only"
         ]
 
 
@@ -85,6 +85,6 @@ def test_other_commands_say_that_they_take_no_chain(sosmith: Command) -> None:
     refused = sosmith("explore", "rx.toml")
     assert refused.status == 2
     assert refused.messages[-1] == (
-        "sosmith: error: rx.toml: not yet available: stage must be left out here, as a chain is for design, generate, "
-        "simulate and verify alone, not [a table, a table]"
+        "sosmith: error: rx.toml: not yet available: stage must be left out here, as only design, generate, simulate "
+        "and verify take a chain, not [a table, a table]"
     )

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 import sosmith
+from sosmith.gen.chain.specification import ANY_INPUT, ANY_OUTPUT
 from sosmith.model.errors import SpecificationError
 
 TREE: dict[str, Any] = {
@@ -84,31 +85,40 @@ REFUSED: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
     ),
     "polynomial": (
         stage(1, kind="polynomial", passband_edge=None, passband_loss=None, stopband_loss=None),
-        "stage[1].kind must be another kind behind the first stage, as a polynomial makes of an error another one for "
-        "each value, not polynomial",
+        "stage[1].kind must be another kind after the first stage, as the gain of a polynomial differs from value to "
+        "value, not 'polynomial'",
     ),
     "auto": (
         stage(2, decimate="auto"),
-        "stage[2].decimate must be a whole number in a stage, as the rates of the stages behind it follow from it, not "
+        "stage[2].decimate must be a whole number in a stage, as the rates of the stages after it follow from it, not "
         "'auto'",
     ),
     "cic without": (stage(0, decimate=None), "stage[0].decimate must be given for a CIC filter, not missing"),
+    "no kind": (
+        stage(0, kind=None),
+        "stage[0].kind must be one of polynomial, gain, iir, fir, halfband, cic, not missing",
+    ),
+    "no order": (stage(0, order=None), "stage[0].order must be given for a CIC filter, not missing"),
     "cic by 3": (
         stage(0, decimate=3),
         "stage[0].decimate must be a power of two for a CIC filter, whose weights are then exact, not 3",
     ),
     "long cic": (
         stage(0, order=5, decimate=64),
-        "stage[0].decimate must be such that order * (decimate - 1) is below 256, as a CIC filter is built as the FIR "
-        "filter that it is; two stages one behind the other decimate further, not 64",
+        "stage[0].decimate must be such that order * (decimate - 1) is below 256, as a CIC filter is built as an FIR "
+        "filter; two stages in series decimate further, not 64",
     ),
     "same name": (
         stage(1, name="slow"),
-        "stage[1].name must be another name than those of the stages before, not 'slow'",
+        "stage[1].name must be different from the names of the stages before, not 'slow'",
     ),
     "begins": (
         stage(1, name="slow_down"),
         "stage[1].name must be a name that does not begin with slow_, as parts of the stage slow do, not 'slow_down'",
+    ),
+    "no name": (
+        stage(1, name=None),
+        "stage[1].name must be a Verilog identifier of at most 64 letters, digits and underscores, not missing",
     ),
     "family": (
         stage(2, family="kaiser"),
@@ -116,7 +126,7 @@ REFUSED: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
     ),
     "rate": (
         lambda tree: tree["stage"].insert(0, {"name": "third", "kind": "fir", "taps": [1], "decimate": 3}),
-        "stage[1] must be at a rate that is a decimal number, in which its edges can be compared, not at "
+        "stage[1] must be at a rate that is a finite decimal in Hz, so that its edges compare exactly, not at "
         "2666.6666666666665 Hz",
     ),
     "filter": (
@@ -127,25 +137,34 @@ REFUSED: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
     "none": (lambda tree: tree.update(stage=[]), "stage must be a list of 1 to 8 tables [[stage]], not 0 of them"),
     "reload": (
         hardware(reload=True),
-        "not yet available: hardware.reload must be false with [[stage]], as the bound of a chain holds for constants "
-        "that stay, and registers are those of one core, not true",
+        "not yet available: hardware.reload must be false with [[stage]], as the bound of a chain holds for fixed "
+        "coefficients, and the registers are those of one core, not true",
+    ),
+    "realization": (
+        hardware(realization="df1"),
+        "hardware.realization must be left out with [[stage]], as every stage has its own, not 'df1'",
     ),
     "protect": (
         hardware(protect="detect"),
-        "not yet available: hardware.protect must be 'none' with [[stage]], as a fault is a flag of a stage's own "
-        "results, which the next stage does not hand on, not 'detect'",
+        "not yet available: hardware.protect must be 'none' with [[stage]], as the flag fault is of a stage's own "
+        "results, which the next stage does not pass on, not 'detect'",
     ),
     "start": (
         hardware(start="zero"),
         "not yet available: hardware.start must be 'steady' with [[stage]], as the flag settling is of a stage's own "
-        "results, which the next stage does not hand on, not 'zero'",
+        "results, which the next stage does not pass on, not 'zero'",
     ),
     "samples": (
         hardware(samples_per_clock=2),
-        "not yet available: hardware.samples_per_clock must be 1 with [[stage]], as a stage behind one that decimates "
-        "has no beats of several samples, not 2",
+        "not yet available: hardware.samples_per_clock must be 1 with [[stage]], as a stage after one that decimates "
+        "gets single samples, not beats of several, not 2",
     ),
 }
+
+
+def test_names_are_kept_in_every_stage() -> None:
+    chain = loaded(hardware(keep=True)).checked
+    assert all(stage.ordinary(chain, (ANY_INPUT,), ANY_OUTPUT).hardware.keep for stage in chain.stages)
 
 
 @pytest.mark.parametrize("name", REFUSED)
@@ -166,8 +185,8 @@ def test_a_chain_is_no_specification_of_a_core() -> None:
     with pytest.raises(SpecificationError) as refused:
         sosmith.Specification.load(TREE)
     assert str(refused.value) == (
-        "specification: not yet available: stage must be left out here, as a chain is for design, generate, simulate "
-        "and verify alone, not [a table, a table, a table, a table]"
+        "specification: not yet available: stage must be left out here, as only design, generate, simulate and verify "
+        "take a chain, not [a table, a table, a table, a table]"
     )
 
 
@@ -176,3 +195,15 @@ def test_an_error_that_is_too_small_is_refused() -> None:
     tree["output"] |= {"bits": 32, "max_error": 2.4e-10}
     with pytest.raises(sosmith.ShortfallError, match=r"stage \w+: .*"):
         sosmith.design_chain(tree)
+
+
+def test_a_clock_that_is_too_slow_is_refused_with_the_stage() -> None:
+    tree = copy.deepcopy(TREE)
+    tree["hardware"] = {"clock": 9000.0}
+    with pytest.raises(sosmith.ShortfallError) as refused:
+        sosmith.design_chain(tree)
+    assert str(refused.value) == (
+        "specification: stage slow: none of the 3 realizations meets the specification: with fir_symmetric, the folded "
+        "architecture takes 13 clocks for 4 samples: at a clock of 9,000 Hz the sample rate must be at most 2,769.23 "
+        "Hz, not 8,000 Hz"
+    )

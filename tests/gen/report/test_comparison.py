@@ -528,6 +528,14 @@ def test_load_refuses_what_is_no_report(tmp_path: Path, content: str, reason: st
         load_report(path)
 
 
+def test_load_refuses_the_report_of_a_chain(tmp_path: Path) -> None:
+    path = tmp_path / "report.json"
+    path.write_text(json.dumps({"name": "rx", "core": "chain"}), encoding="utf-8")
+    message = f"{path} must be the report of a single core, not that of a chain of stages"
+    with pytest.raises(SpecificationError, match=f"^{re.escape(message)}$"):
+        load_report(path)
+
+
 def test_load_refuses_bytes(tmp_path: Path) -> None:
     path = tmp_path / "report.json"
     path.write_bytes(b"\xff\xfe\x00")

@@ -180,10 +180,11 @@ def test_a_last_day_beyond_the_warning_limit_is_said() -> None:
         return "" if notice is None else notice.sentence
 
     assert said([0.0, 0.0, -2.5]) == (
-        "2024-03-03: the sensor reads 0.25 mm more than by the days before, 2.5 times what a day scatters by; beyond 2 "
-        "is one day in 20 by chance; if the sensor has stepped, intervals may not hold until another day is measured"
+        "2024-03-03: the sensor reads 0.25 mm more than the days before predict, 2.5 standard deviations of a day; one "
+        "day in 20 is beyond 2 by chance; if the sensor has stepped, intervals may not hold until another day is "
+        "measured"
     )
-    assert "the sensor reads 0.2 mm less than by the days before, 2.0 times" in said([0.0, WARNING_LIMIT])
+    assert "the sensor reads 0.2 mm less than the days before predict, 2.0 standard" in said([0.0, WARNING_LIMIT])
     assert said([0.0, WARNING_LIMIT - 0.01]) == said([0.0, -2.5, 0.0]) == said([2.5]) == ""
     assert said([0.0, STEP_LIMIT]) == ""  # that is an alarm
     assert said([0.0, 0.0, 2.5], first=3) == ""

@@ -441,7 +441,7 @@ def health_command(store: Path, sensor: str, since: str | None, plot: Path | Non
 
     Each day's measurements are predicted from the days before. Control charts of the differences raise alarms for a
     step of offset or gain, for drift, and for more scatter; a sentence says what explains the change best. A last day
-    that is between the warning limit and that of an alarm is said, too. Exits with 1 while an alarm stands.
+    between the warning limit and the limit of an alarm gets a notice. Exits with 1 while an alarm stands.
 
     \b
         sosmith calibrate health --sensor left --plot health.svg

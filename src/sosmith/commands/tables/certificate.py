@@ -61,7 +61,7 @@ def print_chain_proof(name: str, proof: ChainProof) -> None:
     """Print the proven error budget of a chain, and how much of each part is proven."""
     console = TableConsole()
     print_all(proof.tables())
-    console.print(f"[bold green]proven[/]: {escape(plain(name))}, from end to end")
+    console.print(f"[bold green]proven[/]: {escape(plain(name))}, end to end")
     if proof.files:
         console.print(f"[bold green]unchanged[/]: {proof.files} files and the certificates, by their SHA-256")
     _print_scope(console, proof)

@@ -31,7 +31,7 @@ class ChainProof(View):
     Attributes
     ----------
     bound : Quantity
-        Bound on the difference between hardware and exact result from end to end, for all inputs in range.
+        Bound on the end-to-end difference between hardware and exact result, for all inputs in range.
     budget : dict of str to Quantity
         What each stage adds to it.
     allowed, lsb : Quantity
@@ -76,7 +76,7 @@ class ChainProof(View):
 
 @dataclass(frozen=True)
 class ChainCertificate:
-    """What a chain claims: its stages' certificates by their digests, and one bound from end to end."""
+    """What a chain claims: its stages' certificates by their digests, and one end-to-end bound."""
 
     entries: Entries = field(repr=False)
     """The content of the certificate, as in its file."""

@@ -35,10 +35,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Chain(View):
-    """A chain of proven stages, with one bound from end to end, as returned by `design_chain`.
+    """A chain of proven stages, with one end-to-end bound, as returned by `design_chain`.
 
     Values are in physical units. Arrays hold one sample per row, shape (samples,) for one channel and (samples,
-    channels) for several; of results there is one for `factor` samples, the first with the first of them.
+    channels) for several; there is one result for every `factor` samples, at the first of them.
 
     Examples
     --------
@@ -75,17 +75,17 @@ class Chain(View):
 
     @property
     def stages(self) -> tuple[Design, ...]:
-        """The stages, each a design of its own, in the order of the samples."""
+        """The stages in order, each a design of its own."""
         return tuple(Design(stage.design) for stage in self.core.stages)
 
     @property
     def factor(self) -> int:
-        """Samples of a channel for each result."""
+        """Input samples of a channel for each result."""
         return self.core.factor
 
     @property
     def bound(self) -> Quantity:
-        """Proven bound on ``|hardware - exact|`` from end to end, for all inputs in range."""
+        """Proven end-to-end bound on ``|hardware - exact|``, for all inputs in range."""
         return self._in_unit(float(self.core.bound))
 
     @property
@@ -95,15 +95,15 @@ class Chain(View):
 
     @property
     def gains(self) -> dict[str, float]:
-        """How much of an error at each stage's output reaches the end at most, proven."""
+        """Proven factor by which an error at each stage's output grows at most on its way to the end."""
         return {stage.spec.name: float(stage.gain) for stage in self.core.stages}
 
     @property
     def folding(self) -> dict[str, tuple[float, float]]:
-        """Largest gains of what comes out at another frequency, and the frequencies in Hz where they are reached.
+        """Largest gains of aliases, and the frequencies in Hz at the input where they are reached.
 
-        "anywhere" is of all of it, "passband" of what comes out in the pass band, if a stage states one; empty for a
-        chain that does not decimate. Both are proven.
+        "anywhere" is for all aliases, "passband" for those that land in the pass band, if a stage states one. Both are
+        proven. Empty for a chain that does not decimate.
         """
         rate = self.core.spec.base.sample_rate
         peaks = {"anywhere": self.core.folding, "passband": self.core.passing}
@@ -122,7 +122,7 @@ class Chain(View):
         return ChainCertificate(chain_certificate(self.core))
 
     def frequency_response(self, f: npt.ArrayLike) -> npt.NDArray[np.complex128]:
-        """Return the complex gain from sines at the input to what comes out of them, folded or not.
+        """Return the complex gain from sines at the input to the sines at the output, aliased or not.
 
         Parameters
         ----------
@@ -214,7 +214,7 @@ class Chain(View):
         return ChainReport(write_chain_report(self.core, run, place), place, run)
 
     def plot(self, path: str | PathLike[str]) -> Path:
-        """Draw the gain of the chain and of its stages, and the limit of what folds, into a file; return its path.
+        """Draw the gains of the chain and of its stages, and the aliasing limit, into a file; return its path.
 
         Raises
         ------
@@ -230,7 +230,7 @@ class Chain(View):
         return written
 
     def tables(self, *, details: bool = False) -> list[Table]:
-        """Return what `sosmith design` shows: stages, error budget and what folds; with `details` each stage's own."""
+        """Return what `sosmith design` shows: stages, error budget and aliasing; with `details` each stage's own."""
         tables = chain_tables(self.core)
         if details:
             for stage in self.stages:
@@ -238,7 +238,7 @@ class Chain(View):
         return tables
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the `manifest`, and what folds."""
+        """Return the `manifest`, and `folding`."""
         return self.manifest | {
             "folding": {name: {"gain": gain, "at": at} for name, (gain, at) in self.folding.items()}
         }
@@ -266,7 +266,7 @@ def design_chain(
     board: str | None = None,
     progress: Progress = lambda step, done, total: None,
 ) -> Chain:
-    """Design a chain: formats between the stages, each stage by itself, and prove the error from end to end.
+    """Design a chain: the formats between stages and each stage by itself; and prove the end-to-end error.
 
     Parameters
     ----------

@@ -65,7 +65,7 @@ class ChainSpecification(View):
 
     @property
     def factor(self) -> int:
-        """Samples of a channel for each result."""
+        """Input samples of a channel for each result."""
         return self.checked.factor
 
     @property
