@@ -273,7 +273,9 @@ _APART: dict[tuple[Option, Option], Refusal] = {
     (LOOK_AHEAD, FEW_MULTIPLIERS): Refusal(
         Verdict.REFUSED, "all its products by constants are made of adders", only="'auto' or 0"
     ),
-    (RELOAD, FEW_MULTIPLIERS): _FIXED,
+    (RELOAD, FEW_MULTIPLIERS): Refusal(
+        Verdict.REFUSED, "which products take blocks follows from coefficients, and these change"
+    ),
 }
 """Options that do not go together, in the order in which messages tell them: of the second one's key."""
 
