@@ -338,7 +338,10 @@ def _tables(table: Mapping[str, Any], kind: str, where: str, rate: Fraction, fac
     if kind == "halfband":
         given |= {"family": "halfband"}
         if "passband_edge" in given:
-            edge = number(given["passband_edge"])
+            try:
+                edge = number(given["passband_edge"])
+            except UnfitError as unfit:
+                raise unfit.inside(f"{where}.passband_edge") from None
             given["stopband_edge"] = decimal(rate / 2 - edge)
     if "band" in table or kind == "halfband" or _by_bands(given):
         given["kind"] = table.get("band", "lowpass")
@@ -382,8 +385,10 @@ def _edge(table: Mapping[str, Any], kind: str) -> Fraction | None:
     """Upper edge of a low-pass filter's pass band, as far as it is a number."""
     if table.get("band", "lowpass") != "lowpass" or kind in {"polynomial", "gain", "cic"}:
         return None
-    edge = table.get("passband_edge", table.get("cutoff"))
-    return Fraction(edge) if isinstance(edge, int | Decimal) and not isinstance(edge, bool) else None
+    try:
+        return number(table.get("passband_edge", table.get("cutoff")))
+    except UnfitError:
+        return None
 
 
 def _check_names(names: list[str]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable
+from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -119,6 +120,20 @@ REFUSED: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
         "stage[1] must be at a rate that is a decimal number, in which its edges can be compared, not at "
         "2666.6666666666665 Hz",
     ),
+    "edge without a number": (
+        stage(1, passband_edge="300 Hz"),
+        "stage[1].passband_edge must be a number, not '300 Hz': write 300, without quotes and unit",
+    ),
+    **{
+        f"cutoff {cutoff}": (
+            stage(2, cutoff=Decimal(cutoff)),
+            f"stage low: filter.cutoff must be {wanted}, not {cutoff}",
+        )
+        for cutoff, wanted in (
+            ("nan", "a finite number"),
+            ("1e+999999999", "a number of at most 50 digits, zero or from 1e-30 to below 1e30 in size"),
+        )
+    },
     "filter": (
         lambda tree: tree.update(filter={"taps": [1.0]}),
         "filter must be left out with [[stage]], which takes name, sample_rate, channels, input, stage, output, "
