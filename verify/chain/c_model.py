@@ -45,7 +45,7 @@ def _decimates(core: Certificate) -> bool:
 
 def _fields(chain: ChainCertificate, cores: Sequence[Certificate]) -> Iterator[str]:
     for entry, core in zip(chain.stages, cores, strict=True):
-        yield f"{core.name}_{'decimator' if _decimates(core) else 'state'} {entry.name};"
+        yield f"{core.name}_{'decimator' if _decimates(core) else 'state'} stage_{entry.name};"
 
 
 def _calls(chain: ChainCertificate, cores: Sequence[Certificate]) -> Iterator[str]:
@@ -53,9 +53,9 @@ def _calls(chain: ChainCertificate, cores: Sequence[Certificate]) -> Iterator[st
     for k, (entry, core) in enumerate(zip(chain.stages, cores, strict=True)):
         flags = "status" if k == len(cores) - 1 else "NULL"
         if _decimates(core):
-            yield f"if (!{core.name}_push(&state->{entry.name}, {given}, result, {flags})) return 0;"
+            yield f"if (!{core.name}_push(&state->stage_{entry.name}, {given}, result, {flags})) return 0;"
         else:
-            yield f"*result = {core.name}_step(&state->{entry.name}, {given}, {flags});"
+            yield f"*result = {core.name}_step(&state->stage_{entry.name}, {given}, {flags});"
         given = "*result"
 
 
