@@ -22,6 +22,9 @@ from sosmith.model.errors import SpecificationError
 from sosmith.model.port import Port
 from sosmith.model.suggestion import did_you_mean
 
+MAX_FACTOR = 1 << 12
+"""Most samples for each result: the response from end to end is computed at the rate of the samples."""
+
 MAX_STAGES = 8
 """Most stages of a chain."""
 
@@ -39,6 +42,9 @@ _KEYS: dict[str, tuple[str, ...]] = {
 
 KINDS = tuple(_KEYS)
 _OF_HARDWARE = ("architecture", "realization", "multipliers")
+_OF_ALL = ("architecture", "multipliers", "keep")
+"""Keys of ``[hardware]`` that hold for all stages; the realization of one filter is none of another."""
+
 _TOP = ("name", "sample_rate", "channels", "input", STAGE, "output", "hardware")
 _WIRE = {"sos": [[1, 0, 0, 1, 0, 0]]}
 _EXACT = Context(prec=200, traps=[Inexact])
@@ -112,7 +118,7 @@ class StageSpec:
             | {"unit": output.unit}
             | ({} if max_error is None else {"max_error": decimal(max_error)}),
             "hardware": {"clock": decimal(chain.base.hardware.clock)}
-            | {key: hardware[key] for key in _OF_HARDWARE if key in hardware and key != "realization"}
+            | {key: hardware[key] for key in _OF_ALL if key in hardware}
             | dict(self.hardware),
         }
         return from_tree(tree, chain.base.path.parent / f"{chain.base.path.name}: stage {self.name}")
@@ -221,6 +227,12 @@ def _checked(tree: dict[str, Any], path: Path, text: str | None) -> ChainSpec:
         common["calibration"] = {key: stages[0][key] for key in _KEYS["polynomial"] if key in stages[0]}
     base = from_tree(common | {"filter": _WIRE}, path)
     check_chain(base)
+    if base.hardware.realization != AUTO:
+        raise UnfitError(
+            "left out with [[stage]], each of which has a realization of its own",
+            literal(base.hardware.realization),
+            where="hardware.realization",
+        )
     read, rate, findings = [], base.sample_rate, []
     for k, stage in enumerate(stages):
         try:
@@ -234,6 +246,7 @@ def _checked(tree: dict[str, Any], path: Path, text: str | None) -> ChainSpec:
     if findings:
         raise together(findings)
     _check_names([stage.name for stage in read])
+    _check_factor([stage.factor for stage in read])
     chain = ChainSpec(
         base=base,
         source={key: to_json(value) for key, value in tree.items()},
@@ -392,16 +405,34 @@ def _edge(table: Mapping[str, Any], kind: str) -> Fraction | None:
 
 
 def _check_names(names: list[str]) -> None:
+    small = [name.lower() for name in names]
     for k, name in enumerate(names):
-        if name in names[:k]:
-            raise UnfitError("another name than those of the stages before", literal(name), where=f"stage[{k}].name")
+        if small[k] in small[:k]:
+            raise UnfitError(
+                "another name than those of the stages before, in small letters too, as files are named after it",
+                literal(name),
+                where=f"stage[{k}].name",
+            )
         for other in names:
-            if name.startswith(f"{other}_"):
+            if small[k].startswith(f"{other.lower()}_"):
                 raise UnfitError(
                     f"a name that does not begin with {other}_, as parts of the stage {other} do",
                     literal(name),
                     where=f"stage[{k}].name",
                 )
+
+
+def _check_factor(factors: list[int]) -> None:
+    product = 1
+    for k, factor in enumerate(factors):
+        product *= factor
+        if product > MAX_FACTOR:
+            raise UnfitError(
+                f"such that all stages together decimate by at most {MAX_FACTOR}, as their response is computed at the "
+                "first rate",
+                literal(factor),
+                where=f"stage[{k}].decimate",
+            )
 
 
 def _check_steps(chain: ChainSpec) -> None:

@@ -105,7 +105,24 @@ REFUSED: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
     ),
     "same name": (
         stage(1, name="slow"),
-        "stage[1].name must be another name than those of the stages before, not 'slow'",
+        "stage[1].name must be another name than those of the stages before, in small letters too, as files are named "
+        "after it, not 'slow'",
+    ),
+    "same letters": (
+        stage(1, name="Slow"),
+        "stage[1].name must be another name than those of the stages before, in small letters too, as files are named "
+        "after it, not 'Slow'",
+    ),
+    "long": (
+        lambda tree: tree["stage"].extend(
+            {"name": f"more{k}", "kind": "cic", "order": 1, "decimate": 64} for k in range(2)
+        ),
+        "stage[5].decimate must be such that all stages together decimate by at most 4096, as their response is "
+        "computed at the first rate, not 64",
+    ),
+    "realization": (
+        hardware(realization="df1"),
+        "hardware.realization must be left out with [[stage]], each of which has a realization of its own, not 'df1'",
     ),
     "begins": (
         stage(1, name="slow_down"),
