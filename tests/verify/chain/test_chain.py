@@ -17,8 +17,9 @@ import sosmith
 from sosmith.gen.chain import design as chain_design
 from sosmith.gen.chain.response import gain_into_passband
 from sosmith.model.errors import ShortfallError, SpecificationError
-from sosmith.verify.certificate_file import entries_text, on_grid
+from sosmith.verify.certificate_file import SectionEntry, entries_text, on_grid
 from sosmith.verify.chain.chain_file import ChainCertificate, read_chain, sealed_chain
+from sosmith.verify.chain.responses import Part, peak_gain
 
 TREE: dict[str, Any] = {
     "name": "rx",
@@ -287,6 +288,12 @@ def test_a_port_between_stages_that_limits_is_refused(tmp_path: Path, monkeypatc
     certificate = sosmith.ChainCertificate.load(tmp_path / CERTIFICATE)
     with pytest.raises(ShortfallError, match=r"^the port behind stage slow must hold magnitudes of .*, not end at .*$"):
         certificate.verify()
+
+
+def test_a_response_too_long_to_compute_is_refused_before_it_is_computed() -> None:
+    moving = SectionEntry(numerator=(Fraction(1, 64),) * 64, denominator=(Fraction(1),))
+    with pytest.raises(ShortfallError, match=r"^the response of a chain must have at most 4194304 samples$"):
+        peak_gain([Part((moving,), 64)] * 5)
 
 
 def test_a_certificate_without_a_file_has_no_stages_beside_it() -> None:
