@@ -12,7 +12,7 @@ from sosmith.verify.chain.chain_file import ChainCertificate
 from sosmith.verify.chain.responses import factor_of, parts_of
 from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.specified.words import words_of
-from sosmith.verify.verdict.generated_files import about_of
+from sosmith.verify.verdict.generated_files import about_of, unicode_text
 
 
 def check_chain_manifest(
@@ -26,7 +26,7 @@ def check_chain_manifest(
         If a field is not what follows.
     """
     try:
-        tree = json.loads(content, object_pairs_hook=_without_duplicates)
+        tree = json.loads(unicode_text(f"{chain.name}.json", content), object_pairs_hook=_without_duplicates)
     except (ValueError, RecursionError):
         raise RejectedError("the manifest must be JSON") from None
     wanted = _wanted(chain, cores, items)
@@ -45,7 +45,8 @@ def _without_duplicates(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 def _is_same(read: Any, value: Any) -> bool:
     """Compare trees of JSON, in which true is not the number 1."""
     if isinstance(value, dict):
-        return isinstance(read, dict) and [*read] == [*value] and all(_is_same(read[key], value[key]) for key in value)
+        same = isinstance(read, dict) and read.keys() == value.keys()
+        return same and all(_is_same(read[key], value[key]) for key in value)
     if isinstance(value, list):
         return isinstance(read, list) and len(read) == len(value) and all(map(_is_same, read, value))
     return isinstance(read, bool) == isinstance(value, bool) and bool(read == value)

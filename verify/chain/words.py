@@ -19,7 +19,8 @@ from sosmith.verify.specified.words import words_of
 from sosmith.verify.verdict.generated_files import about_of
 
 _TABLES = ("name", "sample_rate", "channels", "input", "output", "calibration", "filter", "hardware")
-_OF_HARDWARE = ("architecture", "realization", "multipliers", "keep")
+_OF_ALL = ("architecture", "multipliers", "keep")
+_OF_ONE = ("architecture", "realization", "multipliers")
 _CLOCK = 12_000_000
 """Clock of hardware whose specification has none, in Hz."""
 
@@ -68,8 +69,9 @@ def _check(chain: ChainCertificate, tree: Mapping[str, Any], cores: Sequence[Cer
         require(stage["kind"] == "polynomial" or "calibration" not in own, f"{what} must have no calibration")
         _same(f"the {table} of {what}", _plain(own[table]), _plain(_table(stage, rate)))
         hardware = tree.get("hardware", {})
-        of = {key: table[key] for table in (hardware, stage) for key in _OF_HARDWARE if key in table}
-        wanted = {"clock": hardware.get("clock", _CLOCK)} | of
+        wanted = {"clock": hardware.get("clock", _CLOCK)}
+        for keys, words in ((_OF_ALL, hardware), (_OF_ONE, stage)):
+            wanted |= {key: words[key] for key in keys if key in words}
         _same(f"the hardware of {what}", _plain(own.get("hardware", {})), _plain(wanted))
         others = [key for key in own if key not in _TABLES]
         require(not others, f"the specification of {what} must be without {', '.join(others)}")

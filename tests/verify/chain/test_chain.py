@@ -74,6 +74,21 @@ def test_all_of_a_chain_is_proven(folder: Path) -> None:
     assert proof.bound <= proof.allowed
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        {"channels": 2},
+        {"hardware": {"realization": "auto", "architecture": "auto", "multipliers": "auto", "keep": True}},
+        {"hardware": {"clock": 24.0e6, "architecture": "folded", "multipliers": 1}},
+    ],
+)
+def test_words_of_the_whole_are_those_of_its_stages(words: dict[str, Any], tmp_path: Path) -> None:
+    chain = sosmith.design_chain(TREE | words)
+    chain.generate(tmp_path)
+    (tmp_path / "rx.toml").write_text(chain.specification.toml(), encoding="utf-8")
+    assert not proven(tmp_path).missing
+
+
 def test_sealing_again_changes_nothing(folder: Path) -> None:
     before = (folder / CERTIFICATE).read_bytes()
     sealed_again(folder)
@@ -259,6 +274,14 @@ def tight_passing(folder: Path, edge: Fraction) -> dict[str, str]:
     parts = sosmith.design_chain(folder / "rx.toml").core.parts
     peak = gain_into_passband(parts, edge)
     return {"gain": str(on_grid(peak.gain)), "at": str(peak.at)}
+
+
+def test_a_manifest_in_another_encoding_is_refused(folder: Path) -> None:
+    path = folder / "rx.json"
+    path.write_bytes(path.read_text(encoding="utf-8").encode("utf-16"))
+    sealed_again(folder)
+    with pytest.raises(ShortfallError, match=r"^rx\.json must be UTF-8$"):
+        proven(folder, spec=False)
 
 
 def test_other_words_are_refused(folder: Path) -> None:
