@@ -193,6 +193,9 @@ def test_another_wire_is_refused(old: str, new: str, sentence: str, folder: Path
     [
         ("rx.c", "result, status))", "result, NULL))", r"^rx\.c must have status after "),
         ("rx.c", "return 1;", "return 0;", r"^rx\.c must have 1 after "),
+        ("rx.c", "return 1;", "/* *\\\n/ return 0; /* */ return 1;", r"^rx\.c must be without lines that are joined$"),
+        ("rx.c", "return 1;", "/* *??/\n/ return 0; /* */ return 1;", r"^rx\.c must be without lines that are joined$"),
+        ("rx.c", "return 1;", "return\u00a01;", r"^rx\.c must have 1 after "),
         ("rx.h", "rx_low_state stage_low;", "rx_slow_state stage_low;", r"^rx\.h must have rx_low_state after "),
         ("rx.json", '"decimate": 4', '"decimate": 2', r"^decimate of the manifest must be 4, not 2$"),
         ("rx.json", '"channels": 1', '"channels": true', r"^channels of the manifest must be 1, not True$"),
