@@ -15,7 +15,7 @@ def chain_header(design: ChainDesign) -> str:
     name = design.name
     includes = "".join(f'#include "{stage.design.datapath.name}.h"\n' for stage in design.stages)
     states = "".join(
-        f"    {stage.design.datapath.name}_{'state' if _steps(stage) else 'decimator'} {stage.spec.name};\n"
+        f"    {stage.design.datapath.name}_{'state' if _steps(stage) else 'decimator'} stage_{stage.spec.name};\n"
         for stage in design.stages
     )
     return f"""/* {name}: bit-true model of the generated hardware, made by sosmith. */
@@ -52,7 +52,7 @@ def chain_source(design: ChainDesign) -> str:
     lines = []
     given = ", ".join(f"{port.name}_code" for port in design.spec.base.inputs)
     for stage in design.stages:
-        core, state = stage.design.datapath.name, f"&state->{stage.spec.name}"
+        core, state = stage.design.datapath.name, f"&state->stage_{stage.spec.name}"
         flags = "status" if stage is design.stages[-1] else "NULL"
         if _steps(stage):
             lines.append(f"    *result = {core}_step({state}, {given}, {flags});\n")

@@ -32,6 +32,9 @@ from sosmith.model.errors import SpecificationError
 from sosmith.model.port import Port
 from sosmith.model.suggestion import did_you_mean
 
+MAX_FACTOR = 1 << 12
+"""Most samples for each result: the response from end to end is computed at the rate of the samples."""
+
 MAX_STAGES = 8
 """Most stages of a chain."""
 
@@ -49,6 +52,9 @@ _KEYS: dict[str, tuple[str, ...]] = {
 
 KINDS = tuple(_KEYS)
 _OF_HARDWARE = ("architecture", "realization", "multipliers")
+_OF_ALL = ("architecture", "multipliers", "keep")
+"""Keys of ``[hardware]`` that hold for all stages; the realization of one filter is none of another."""
+
 _TOP = ("name", "sample_rate", "channels", "input", STAGE, "output", "hardware")
 _WIRE = {"sos": [[1, 0, 0, 1, 0, 0]]}
 _EXACT = Context(prec=200, traps=[Inexact])
@@ -122,7 +128,7 @@ class StageSpec:
             | {"unit": output.unit}
             | ({} if max_error is None else {"max_error": decimal(max_error)}),
             "hardware": {"clock": decimal(chain.base.hardware.clock)}
-            | {key: hardware[key] for key in (*_OF_HARDWARE, "keep") if key in hardware}
+            | {key: hardware[key] for key in _OF_ALL if key in hardware}
             | dict(self.hardware),
         }
         return from_tree(tree, chain.base.path.parent / f"{chain.base.path.name}: stage {self.name}")
@@ -250,6 +256,7 @@ def _checked(tree: dict[str, Any], path: Path, text: str | None) -> ChainSpec:
     if findings:
         raise together(findings)
     _check_names([stage.name for stage in read])
+    _check_factor([stage.factor for stage in read])
     chain = ChainSpec(
         base=base,
         source={key: to_json(value) for key, value in tree.items()},
@@ -358,7 +365,10 @@ def _tables(table: Mapping[str, Any], kind: str, where: str, rate: Fraction, fac
     if kind == "halfband":
         given |= {"family": "halfband"}
         if "passband_edge" in given:
-            edge = number(given["passband_edge"])
+            try:
+                edge = number(given["passband_edge"])
+            except UnfitError as unfit:
+                raise unfit.inside(f"{where}.passband_edge") from None
             given["stopband_edge"] = decimal(rate / 2 - edge)
     if "band" in table or kind == "halfband" or _by_bands(given):
         given["kind"] = table.get("band", "lowpass")
@@ -404,21 +414,41 @@ def _edge(table: Mapping[str, Any], kind: str) -> Fraction | None:
     """Upper edge of a low-pass filter's pass band, as far as it is a number."""
     if table.get("band", "lowpass") != "lowpass" or kind in {"polynomial", "gain", "cic"}:
         return None
-    edge = table.get("passband_edge", table.get("cutoff"))
-    return Fraction(edge) if isinstance(edge, int | Decimal) and not isinstance(edge, bool) else None
+    try:
+        return number(table.get("passband_edge", table.get("cutoff")))
+    except UnfitError:
+        return None
 
 
 def _check_names(names: list[str]) -> None:
+    small = [name.lower() for name in names]
     for k, name in enumerate(names):
-        if name in names[:k]:
-            raise UnfitError("different from the names of the stages before", literal(name), where=f"stage[{k}].name")
+        if small[k] in small[:k]:
+            raise UnfitError(
+                "different from the names of the stages before, in small letters too, as files are named after it",
+                literal(name),
+                where=f"stage[{k}].name",
+            )
         for other in names:
-            if name.startswith(f"{other}_"):
+            if small[k].startswith(f"{other.lower()}_"):
                 raise UnfitError(
                     f"a name that does not begin with {other}_, as parts of the stage {other} do",
                     literal(name),
                     where=f"stage[{k}].name",
                 )
+
+
+def _check_factor(factors: list[int]) -> None:
+    product = 1
+    for k, factor in enumerate(factors):
+        product *= factor
+        if product > MAX_FACTOR:
+            raise UnfitError(
+                f"such that all stages together decimate by at most {MAX_FACTOR}, as their response is computed at the "
+                "first rate",
+                literal(factor),
+                where=f"stage[{k}].decimate",
+            )
 
 
 def _check_steps(chain: ChainSpec) -> None:

@@ -14,7 +14,9 @@ from sosmith.verify.chain.responses import factor_of, parts_of
 from sosmith.verify.graph import require
 
 _COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
-_TOKEN = re.compile(r"\w+|\S")
+_TOKEN = re.compile(r"\w+|\S", re.ASCII)
+_SPLICES = ("\\", "??/")
+"""What joins a line to the next before comments are found, so that one may end where it does not seem to."""
 
 
 def check_chain_model(source: str, header: str, chain: ChainCertificate, cores: Sequence[Certificate]) -> None:
@@ -45,7 +47,7 @@ def _decimates(core: Certificate) -> bool:
 
 def _fields(chain: ChainCertificate, cores: Sequence[Certificate]) -> Iterator[str]:
     for entry, core in zip(chain.stages, cores, strict=True):
-        yield f"{core.name}_{'decimator' if _decimates(core) else 'state'} {entry.name};"
+        yield f"{core.name}_{'decimator' if _decimates(core) else 'state'} stage_{entry.name};"
 
 
 def _calls(chain: ChainCertificate, cores: Sequence[Certificate]) -> Iterator[str]:
@@ -53,13 +55,14 @@ def _calls(chain: ChainCertificate, cores: Sequence[Certificate]) -> Iterator[st
     for k, (entry, core) in enumerate(zip(chain.stages, cores, strict=True)):
         flags = "status" if k == len(cores) - 1 else "NULL"
         if _decimates(core):
-            yield f"if (!{core.name}_push(&state->{entry.name}, {given}, result, {flags})) return 0;"
+            yield f"if (!{core.name}_push(&state->stage_{entry.name}, {given}, result, {flags})) return 0;"
         else:
-            yield f"*result = {core.name}_step(&state->{entry.name}, {given}, {flags});"
+            yield f"*result = {core.name}_step(&state->stage_{entry.name}, {given}, {flags});"
         given = "*result"
 
 
 def _same(text: str, wanted: Sequence[str], what: str) -> None:
+    require(not any(splice in text for splice in _SPLICES), f"{what} must be without lines that are joined")
     own = [token for line in _COMMENT.sub(" ", text).split("\n") for token in _tokens(line)]
     other = [token for line in wanted for token in _tokens(line)]
     for k, token in enumerate(other):
@@ -70,4 +73,5 @@ def _same(text: str, wanted: Sequence[str], what: str) -> None:
 
 def _tokens(line: str) -> list[str]:
     """Return the tokens of a line; a line for the preprocessor is one, since it ends what it says."""
-    return [line.strip()] if line.strip().startswith("#") else _TOKEN.findall(line)
+    bare = line.strip(" \t\r")
+    return [bare] if bare.startswith("#") else _TOKEN.findall(line)

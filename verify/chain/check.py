@@ -6,6 +6,7 @@ holds all that can pass it: the exact value, which the response up to there boun
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -31,6 +32,7 @@ from sosmith.verify.verification import Progress
 
 _OWN_FILES = ("{}.sv", "{}.json", "{}.c", "{}.h")
 _GRID = Fraction(1, 1 << 64)
+_PLAIN = re.compile(r"[A-Za-z_]\w{0,199}", re.ASCII)
 
 
 @dataclass(frozen=True)
@@ -94,6 +96,7 @@ def judge_chain(
     RejectedError
         If anything is wrong: what is only not proven is in the scope.
     """
+    _check_names(chain)
     _check_seal(chain, content)
     cores, stages = [], dict[str, Judgement]()
     for entry in chain.stages:
@@ -106,6 +109,10 @@ def judge_chain(
         own = content_of(path)
         _compare(str(path), entry.certificate.sha256, own)
         core = read_certificate(path)
+        require(
+            entries_text(core).encode() == own,
+            f"the certificate of stage {entry.name} must have the layout in which it was written, not another one",
+        )
         require(core.name == name, f"the core of stage {entry.name} must be {name}, not {core.name}")
         data = about_of(core).measurements
         stated = (
@@ -150,6 +157,13 @@ def judge_chain(
 
 def _named(progress: Progress, stage: str, step: str, done: int, total: int) -> None:
     progress(f"{stage}: {step}", done, total)
+
+
+def _check_names(chain: ChainCertificate) -> None:
+    """Check names of which those of files are made: no file of another folder is read, whatever they are."""
+    names = [("chain", chain.name), *(("stage", entry.name) for entry in chain.stages)]
+    for what, name in names:
+        require(_PLAIN.fullmatch(name) is not None, f"the name of a {what} must be a plain identifier, not {name!r}")
 
 
 def _check_seal(chain: ChainCertificate, content: bytes) -> None:

@@ -12,7 +12,7 @@ from sosmith.verify.chain.chain_file import ChainCertificate
 from sosmith.verify.chain.responses import factor_of, parts_of
 from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.specified.words import words_of
-from sosmith.verify.verdict.generated_files import about_of
+from sosmith.verify.verdict.generated_files import about_of, unicode_text
 
 
 def check_chain_manifest(
@@ -26,13 +26,30 @@ def check_chain_manifest(
         If a field is not what follows.
     """
     try:
-        tree = json.loads(content)
+        tree = json.loads(unicode_text(f"{chain.name}.json", content), object_pairs_hook=_without_duplicates)
     except (ValueError, RecursionError):
         raise RejectedError("the manifest must be JSON") from None
     wanted = _wanted(chain, cores, items)
     require(isinstance(tree, dict) and [*tree] == [*wanted], f"the manifest must have the fields {', '.join(wanted)}")
     for name, value in wanted.items():
-        require(tree[name] == value, f"{name} of the manifest must be {value}, not {tree[name]}")
+        require(_is_same(tree[name], value), f"{name} of the manifest must be {value}, not {tree[name]}")
+
+
+def _without_duplicates(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    tree = dict(pairs)
+    if len(tree) < len(pairs):
+        raise ValueError("a key twice")
+    return tree
+
+
+def _is_same(read: Any, value: Any) -> bool:
+    """Compare trees of JSON, in which true is not the number 1."""
+    if isinstance(value, dict):
+        same = isinstance(read, dict) and read.keys() == value.keys()
+        return same and all(_is_same(read[key], value[key]) for key in value)
+    if isinstance(value, list):
+        return isinstance(read, list) and len(read) == len(value) and all(map(_is_same, read, value))
+    return isinstance(read, bool) == isinstance(value, bool) and bool(read == value)
 
 
 def _wanted(chain: ChainCertificate, cores: Sequence[Certificate], items: Sequence[ItemEntry]) -> dict[str, Any]:

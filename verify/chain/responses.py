@@ -60,6 +60,11 @@ def factor_of(parts: Sequence[Part]) -> int:
 
 def peak_gain(parts: Sequence[Part]) -> Fraction:
     """Bound the sum of the magnitudes of the response of parts one behind the other, from above."""
+    length, step = 1, 1
+    for part in parts:
+        length += sum((len(section.numerator) - 1) * step for section in part.sections)
+        step *= part.factor
+    _check_length(length)
     numerator, step, inverses = fmpq_poly([1]), 1, list[tuple[Inverse, int]]()
     for part in parts:
         under = fmpq_poly([1])
@@ -74,12 +79,14 @@ def peak_gain(parts: Sequence[Part]) -> Fraction:
     for one, spread in inverses:
         size = _norm(one.samples) / (1 << one.bits)
         exact, wide = exact * size, wide * (size + one.error)
+        _check_length(len(samples) + len(one.samples) * spread)
         apart = one.samples(fmpz_poly([0] * spread + [1])) if spread > 1 else one.samples
-        require(
-            len(samples) + len(apart) <= _MOST_TAPS, f"the response of a chain must have at most {_MOST_TAPS} samples"
-        )
         samples, scale = samples * apart, scale / (1 << one.bits)
     return _norm(samples) * scale + own * (wide - exact)
+
+
+def _check_length(samples: int) -> None:
+    require(samples <= _MOST_TAPS, f"the response of a chain must have at most {_MOST_TAPS} samples")
 
 
 def _norm(samples: fmpz_poly) -> Fraction:

@@ -18,7 +18,14 @@ from sosmith.verify.specified.stated_specification import CALIBRATED, stated_num
 from sosmith.verify.specified.words import words_of
 from sosmith.verify.verdict.generated_files import about_of
 
+_TABLES = ("name", "sample_rate", "channels", "input", "output", "calibration", "filter", "hardware")
+_OF_ALL = ("architecture", "multipliers", "keep")
+_OF_ONE = ("architecture", "realization", "multipliers")
+_CLOCK = 12_000_000
+"""Clock of hardware whose specification has none, in Hz."""
+
 _BY_ITSELF = ("taps", "taps_file", "sos", "sos_file")
+_WITH_EDGES = ("iir", "fir", "halfband")
 _OF_STAGES = ("name", "kind", "architecture", "realization", "multipliers", "band", "order", "decimate", "factor")
 
 
@@ -61,7 +68,30 @@ def _check(chain: ChainCertificate, tree: Mapping[str, Any], cores: Sequence[Cer
         table = "calibration" if stage["kind"] == "polynomial" else "filter"
         require(stage["kind"] == "polynomial" or "calibration" not in own, f"{what} must have no calibration")
         _same(f"the {table} of {what}", _plain(own[table]), _plain(_table(stage, rate)))
+        hardware = tree.get("hardware", {})
+        wanted = {"clock": hardware.get("clock", _CLOCK)}
+        for keys, words in ((_OF_ALL, hardware), (_OF_ONE, stage)):
+            wanted |= {key: words[key] for key in keys if key in words}
+        _same(f"the hardware of {what}", _plain(own.get("hardware", {})), _plain(wanted))
+        others = [key for key in own if key not in _TABLES]
+        require(not others, f"the specification of {what} must be without {', '.join(others)}")
         rate /= stage.get("decimate", 1)
+    _check_edge(chain, stages, stated_number(tree["sample_rate"]), rate)
+
+
+def _check_edge(chain: ChainCertificate, stages: Sequence[Mapping[str, Any]], rate: Fraction, last: Fraction) -> None:
+    """Check that the pass band ends at the lowest edge of the low-pass filters, if that comes out as itself."""
+    if chain.folding is None:
+        return
+    ends = [
+        stated_number(stage.get("passband_edge", stage.get("cutoff")))
+        for stage in stages
+        if stage["kind"] in _WITH_EDGES
+        and stage.get("band", "lowpass") == "lowpass"
+        and ("passband_edge" in stage or "cutoff" in stage)
+    ]
+    edge = min(ends) / rate if ends and 2 * min(ends) <= last else None
+    _same("the edge of the pass band, in units of the sample rate,", chain.folding.edge, edge)
 
 
 def _table(stage: Mapping[str, Any], rate: Fraction) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable
+from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -110,7 +111,24 @@ REFUSED: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
     ),
     "same name": (
         stage(1, name="slow"),
-        "stage[1].name must be different from the names of the stages before, not 'slow'",
+        "stage[1].name must be different from the names of the stages before, in small letters too, as files are "
+        "named after it, not 'slow'",
+    ),
+    "same letters": (
+        stage(1, name="Slow"),
+        "stage[1].name must be different from the names of the stages before, in small letters too, as files are "
+        "named after it, not 'Slow'",
+    ),
+    "long": (
+        lambda tree: tree["stage"].extend(
+            {"name": f"more{k}", "kind": "cic", "order": 1, "decimate": 64} for k in range(2)
+        ),
+        "stage[5].decimate must be such that all stages together decimate by at most 4096, as their response is "
+        "computed at the first rate, not 64",
+    ),
+    "realization": (
+        hardware(realization="df1"),
+        "hardware.realization must be left out with [[stage]], as every stage has its own, not 'df1'",
     ),
     "begins": (
         stage(1, name="slow_down"),
@@ -129,6 +147,20 @@ REFUSED: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
         "stage[1] must be at a rate that is a finite decimal in Hz, so that its edges compare exactly, not at "
         "2666.6666666666665 Hz",
     ),
+    "edge without a number": (
+        stage(1, passband_edge="300 Hz"),
+        "stage[1].passband_edge must be a number, not '300 Hz': write 300, without quotes and unit",
+    ),
+    **{
+        f"cutoff {cutoff}": (
+            stage(2, cutoff=Decimal(cutoff)),
+            f"stage low: filter.cutoff must be {wanted}, not {cutoff}",
+        )
+        for cutoff, wanted in (
+            ("nan", "a finite number"),
+            ("1e+999999999", "a number of at most 50 digits, zero or from 1e-30 to below 1e30 in size"),
+        )
+    },
     "filter": (
         lambda tree: tree.update(filter={"taps": [1.0]}),
         "filter must be left out with [[stage]], which takes name, sample_rate, channels, input, stage, output, "
@@ -139,10 +171,6 @@ REFUSED: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
         hardware(reload=True),
         "not yet available: hardware.reload must be false with [[stage]], as the bound of a chain holds for fixed "
         "coefficients, and the registers are those of one core, not true",
-    ),
-    "realization": (
-        hardware(realization="df1"),
-        "hardware.realization must be left out with [[stage]], as every stage has its own, not 'df1'",
     ),
     "protect": (
         hardware(protect="detect"),

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,13 +16,13 @@ from tests.sim.lint import icarus_check, lint
 import sosmith
 from sosmith.sim.chain import whole_text
 
-TREE = {
+TREE: dict[str, Any] = {
     "name": "rx",
     "sample_rate": 8000.0,
     "input": {"x": {"bits": 8, "range": [-1.0, 1.0], "signed": True}},
     "stage": [
         {"name": "slow", "kind": "cic", "order": 2, "decimate": 2},
-        {"name": "mean", "kind": "fir", "taps": [0.5, 0.5], "architecture": "parallel"},
+        {"name": "double", "kind": "fir", "taps": [0.5, 0.5], "architecture": "parallel"},
         {"name": "out", "kind": "fir", "taps": [0.25, 0.5, 0.25], "decimate": 2},
     ],
     "output": {"bits": 10, "range": [-1.0, 1.0], "signed": True},
@@ -58,6 +60,13 @@ def test_two_runs_write_the_same_bytes(chain: sosmith.Chain, tmp_path: Path) -> 
 
 def test_stages_have_the_architecture_that_each_asks_for(chain: sosmith.Chain) -> None:
     assert [stage.architecture for stage in chain.stages] == ["folded", "parallel", "folded"]
+
+
+def test_names_of_nets_are_kept_in_all_stages(tmp_path: Path) -> None:
+    sosmith.design_chain(TREE | {"hardware": {"keep": True}}).generate(tmp_path)
+    for stage in TREE["stage"]:
+        text = (tmp_path / f"rx_{stage['name']}.certificate.json").read_text(encoding="utf-8")
+        assert json.loads(text)["about"]["item"]["keep"] is True
 
 
 def test_the_c_model_computes_what_the_design_does(chain: sosmith.Chain, tmp_path: Path) -> None:

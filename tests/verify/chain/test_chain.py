@@ -15,9 +15,11 @@ import pytest
 
 import sosmith
 from sosmith.gen.chain import design as chain_design
+from sosmith.gen.chain.response import gain_into_passband
 from sosmith.model.errors import ShortfallError, SpecificationError
-from sosmith.verify.certificate_file import entries_text
+from sosmith.verify.certificate_file import SectionEntry, entries_text, on_grid
 from sosmith.verify.chain.chain_file import ChainCertificate, read_chain, sealed_chain
+from sosmith.verify.chain.responses import Part, peak_gain
 
 TREE: dict[str, Any] = {
     "name": "rx",
@@ -70,6 +72,21 @@ def test_all_of_a_chain_is_proven(folder: Path) -> None:
     assert proof.files == 19
     assert sum(proof.budget.values()) == pytest.approx(proof.bound)
     assert proof.bound <= proof.allowed
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        {"channels": 2},
+        {"hardware": {"realization": "auto", "architecture": "auto", "multipliers": "auto", "keep": True}},
+        {"hardware": {"clock": 24.0e6, "architecture": "folded", "multipliers": 1}},
+    ],
+)
+def test_words_of_the_whole_are_those_of_its_stages(words: dict[str, Any], tmp_path: Path) -> None:
+    chain = sosmith.design_chain(TREE | words)
+    chain.generate(tmp_path)
+    (tmp_path / "rx.toml").write_text(chain.specification.toml(), encoding="utf-8")
+    assert not proven(tmp_path).missing
 
 
 def test_sealing_again_changes_nothing(folder: Path) -> None:
@@ -176,8 +193,13 @@ def test_another_wire_is_refused(old: str, new: str, sentence: str, folder: Path
     [
         ("rx.c", "result, status))", "result, NULL))", r"^rx\.c must have status after "),
         ("rx.c", "return 1;", "return 0;", r"^rx\.c must have 1 after "),
-        ("rx.h", "rx_low_state low;", "rx_slow_state low;", r"^rx\.h must have rx_low_state after "),
+        ("rx.c", "return 1;", "/* *\\\n/ return 0; /* */ return 1;", r"^rx\.c must be without lines that are joined$"),
+        ("rx.c", "return 1;", "/* *??/\n/ return 0; /* */ return 1;", r"^rx\.c must be without lines that are joined$"),
+        ("rx.c", "return 1;", "return\u00a01;", r"^rx\.c must have 1 after "),
+        ("rx.h", "rx_low_state stage_low;", "rx_slow_state stage_low;", r"^rx\.h must have rx_low_state after "),
         ("rx.json", '"decimate": 4', '"decimate": 2', r"^decimate of the manifest must be 4, not 2$"),
+        ("rx.json", '"channels": 1', '"channels": true', r"^channels of the manifest must be 1, not True$"),
+        ("rx.json", '"core": "rx_low"', '"core": "other", "core": "rx_low"', r"^the manifest must be JSON$"),
     ],
 )
 def test_another_model_or_manifest_is_refused(file: str, old: str, new: str, sentence: str, folder: Path) -> None:
@@ -187,6 +209,81 @@ def test_another_model_or_manifest_is_refused(file: str, old: str, new: str, sen
     path.write_text(text.replace(old, new, 1), encoding="utf-8")
     sealed_again(folder)
     with pytest.raises(ShortfallError, match=sentence):
+        proven(folder, spec=False)
+
+
+@pytest.mark.parametrize("name", ["../other/rx", "", "rx\0", "/rx", "rx.y"])
+def test_a_name_that_leads_out_of_the_folder_is_refused_before_a_file_is_read(name: str, folder: Path) -> None:
+    def change(tree: dict[str, Any]) -> None:
+        tree["name"] = name
+
+    before = sorted(path.name for path in folder.iterdir())
+    sealed_again(folder, change)
+    with pytest.raises(ShortfallError, match=r"^the name of a chain must be a plain identifier, not "):
+        proven(folder, spec=False)
+
+    def change_stage(tree: dict[str, Any]) -> None:
+        tree["name"] = "rx"
+        change(tree["stages"][0])
+
+    sealed_again(folder, change_stage)
+    with pytest.raises(ShortfallError, match=r"^the name of a stage must be a plain identifier, not "):
+        proven(folder, spec=False)
+    assert sorted(path.name for path in folder.iterdir()) == before
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('architecture = "folded"', 'architecture = "parallel"'),
+        ('architecture = "folded"', 'architecture = "folded"\nrealization = "df1"'),
+        ("[output]", "[hardware]\nclock = 24.0e6\n\n[output]"),
+        ("[output]", "[hardware]\nkeep = true\n\n[output]"),
+    ],
+)
+def test_other_hardware_than_the_words_ask_for_is_refused(old: str, new: str, folder: Path) -> None:
+    path = folder / "rx.toml"
+    text = path.read_text(encoding="utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new), encoding="utf-8")
+    sealed_again(folder, lambda tree: tree.update(specification=path.read_text(encoding="utf-8")))
+    with pytest.raises(
+        ShortfallError, match=r"^the hardware of stage \w+ must be as the specification of the chain says"
+    ):
+        sosmith.ChainCertificate.load(folder / CERTIFICATE).verify(spec=path)
+
+
+@pytest.mark.parametrize("edge", [None, "1/40"])
+def test_another_pass_band_than_that_of_the_words_is_refused(edge: str | None, folder: Path) -> None:
+    """What is claimed of it is true, of another band than the one that the specification states."""
+    change = changed("folding.edge", lambda _: "1/20") if edge is None else changed("folding.edge", lambda _: edge)
+
+    def narrow(tree: dict[str, Any]) -> None:
+        change(tree)
+        if edge is None:
+            tree["folding"] |= {"edge": None, "passing": None}
+        else:
+            tree["folding"]["passing"] = passing
+
+    passing = tight_passing(folder, Fraction(edge)) if edge is not None else None
+    sealed_again(folder, narrow)
+    proven(folder, spec=False)
+    with pytest.raises(ShortfallError, match=r"^the edge of the pass band, in units of the sample rate, must be as "):
+        proven(folder)
+
+
+def tight_passing(folder: Path, edge: Fraction) -> dict[str, str]:
+    """Return what is reached of what folds into a pass band that ends at `edge`."""
+    parts = sosmith.design_chain(folder / "rx.toml").core.parts
+    peak = gain_into_passband(parts, edge)
+    return {"gain": str(on_grid(peak.gain)), "at": str(peak.at)}
+
+
+def test_a_manifest_in_another_encoding_is_refused(folder: Path) -> None:
+    path = folder / "rx.json"
+    path.write_bytes(path.read_text(encoding="utf-8").encode("utf-16"))
+    sealed_again(folder)
+    with pytest.raises(ShortfallError, match=r"^rx\.json must be UTF-8$"):
         proven(folder, spec=False)
 
 
@@ -217,6 +314,12 @@ def test_a_port_between_stages_that_limits_is_refused(tmp_path: Path, monkeypatc
     certificate = sosmith.ChainCertificate.load(tmp_path / CERTIFICATE)
     with pytest.raises(ShortfallError, match=r"^the port behind stage slow must hold magnitudes of .*, not end at .*$"):
         certificate.verify()
+
+
+def test_a_response_too_long_to_compute_is_refused_before_it_is_computed() -> None:
+    moving = SectionEntry(numerator=(Fraction(1, 64),) * 64, denominator=(Fraction(1),))
+    with pytest.raises(ShortfallError, match=r"^the response of a chain must have at most 4194304 samples$"):
+        peak_gain([Part((moving,), 64)] * 5)
 
 
 def test_a_certificate_without_a_file_has_no_stages_beside_it() -> None:
