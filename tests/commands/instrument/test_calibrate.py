@@ -101,10 +101,12 @@ def test_a_shift_beyond_the_warning_limit_is_said_and_is_no_alarm() -> None:
     write_csv(Path("b.csv"), [(d, round(V - 0.2, 4), T) for d, V, T in readings(60, seed=2) if V > 1.1])
     second = good("add", "b.csv", "--date", "2024-03-08")
     said = re.search(
-        r"^sosmith: warning: (2024-03-08: the sensor reads 0\.\d+ mm less than by .*)$", second.stderr, re.M
+        r"^sosmith: warning: (2024-03-08: the sensor reads 0\.\d+ mm less than the days before predict, .*)$",
+        second.stderr,
+        re.M,
     )
     assert said is not None
-    assert "one day in 20 by chance; if the sensor has stepped, intervals may not hold" in said[1]
+    assert "one day in 20 is beyond 2 by chance; if the sensor has stepped, intervals may not hold" in said[1]
     shown = good("health")
     assert shown.stdout.startswith("Sensor sensor: no alarm; ")
     assert said[1] in " ".join(shown.stdout.split())
