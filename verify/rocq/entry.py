@@ -82,7 +82,7 @@ def decimated_entry(certificate: Certificate, behind: Certificate, graph: FlatGr
         ahead = flattened(alone)
         place = ahead.offsets[-2] + alone.stages[-1].outputs[0]
         made = calibration_of(alone, ahead, place)
-        claims.append(_ahead(alone, ahead, place, made))
+        claims += _ahead(alone, ahead, place, made)
         step, zero = alone.output.lsb / certificate.output.lsb, Fraction(0)
         error, most = made.error * step, made.most * step
     following = calibration_of(behind, graph, taken)
@@ -214,7 +214,7 @@ Qed.
     return Claim("decimated_within", "what leaves the decimator is in the range of the core", text)
 
 
-def _ahead(alone: Certificate, graph: FlatGraph, place: int, made: Calibration) -> Claim:
+def _ahead(alone: Certificate, graph: FlatGraph, place: int, made: Calibration) -> list[Claim]:
     words = f"what the decimator takes is within {float(made.error):.9g} of its last place of the exact calibration"
     text = _calibrated("calibrated_ahead", made.physical) + _followed(
         "ahead_is_calibrated", ("calibrated_ahead", "ahead", "given"), made, len(alone.inputs), graph, place
@@ -222,11 +222,14 @@ def _ahead(alone: Certificate, graph: FlatGraph, place: int, made: Calibration) 
     claims = alone.claims
     parts = " + ".join(map(real, claims.budget.values())) or "0"
     bound = real(claims.bound)
-    text += f"""\
+    bounded = f"""\
 Theorem ahead_is_bounded : ({real(made.error)} <= {bound} /\\ {bound} = {parts})%R.
 Proof. split; lra. Qed.
 """
-    return Claim("ahead_is_calibrated", words, text)
+    return [
+        Claim("ahead_is_calibrated", words, text),
+        Claim("ahead_is_bounded", "that is within the bound of the calibration, the sum of its parts", bounded),
+    ]
 
 
 _Bounds = tuple[Fraction, Fraction, Fraction, int]
