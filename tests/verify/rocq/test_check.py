@@ -308,7 +308,7 @@ def other_polynomial(tree: Any) -> None:
         (SETTLING, sooner, "flagged"),
         (DECIMATED, less_decimation, "error_in_parts"),
         (BOTH, less_before, "ahead_is_bounded"),
-        (BOTH, other_polynomial, "ahead_is_calibrated"),
+        (BOTH, other_polynomial, "ahead_is_bounded"),
     ],
 )
 def test_what_is_wrong_before_the_filter_is_refused(
