@@ -21,7 +21,8 @@ def accept(core: Made) -> None:
     assert found.states > found.memories == len(re.findall(r"^  reg .*_memory \[", core.text, re.MULTILINE)) > 0
 
 
-@pytest.mark.parametrize("lanes", [1, *(pytest.param(lanes, marks=pytest.mark.slow) for lanes in (2, 4))])
+@pytest.mark.slow
+@pytest.mark.parametrize("lanes", [1, 2, 4])
 def test_an_example(lanes: int) -> None:
     accept(made(designed(lanes), lanes=lanes, look_ahead=True))
 
