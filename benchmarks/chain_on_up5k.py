@@ -19,7 +19,7 @@ _CELLS = ("ICESTORM_LC", "ICESTORM_RAM", "ICESTORM_DSP")
 _SEED = 1
 
 
-def placed(specification: Path, folder: Path) -> dict[str, object]:
+def placed(specification: Path, folder: Path) -> tuple[dict[str, tuple[int, int]], float]:
     """Return the cells of each kind, used and there, and the highest clock in MHz."""
     chain = sosmith.design_chain(specification)
     chain.generate(folder)
@@ -35,10 +35,7 @@ def placed(specification: Path, folder: Path) -> dict[str, object]:
     _run("nextpnr-ice40", [*arguments, "--report", "report.json", "--pcf-allow-unconstrained"], folder)
     report = json.loads((folder / "report.json").read_text(encoding="utf-8"))
     cells = {kind: (entry["used"], entry["available"]) for kind, entry in report["utilization"].items()}
-    return {
-        **{kind: cells[kind] for kind in _CELLS},
-        "clock": max(timing["achieved"] for timing in report["fmax"].values()),
-    }
+    return {kind: cells[kind] for kind in _CELLS}, max(timing["achieved"] for timing in report["fmax"].values())
 
 
 def _pins(name: str, taken: int, given: int) -> str:
@@ -67,11 +64,10 @@ def _run(tool: str, arguments: list[str], folder: Path) -> None:
 def main() -> None:
     """Print what the receiver takes."""
     with TemporaryDirectory() as folder:
-        result = placed(SPECIFICATION, Path(folder))
-    for kind in _CELLS:
-        used, there = result[kind]  # type: ignore[misc]
+        cells, clock = placed(SPECIFICATION, Path(folder))
+    for kind, (used, there) in cells.items():
         print(f"{kind}: {used} of {there}")
-    print(f"clock: {result['clock']:.1f} MHz")
+    print(f"clock: {clock:.1f} MHz")
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path
 
 from sosmith.verify.bounds.l1_response import UndecidedError
-from sosmith.verify.certificate_file import Certificate, ItemEntry, entries_text, on_grid, read_certificate
+from sosmith.verify.certificate_file import Certificate, ItemEntry, PortEntry, entries_text, on_grid, read_certificate
 from sosmith.verify.chain.c_model import check_chain_model
 from sosmith.verify.chain.chain_file import ChainCertificate, sealed_chain
 from sosmith.verify.chain.folding import check_folding
@@ -213,8 +213,8 @@ def _check_joints(chain: ChainCertificate, cores: Sequence[Certificate]) -> list
     return items
 
 
-def _unnamed(port: object) -> object:
-    return port.model_copy(update={"name": ""})  # type: ignore[attr-defined]
+def _unnamed(port: PortEntry) -> PortEntry:
+    return port.model_copy(update={"name": ""})
 
 
 def _check_bound(chain: ChainCertificate, cores: Sequence[Certificate]) -> dict[str, Fraction]:
