@@ -20,9 +20,11 @@ from flint import acb, arb, fmpq
 
 from sosmith.gen.filter.exact_form import Exact, exact_bilinear, exact_form, given_form, pole_factors
 from sosmith.gen.filter.impulse_invariance import Aliasing, aliasing, impulse_invariant, simple_level
+from sosmith.gen.filter.loss_mask import LossMask, mask_of
 from sosmith.gen.filter.minimum_order import least_order
 from sosmith.gen.filter.prototypes import Prototype, prototype
 from sosmith.gen.filter.sections import Row, rounded, sections
+from sosmith.gen.filter.short_coefficients import ExactRow, Nominal, short_rows
 from sosmith.gen.filter.transformations import bilinear, unwarped, warped
 from sosmith.gen.quantity import count, frequency
 from sosmith.gen.specification.choices import FIR, FIR_FAMILIES, MAX_DECIMATION
@@ -38,6 +40,7 @@ _DECAY = 1e-12  # relative to its envelope, where an impulse response counts as 
 _LONG = 1 << 15  # samples, beyond which responses are cut shorter where they are only estimated
 _COMFORTABLE = 20  # samples per period of the band edge; fewer hardly reduce the word lengths
 _UNITY = 1e-14  # relative distance within which the gain of given sections counts as one: rounding, not intent
+_MARGINS = 64  # parts of the losses by which a mask is narrowed around the filter from which a search starts
 _GRID = 2048  # frequencies up to half the sample rate at which given sections are evaluated
 
 
@@ -54,7 +57,7 @@ class Filter:
     order : int
         Number of poles; of an FIR filter, of taps less 1.
     cutoff : tuple of float or None
-        Hz, as the family defines it; None if the sections were given.
+        Hz, as the family defines it; None if the sections were given, or the filter is any inside its mask.
     passband_edge, stopband_edge : tuple of float or None
         Hz; None if the specification does not state them.
     passband_loss, stopband_loss : float or None
@@ -69,6 +72,8 @@ class Filter:
         Deviation of an impulse-invariant filter from its analog model; None for all others.
     decimated : int
         Factor of the decimator in front, which hands on samples at `sample_rate`; 1 without one.
+    freedom : str
+        "mask" if it is only near the filter of the family, inside its mask with coefficients of few digits.
     """
 
     sample_rate: float
@@ -84,6 +89,7 @@ class Filter:
     exact: tuple[Exact, ...]
     aliasing: Aliasing | None = None
     decimated: int = 1
+    freedom: str = "none"
 
     @property
     def sos(self) -> Array:
@@ -130,6 +136,9 @@ class Filter:
             if self.family == FIR:  # its kind is where its gain is largest, which misleads of a pure gain or a comb
                 return f"FIR of {taps} given at {rate}"
             return f"{self.family} FIR {self.kind}, {taps} at {rate}".replace("_", " ")
+        if self.freedom == "mask":
+            near = f"near {self.family.capitalize()}, at {frequency(self.sample_rate)}"
+            return f"{self.kind.capitalize()} inside its mask, order {self.order}, {near}"
         if self.cutoff is None:
             return f"{count(len(self.rows), 'given section')} at {frequency(self.sample_rate)}"
         method = "" if self.aliasing is None else ", impulse-invariant"
@@ -253,13 +262,18 @@ def design(spec: FilterSpec, sample_rate: Fraction | float) -> Filter:
         return _fir(spec, spec.taps, fs)
     if spec.family in FIR_FAMILIES:
         return replace(_fir(spec, _designed(spec, fs), fs), family=spec.family, kind=spec.kind)
+    cutoff: tuple[float, ...] | None
     order, cutoff = evaluate(lambda: _order_and_cutoff(spec, fs))
-    alias = None
+    alias: Aliasing | None = None
     if spec.method == "impulse_invariant":
         assert spec.cutoff is not None  # the specification has checked it
         ratio = spec.cutoff[0] / fs
         rows, exact = evaluate(lambda: _sampled(spec, order, ratio))
         alias = evaluate(lambda: aliasing(_prototype(spec, order), ratio))
+    elif spec.freedom == "mask":
+        short = _short(spec, fs)
+        rows, exact = tuple(tuple(map(float, row)) for row in short), evaluate(lambda: given_form(short))
+        cutoff = None  # that of the family is not quite its own
     else:
         rows, exact = evaluate(lambda: _bilinear(spec, fs))
     doubled = 2 if spec.kind in {"bandpass", "bandstop"} else 1
@@ -275,15 +289,9 @@ def _fir(spec: FilterSpec, taps: Sequence[Fraction], fs: Fraction) -> Filter:
 
 
 def _designed(spec: FilterSpec, fs: Fraction) -> tuple[Fraction, ...]:
-    from sosmith.gen.filter.fir_design import designed_taps, mask_of  # noqa: PLC0415 - slow to load
+    from sosmith.gen.filter.fir_design import designed_taps  # noqa: PLC0415 - slow to load
 
-    # The specification has checked that these are given together.
-    assert spec.passband_edge is not None
-    assert spec.stopband_edge is not None
-    assert spec.passband_loss is not None
-    assert spec.stopband_loss is not None
-    passband, stopband = (tuple(edge / fs for edge in edges) for edges in (spec.passband_edge, spec.stopband_edge))
-    return designed_taps(spec.family, mask_of(spec.kind, passband, stopband, (spec.passband_loss, spec.stopband_loss)))
+    return designed_taps(spec.family, _mask(spec, fs))
 
 
 def fir_row(taps: Sequence[Fraction]) -> tuple[Fraction, ...]:
@@ -321,6 +329,7 @@ def _filter(
         rows=rows,
         exact=exact,
         aliasing=aliasing,
+        freedom=spec.freedom,
     )
 
 
@@ -368,6 +377,66 @@ def _bilinear(spec: FilterSpec, fs: Fraction) -> _Both:
     order, edges = _order_and_edges(spec, fs)
     digital = bilinear(_prototype(spec, order), spec.kind, edges)
     return rounded(sections(digital), digital.passing, digital.level), exact_bilinear(digital)
+
+
+def _short(spec: FilterSpec, fs: Fraction) -> tuple[ExactRow, ...]:
+    """Return sections with few digits inside the mask, searched near the family's filter that keeps furthest from it.
+
+    Raises
+    ------
+    ShortfallError
+        If there are none.
+    """
+    order, _ = evaluate(lambda: _order_and_edges(spec, fs))
+    centred = _centred(spec, fs, order)
+    cascade, at = evaluate(lambda: _nominal(centred, fs, order))
+    return short_rows(tuple(cascade), _mask(spec, fs), at)
+
+
+def _centred(spec: FilterSpec, fs: Fraction, order: int) -> FilterSpec:
+    """Return the losses of a mask as far inside this one as the order allows."""
+    low, high = 0, _MARGINS
+    while high - low > 1:
+        share = (low + high) // 2
+        narrower = _narrowed(spec, Fraction(share, _MARGINS))
+        try:
+            fits = evaluate(lambda narrower=narrower: _order_and_edges(narrower, fs)[0]) <= order  # type: ignore[misc]
+        except SpecificationError:
+            fits = False
+        low, high = (share, high) if fits else (low, share)
+    return _narrowed(spec, Fraction(low, _MARGINS))
+
+
+def _narrowed(spec: FilterSpec, share: Fraction) -> FilterSpec:
+    """Return narrower losses: less by a share in the pass band, and more by up to 1 dB in the stop band.
+
+    Coefficients move the gain in the pass band by as many dB as in the stop band, where there is more room.
+    """
+    assert spec.passband_loss is not None
+    assert spec.stopband_loss is not None
+    return replace(spec, passband_loss=spec.passband_loss * (1 - share), stopband_loss=spec.stopband_loss + share)
+
+
+def _nominal(spec: FilterSpec, fs: Fraction, order: int) -> tuple[list[Nominal], int | None]:
+    """Return a family's filter by doubles, and at which real z its gain is 1; None if at none."""
+    _, edges = _order_and_edges(spec, fs)
+    digital = bilinear(_prototype(spec, order), spec.kind, edges)
+    cascade = [
+        Nominal(*(tuple(map(nearest_double, taps)) for taps in (section.numerator, section.denominator)))
+        for section in sections(digital)
+    ]
+    is_one = nearest_double(digital.level) == 1 and nearest_double(digital.passing.imag) == 0
+    return cascade, int(nearest_double(digital.passing.real)) if is_one else None
+
+
+def _mask(spec: FilterSpec, fs: Fraction) -> LossMask:
+    # The specification has checked that these are given together.
+    assert spec.passband_edge is not None
+    assert spec.stopband_edge is not None
+    assert spec.passband_loss is not None
+    assert spec.stopband_loss is not None
+    passband, stopband = (tuple(edge / fs for edge in edges) for edges in (spec.passband_edge, spec.stopband_edge))
+    return mask_of(spec.kind, passband, stopband, (spec.passband_loss, spec.stopband_loss))
 
 
 def _sampled(spec: FilterSpec, order: int, ratio: Fraction) -> _Both:

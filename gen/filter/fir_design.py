@@ -1,8 +1,8 @@
 """Design of linear-phase FIR filters by edges and losses: the fewest taps that are proven to keep to them.
 
 The methods work in double precision; what they find is rounded to a grid, made symmetric, and scaled so that no gain in
-the pass band is above 1. These taps are the filter, exactly, and of them `sosmith.gen.filter.fir_gains` proves that the
-losses are kept. Lengths are tried from an estimate on (Kaiser 1974), downward and then upward.
+the pass band is above 1. These taps are the filter, exactly, and `sosmith.gen.filter.gain_limits` proves that they keep
+to the losses. Lengths are tried from an estimate on (Kaiser 1974), downward and then upward.
 
 - equiripple: the Remez exchange algorithm (Parks and McClellan 1972);
 - least_squares: the least integral of the squared error, weighted by the losses;
@@ -25,13 +25,12 @@ import numpy as np
 import numpy.typing as npt
 from scipy import signal
 
-from sosmith.gen.filter.fir_gains import keeps_to
+from sosmith.gen.filter.gain_limits import keeps_to
+from sosmith.gen.filter.loss_mask import Band, LossMask
 from sosmith.gen.specification.choices import MAX_TAPS
 from sosmith.model.errors import SpecificationError
 
 Array = npt.NDArray[np.float64]
-Band = tuple[Fraction, Fraction]
-
 _GRID_BITS = 36
 """Fraction bits of taps: fewer than the last ones of a double, which depend on the machine's functions."""
 
@@ -45,61 +44,21 @@ _POINTS = 1 << 14
 """Frequencies up to half the sample rate at which the largest gain is looked for."""
 
 
-class FirMask(NamedTuple):
-    """What is asked for.
-
-    Attributes
-    ----------
-    passbands, stopbands : tuple of Band
-        Frequencies in units of the sample rate, from 0 to 1/2.
-    passband_loss, stopband_loss : Fraction
-        In dB: gains are from -passband_loss to 0 in a pass band, and at most -stopband_loss in a stop band.
-    """
-
-    passbands: tuple[Band, ...]
-    stopbands: tuple[Band, ...]
-    passband_loss: Fraction
-    stopband_loss: Fraction
-
-    @property
-    def ripples(self) -> tuple[float, float]:
-        """Largest deviations from gains of 1 and 0, before the filter is scaled."""
-        least = 10 ** (-float(self.passband_loss) / 20)
-        ripple = (1 - least) / (1 + least)
-        return ripple, 10 ** (-float(self.stopband_loss) / 20) * (1 + ripple)
-
-    @property
-    def transition(self) -> float:
-        """Width of the narrowest transition band."""
-        ends = sorted((*self.passbands, *self.stopbands))
-        return float(min(upper[0] - lower[1] for lower, upper in pairwise(ends)))
-
-    @property
-    def is_even_possible(self) -> bool:
-        """Whether the number of taps may be even: the gain at half the sample rate is then 0."""
-        return all(band[1] < Fraction(1, 2) for band in self.passbands)
+def _ripples(mask: LossMask) -> tuple[float, float]:
+    """Return the largest deviations from gains of 1 and 0, before the filter is scaled."""
+    least = 10 ** (-float(mask.passband_loss) / 20)
+    ripple = (1 - least) / (1 + least)
+    return ripple, 10 ** (-float(mask.stopband_loss) / 20) * (1 + ripple)
 
 
-def mask_of(
-    kind: str, passband: tuple[Fraction, ...], stopband: tuple[Fraction, ...], losses: tuple[Fraction, Fraction]
-) -> FirMask:
-    """Return what the edges of a kind of filter ask for; edges are in units of the sample rate, losses in dB."""
-    zero, half = Fraction(0), Fraction(1, 2)
-    passing: tuple[Band, ...]
-    stopping: tuple[Band, ...]
-    if kind == "lowpass":
-        passing, stopping = ((zero, passband[0]),), ((stopband[0], half),)
-    elif kind == "highpass":
-        passing, stopping = ((passband[0], half),), ((zero, stopband[0]),)
-    elif kind == "bandpass":
-        passing, stopping = ((passband[0], passband[1]),), ((zero, stopband[0]), (stopband[1], half))
-    else:
-        passing, stopping = ((zero, passband[0]), (passband[1], half)), ((stopband[0], stopband[1]),)
-    return FirMask(passing, stopping, *losses)
+def _transition(mask: LossMask) -> float:
+    """Return the width of the narrowest transition band."""
+    ends = sorted((*mask.passbands, *mask.stopbands))
+    return float(min(upper[0] - lower[1] for lower, upper in pairwise(ends)))
 
 
 @lru_cache(maxsize=32)
-def designed_taps(family: str, mask: FirMask) -> tuple[Fraction, ...]:
+def designed_taps(family: str, mask: LossMask) -> tuple[Fraction, ...]:
     """Design the filter with the fewest taps that a family needs.
 
     Raises
@@ -125,13 +84,13 @@ def designed_taps(family: str, mask: FirMask) -> tuple[Fraction, ...]:
     return best
 
 
-def _estimated(mask: FirMask) -> float:
+def _estimated(mask: LossMask) -> float:
     """Estimate the number of taps of an equiripple filter by Kaiser's formula."""
-    first, second = mask.ripples
-    return (-10 * math.log10(first * second) - 13) / (14.6 * mask.transition) + 1
+    first, second = _ripples(mask)
+    return (-10 * math.log10(first * second) - 13) / (14.6 * _transition(mask)) + 1
 
 
-def _kept(family: str, length: int, mask: FirMask) -> tuple[Fraction, ...] | None:
+def _kept(family: str, length: int, mask: LossMask) -> tuple[Fraction, ...] | None:
     """Return a filter with so many taps; None if it does not keep to the losses."""
     try:
         with warnings.catch_warnings():
@@ -147,7 +106,7 @@ def _kept(family: str, length: int, mask: FirMask) -> tuple[Fraction, ...] | Non
     if not _may_keep(gain / float(np.max(gain[inside])), inside, mask):
         return None
     taps = tuple(Fraction(round(tap * 2.0**_GRID_BITS), 1 << _GRID_BITS) for tap in scaled.tolist())
-    return taps if keeps_to(taps, *mask) else None
+    return taps if keeps_to(taps, mask) else None
 
 
 def _points_in(bands: tuple[Band, ...]) -> npt.NDArray[np.bool_]:
@@ -158,42 +117,42 @@ def _points_in(bands: tuple[Band, ...]) -> npt.NDArray[np.bool_]:
     return inside
 
 
-def _may_keep(gain: Array, inside: npt.NDArray[np.bool_], mask: FirMask) -> bool:
+def _may_keep(gain: Array, inside: npt.NDArray[np.bool_], mask: LossMask) -> bool:
     """Whether gains relative to the largest in a pass band show no loss that is not kept: a proof is worth it."""
     least, most = (10 ** (-float(loss) / 20) for loss in (mask.passband_loss, mask.stopband_loss))
     stopped = gain[_points_in(mask.stopbands)]
     return bool(gain[inside].min() > least * (1 - _SPARE) and stopped.max() < most * (1 + _SPARE))
 
 
-def _edges_and_gains(mask: FirMask) -> tuple[list[float], list[float], list[float]]:
+def _edges_and_gains(mask: LossMask) -> tuple[list[float], list[float], list[float]]:
     """Return edges of all bands, and gain and weight of each."""
-    first, second = mask.ripples
+    first, second = _ripples(mask)
     bands = sorted([(band, 1.0, 1 / first) for band in mask.passbands] + [(b, 0.0, 1 / second) for b in mask.stopbands])
     edges = [float(edge) for band, _, _ in bands for edge in band]
     return edges, [gain for _, gain, _ in bands], [weight for _, _, weight in bands]
 
 
-def _equiripple(length: int, mask: FirMask) -> Array:
+def _equiripple(length: int, mask: LossMask) -> Array:
     edges, gains, weights = _edges_and_gains(mask)
     return np.asarray(signal.remez(length, edges, gains, weight=weights, fs=1.0), dtype=np.float64)
 
 
-def _least_squares(length: int, mask: FirMask) -> Array:
+def _least_squares(length: int, mask: LossMask) -> Array:
     edges, gains, weights = _edges_and_gains(mask)
     both = [gain for gain in gains for _ in range(2)]
     squares = [weight**2 for weight in weights]
     return np.asarray(signal.firls(length, edges, both, weight=squares, fs=1.0), dtype=np.float64)
 
 
-def _kaiser(length: int, mask: FirMask) -> Array:
+def _kaiser(length: int, mask: LossMask) -> Array:
     edges, gains, _ = _edges_and_gains(mask)
     cutoffs = [(edges[k] + edges[k + 1]) / 2 for k in range(1, len(edges) - 1, 2)]
-    beta = signal.kaiser_beta(-20 * math.log10(min(mask.ripples)))
+    beta = signal.kaiser_beta(-20 * math.log10(min(_ripples(mask))))
     taps = signal.firwin(length, cutoffs, window=("kaiser", beta), pass_zero=gains[0] == 1, scale=False, fs=1.0)
     return np.asarray(taps, dtype=np.float64)
 
 
-def _halfband(length: int, mask: FirMask) -> Array:
+def _halfband(length: int, mask: LossMask) -> Array:
     ((_, edge),) = mask.passbands
     taps = np.zeros(length)
     taps[::2] = signal.remez((length + 1) // 2, [0, 2 * float(edge)], [1], fs=1.0) / 2
@@ -204,20 +163,21 @@ def _halfband(length: int, mask: FirMask) -> Array:
 class _Family(NamedTuple):
     """How a family is designed, and what numbers of taps it has."""
 
-    design: Callable[[int, FirMask], Array]
-    takes: Callable[[int, FirMask], bool]
+    design: Callable[[int, LossMask], Array]
+    takes: Callable[[int, LossMask], bool]
 
 
-def _of_any_length(length: int, mask: FirMask) -> bool:
-    return length % 2 == 1 or mask.is_even_possible
+def _of_any_length(length: int, mask: LossMask) -> bool:
+    # The gain of an even number of symmetric taps is 0 at half the sample rate.
+    return length % 2 == 1 or all(band[1] < Fraction(1, 2) for band in mask.passbands)
 
 
-def _of_odd_length(length: int, mask: FirMask) -> bool:
+def _of_odd_length(length: int, mask: LossMask) -> bool:
     del mask
     return length % 2 == 1
 
 
-def _of_halfband_length(length: int, mask: FirMask) -> bool:
+def _of_halfband_length(length: int, mask: LossMask) -> bool:
     del mask
     return length % 4 == 3
 

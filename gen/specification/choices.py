@@ -42,6 +42,9 @@ LOSSES = {
 }
 """Losses that a family needs in addition to order and cutoff: they set the size of its ripples."""
 
+FREEDOMS = ("none", "mask")
+"""What a filter by edges and losses may be: that of its family, or any inside the mask."""
+
 METHODS = ("bilinear", "impulse_invariant")
 REALIZATIONS = (AUTO, *(each.name for each in realizations.ALL))
 STARTS = ("steady", "zero")

@@ -190,6 +190,8 @@ def _check_filter(document: Document) -> None:
             _check_taps(table, given)
         case _:
             raise UnfitError(_FORMS, f"by {listed(given) if given else 'none of them'}", where="filter")
+    if table.freedom != "none":
+        _check_freedom(table, given)
 
 
 def _check_by_order(table: FilterTable, given: Sequence[str], sample_rate: Fraction) -> None:
@@ -244,6 +246,18 @@ def _check_by_edges(table: FilterTable, given: Sequence[str], sample_rate: Fract
         )
     if family == "halfband":
         _check_halfband(kind, passband, stopband, sample_rate)
+
+
+def _check_freedom(table: FilterTable, given: Sequence[str]) -> None:
+    """Check that there is a mask, of a filter with poles."""
+    if _BY_EDGES[0] not in given:
+        raise UnfitError(
+            f"left out unless the filter is given by {listed(_BY_EDGES)}",
+            literal(table.freedom),
+            where="filter.freedom",
+        )
+    if table.family in FIR_FAMILIES:
+        raise UnfitError(f"left out for {table.family}", literal(table.freedom), where="filter.freedom", later=True)
 
 
 def _check_halfband(

@@ -20,6 +20,7 @@ from sosmith.gen.specification.choices import (
     FAMILIES,
     FAMILY_HINTS,
     FIR_FAMILIES,
+    FREEDOMS,
     KIND_HINTS,
     KINDS,
     MAX_DECIMATION,
@@ -194,6 +195,7 @@ class FilterTable(Table):
     stopband_edge: Edges = None
     passband_loss: Loss = None
     stopband_loss: Loss = None
+    freedom: Annotated[str, PlainValidator(choice(FREEDOMS))] = "none"
     sos: Annotated[
         Rows | None,
         PlainValidator(list_of(list_of(number, 6, 6), 1, MAX_ORDER // 2, "rows [b0, b1, b2, 1.0, a1, a2]")),

@@ -85,6 +85,9 @@ class FilterSpec:
         Factor of the decimator before a low-pass filter by order and cutoff, a power of two; None without one.
     hold : bool
         Whether each result behind a decimator is handed out once for each of its samples, at their rate.
+    freedom : str
+        "mask" for any filter that keeps to edges and losses, with coefficients of few digits; "none" for that of the
+        family.
     origin : str
         How `sos_file` or `taps_file` was read, a sentence; empty without one.
     """
@@ -103,6 +106,7 @@ class FilterSpec:
     origin: str = ""
     decimate: int | str | None = None
     hold: bool = False
+    freedom: str = "none"
 
     @property
     def is_fir(self) -> bool:
@@ -400,4 +404,5 @@ def _filter(path: Path, table: FilterTable) -> FilterSpec:
         origin=origin,
         decimate=table.decimate,
         hold=table.hold,
+        freedom=table.freedom,
     )

@@ -23,6 +23,10 @@ def run(line: str, folder: Path) -> str:
     if written := re.fullmatch(r"cat > (\S+) <<'END'\n(.*\n)END", line, flags=re.DOTALL):
         (folder / written[1]).write_text(written[2], encoding="utf-8")
         return ""
+    if kept := re.fullmatch(r"grep -v (\w+) (\S+) > (\S+)", line):
+        lines = (folder / kept[2]).read_text(encoding="utf-8").splitlines(keepends=True)
+        (folder / kept[3]).write_text("".join(each for each in lines if kept[1] not in each), encoding="utf-8")
+        return ""
     command, *arguments = shlex.split(line)
     assert command == "./run"
     result = CliRunner(env={"COLUMNS": "100"}).invoke(cli, arguments)

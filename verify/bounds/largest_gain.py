@@ -22,8 +22,9 @@ from fractions import Fraction
 from functools import reduce
 from operator import mul
 
-from flint import arb, arb_poly, ctx, fmpq, fmpq_poly, fmpz_poly
+from flint import arb, arb_poly, ctx, fmpq, fmpq_poly
 
+from sosmith.verify.bounds.cosine_polynomials import bernstein, cosine_below, exactly, squared_magnitude
 from sosmith.verify.bounds.grid import rounded_up
 from sosmith.verify.bounds.l1_response import UndecidedError, fraction
 from sosmith.verify.certificate_file import BandEntry, DecimationEntry, SectionEntry
@@ -59,8 +60,8 @@ class _LeftSide:
     """The left side for all bands, on every interval that was asked for."""
 
     def __init__(self, sections: Sequence[SectionEntry], stages: int) -> None:
-        over = [_square(section.denominator) for section in sections]
-        under = [_square(section.numerator) for section in sections]
+        over = [squared_magnitude(section.denominator) for section in sections]
+        under = [squared_magnitude(section.numerator) for section in sections]
         self._sections = list(zip(under, over, strict=True))
         self._stages = stages
         half = fmpq_poly([fmpq(1, 2), fmpq(-1, 2)])
@@ -73,26 +74,18 @@ class _LeftSide:
         """Bound it on an interval."""
         interval = self._known.get((low, high))
         if interval is None:
-            over, under = (self._bernstein(each, low, high) for each in (self._over, self._under))
+            over, under = (bernstein(each, self._degree, low, high) for each in (self._over, self._under))
             middle = (low + high) / 2
             positive = min(under) > 0
             most = max(fraction(p / q) for p, q in zip(over, under, strict=True)) if positive else None
-            at = _fmpq(middle)
+            at = exactly(middle)
             value = fraction(self._over(at) / self._under(at))
             interval = self._known[low, high] = _Interval(most, value, _frequency(low), _frequency(middle))
         return interval
 
-    def _bernstein(self, polynomial: fmpq_poly, low: Fraction, high: Fraction) -> list[fmpq]:
-        """Bernstein coefficients on an interval, each times a binomial coefficient."""
-        count = self._degree + 1
-        within = polynomial(fmpq_poly([_fmpq(low), _fmpq(high - low)])).coeffs()
-        mirrored = fmpq_poly((within + [fmpq(0)] * (count - len(within)))[::-1])
-        shifted: list[fmpq] = mirrored(fmpq_poly([1, 1])).coeffs()
-        return (shifted + [fmpq(0)] * (count - len(shifted)))[::-1]
-
     def at(self, frequency: Fraction) -> arb:
         """Enclose it at a frequency, section by section."""
-        x = arb.cos_pi_fmpq(_fmpq(2 * frequency))
+        x = arb.cos_pi_fmpq(exactly(2 * frequency))
         value = ((1 - x) / 2) ** self._stages
         for under, over in self._sections:
             value *= arb_poly(under)(x) / arb_poly(over)(x)
@@ -135,9 +128,9 @@ def _check_claims(
             f"band {band} must have its largest gain at a multiple of {_PLACES} of the lower rate, not at {claim.at}",
         )
         with ctx.workprec(_PRECISION):
-            right = _right_side(entry, band, arb(_fmpq(claim.at)))
+            right = _right_side(entry, band, arb(exactly(claim.at)))
             reached = (left.at(claim.at) / right).sqrt()
-            wanted = rounded_up(reached * arb(_fmpq(1 + _EXCESS)), f"the largest gain {what} {band}")
+            wanted = rounded_up(reached * arb(exactly(1 + _EXCESS)), f"the largest gain {what} {band}")
             require(
                 claim.gain <= wanted,
                 f"the largest gain {what} {band} must be that at {claim.at} of the lower rate, "
@@ -153,18 +146,18 @@ def _check_claims(
 
 def _check_bound(left: _LeftSide, entry: DecimationEntry, band: int, gain: Fraction, what: str, end: Fraction) -> None:
     """Prove that no frequency has a larger gain."""
-    square = arb(_fmpq(gain**2))
-    left_to_do = [(_cosine_below(end), Fraction(1))]
+    square = arb(exactly(gain**2))
+    left_to_do = [(cosine_below(end), Fraction(1))]
     while left_to_do:
         low, high = left_to_do.pop()
         interval = left.on(low, high)
         least = square * _right_side(entry, band, interval.lowest)
-        if interval.most is not None and arb(_fmpq(interval.most)) <= least:
+        if interval.most is not None and arb(exactly(interval.most)) <= least:
             continue
         there = _right_side(entry, band, interval.central)
-        reached = (arb(_fmpq(interval.middle)) / there).sqrt()
+        reached = (arb(exactly(interval.middle)) / there).sqrt()
         require(
-            not reached > arb(_fmpq(gain)),
+            not reached > arb(exactly(gain)),
             f"{what} must be at least {float(reached):.6g}, which "
             f"is reached at {float(interval.central):.6g} of the lower rate, not {float(gain):.6g}",
         )
@@ -179,30 +172,6 @@ def _right_side(entry: DecimationEntry, band: int, frequency: arb) -> arb:
     return (entry.factor * ((band - frequency) / entry.factor).sin_pi()) ** (2 * entry.stages)
 
 
-def _cosine_below(frequency: Fraction) -> Fraction:
-    """Return a multiple of 2**-64 that is no greater than the cosine of a frequency of 0 to 1/2."""
-    if frequency == Fraction(1, 2):
-        return Fraction(-1)
-    scaled = arb.cos_pi_fmpq(_fmpq(2 * frequency)) * arb(2) ** 64
-    whole = scaled.lower().floor().unique_fmpz()
-    if whole is None:
-        raise UndecidedError("the end of the pass band")
-    return Fraction(int(whole), 1 << 64)
-
-
-def _square(taps: Sequence[Fraction]) -> fmpq_poly:
-    """Squared magnitude of taps, in the cosine: that of k times the angle is the Chebyshev polynomial T_k."""
-    square = fmpq_poly([])
-    for k in range(len(taps)):
-        apart = sum((one * other for one, other in zip(taps, taps[k:], strict=False)), Fraction(0))
-        square += fmpq_poly(fmpz_poly.chebyshev_t(k)) * _fmpq(apart * min(k + 1, 2))
-    return square
-
-
 def _frequency(x: Fraction) -> arb:
     """Frequency with the cosine x."""
-    return arb(_fmpq(x)).acos() / (2 * arb.pi())
-
-
-def _fmpq(value: Fraction) -> fmpq:
-    return fmpq(value.numerator, value.denominator)
+    return arb(exactly(x)).acos() / (2 * arb.pi())

@@ -19,6 +19,7 @@ _EDGES = ("passband_edge", "stopband_edge")
 _LOSSES = ("passband_loss", "stopband_loss")
 _RIPPLES = {"chebyshev1": _LOSSES[:1], "chebyshev2": _LOSSES[1:], "elliptic": _LOSSES}
 """Losses that stand beside order and cutoff."""
+_FREEDOMS = ("none", "mask")
 _MAX_ORDER = 20
 
 
@@ -36,6 +37,8 @@ class FilterTable:
         One or two rising frequencies in units of the sample rate, above 0 and below 1/2; empty if not stated.
     losses : mapping of str to Fraction
         "passband_loss" and "stopband_loss" in dB, above 0, as far as they are stated.
+    freedom : str
+        "mask" if any filter with poles that keeps to edges and losses will do, else "none".
     rows : tuple of tuples of Fraction
         Sections (b0, b1, b2, 1, a1, a2), or one of an FIR filter: its taps, and as many of 1, 0, 0, ...; or empty.
     """
@@ -48,12 +51,18 @@ class FilterTable:
     passband_edge: tuple[Fraction, ...] = ()
     stopband_edge: tuple[Fraction, ...] = ()
     losses: Mapping[str, Fraction] = field(default_factory=dict)
+    freedom: str = "none"
     rows: tuple[tuple[Fraction, ...], ...] = ()
 
     @property
     def is_fir(self) -> bool:
         """Whether edges and losses state no single filter, but what an FIR filter must keep to."""
         return self.family in FIR_FAMILIES
+
+    @property
+    def by_losses(self) -> bool:
+        """Whether the filter may be any that keeps to the losses."""
+        return self.is_fir or self.freedom == "mask"
 
     @property
     def max_order(self) -> int:
@@ -83,6 +92,8 @@ def read_filter_table(table: Mapping[str, object], sample_rate: Fraction) -> Fil
     >>> read_filter_table(stated, Fraction(100)).cutoff
     (Fraction(3, 1000),)
     """
+    if table.get("freedom") == _FREEDOMS[0]:
+        table = {key: value for key, value in table.items() if key != "freedom"}
     if "taps" in table:
         _require_only(table, ("taps",), "with taps")
         return FilterTable(rows=(_taps(table["taps"]),))
@@ -108,7 +119,9 @@ def read_filter_table(table: Mapping[str, object], sample_rate: Fraction) -> Fil
         )
         _check_order(read)
         return read
-    _require_only(table, (*_LABELS, *_EDGES, *_LOSSES), "with edges and losses")
+    _require_only(table, (*_LABELS, *_EDGES, *_LOSSES, "freedom"), "with edges and losses")
+    freedom = _word({"freedom": _FREEDOMS[0], **table}, "freedom", _FREEDOMS)
+    _require(family not in FIR_FAMILIES or freedom == _FREEDOMS[0], "freedom", f"left out for {family}", freedom)
     _require(method == _METHODS[0], "method", "bilinear with edges and losses", method)
     _require(family != "bessel", "family", "one with a formula for the minimum order", family)
     passband, stopband = (_frequencies(table, key, kind, sample_rate) for key in _EDGES)
@@ -120,6 +133,7 @@ def read_filter_table(table: Mapping[str, object], sample_rate: Fraction) -> Fil
         passband_edge=passband,
         stopband_edge=stopband,
         losses=_losses(table, _LOSSES),
+        freedom=freedom,
     )
 
 

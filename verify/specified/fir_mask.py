@@ -42,14 +42,14 @@ def keeps_to_losses(taps: Sequence[Fraction], table: FilterTable) -> bool:
         return False
     with ctx.workprec(_PRECISION):
         least, most = (arb(10) ** (-ball(loss) / 20) for loss in table.losses.values())
-        passing, stopping = _bands(table)
+        passing, stopping = bands_of(table)
         amplitude = _Amplitude(taps)
         return all(amplitude.is_within(band, least, arb(1)) for band in passing) and all(
             amplitude.is_within(band, arb(0), most) for band in stopping
         )
 
 
-def _bands(table: FilterTable) -> tuple[list[_Band], list[_Band]]:
+def bands_of(table: FilterTable) -> tuple[list[_Band], list[_Band]]:
     """Return the pass bands and the stop bands, in units of the sample rate."""
     zero, half = Fraction(0), Fraction(1, 2)
     passband, stopband = table.passband_edge, table.stopband_edge

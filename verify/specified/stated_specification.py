@@ -24,6 +24,7 @@ from sosmith.verify.specified.filter_distance import distance
 from sosmith.verify.specified.filter_table import FilterTable
 from sosmith.verify.specified.fir_mask import keeps_to_losses
 from sosmith.verify.specified.ideal_filter import stated_filter
+from sosmith.verify.specified.section_mask import sections_keep_to_losses
 from sosmith.verify.specified.sections_file import sections_in, taps_in
 from sosmith.verify.specified.words import words_of
 
@@ -50,7 +51,8 @@ class Agreement:
     measurements : int
         Number of measurements that it was fitted to again; 0 if it was not.
     by_losses : bool
-        Whether the filter is an FIR filter that was shown to keep to its edges and losses, which state no digits of it.
+        Whether the filter was shown to keep to its edges and losses, which state no digits of it: those of FIR filters,
+        and of others with `freedom`.
     not_compared : tuple of str
         Keys of the specification that nothing was held against, in its order.
     """
@@ -152,7 +154,7 @@ def _filter_distance(
             certificate.downsampling is None or "taps" in table or wanted.table.is_fir,
             "a filter that decimates by itself must be an FIR filter",
         )
-        if wanted.table.is_fir:
+        if wanted.table.by_losses:
             _check_losses(certificate.ideal.sections, wanted.table)
             return None
         apart = distance(wanted, certificate.ideal.sections)
@@ -169,11 +171,16 @@ def _filter_distance(
 
 
 def _check_losses(proven: Sequence[SectionEntry], table: FilterTable) -> None:
-    """Check that a filter is an FIR filter that keeps to edges and losses."""
-    require(
-        len(proven) == 1 and len(proven[0].denominator) == 1 and keeps_to_losses(proven[0].numerator, table),
-        "the filter must keep to the edges and losses of the specification with symmetric taps",
-    )
+    """Check that a filter keeps to edges and losses; that its poles are stable has been proven."""
+    if table.is_fir:
+        require(
+            len(proven) == 1 and len(proven[0].denominator) == 1 and keeps_to_losses(proven[0].numerator, table),
+            "the filter must keep to the edges and losses of the specification with symmetric taps",
+        )
+    else:
+        require(
+            sections_keep_to_losses(proven, table), "the filter must keep to the edges and losses of the specification"
+        )
 
 
 def _check_digits(proven: Sequence[SectionEntry], exact: Sequence[SectionEntry]) -> None:

@@ -107,7 +107,7 @@ TABLES = (
 
 FILTER_KEYS = (
     "one of the keys family, kind, method, order, cutoff, passband_edge, stopband_edge, passband_loss,"
-    " stopband_loss, sos, sos_file, taps, taps_file, decimate, hold, not an unknown one"
+    " stopband_loss, freedom, sos, sos_file, taps, taps_file, decimate, hold, not an unknown one"
 )
 
 
@@ -765,6 +765,25 @@ BAD = [
         FAM,
         'family = "elliptic"\npassband_loss = 60\nstopband_loss = 0.5',
         "filter.passband_loss must be below stopband_loss (0.5 dB), not 60",
+    ),
+    (
+        "freedom without a mask",
+        ORD,
+        ORD + '\nfreedom = "mask"',
+        "filter.freedom must be left out unless the filter is given by passband_edge, stopband_edge, passband_loss and "
+        "stopband_loss, not 'mask'",
+    ),
+    (
+        "freedom of an FIR filter",
+        f"{FAM}\n{KO}",
+        f'family = "equiripple"\n{KIND}\nfreedom = "mask"\n' + EDGES.format(10.0, 45.0, 0.02, 60.0),
+        "not yet available: filter.freedom must be left out for equiripple, not 'mask'",
+    ),
+    (
+        "no such freedom",
+        ORD,
+        ORD + '\nfreedom = "all"',
+        "filter.freedom must be one of none, mask, not 'all'",
     ),
     (
         "order and cutoff beside edges",

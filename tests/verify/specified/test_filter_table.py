@@ -105,6 +105,15 @@ def test_numbers_are_exact() -> None:
             {**BY_EDGES, "family": "bessel"},
             "filter.family must be one with a formula for the minimum order, not bessel",
         ),
+        (
+            {**BY_ORDER, "freedom": "mask"},
+            "filter.freedom must be left out with order and cutoff for butterworth, not mask",
+        ),
+        ({**BY_EDGES, "freedom": "all"}, "filter.freedom must be one of none, mask, not all"),
+        (
+            {**BY_EDGES, "family": "equiripple", "freedom": "mask"},
+            "filter.freedom must be left out for equiripple, not mask",
+        ),
         ({**BY_EDGES, "gain": 2}, "filter.gain must be left out with edges and losses, not 2"),
         (
             {**BY_EDGES, "stopband_edge": [10, 25]},
@@ -134,3 +143,12 @@ def test_numbers_are_exact() -> None:
 def test_refusals(table: Any, sentence: str) -> None:
     with pytest.raises(SpecificationError, match=f"^{re.escape(sentence)}$"):
         read(table)
+
+
+def test_freedom() -> None:
+    by_edges, by_order = {**BY_EDGES, "freedom": "mask"}, {**BY_ORDER, "freedom": "none"}
+    assert [read_filter_table(table, Fraction(100)).by_losses for table in (by_edges, by_order, BY_EDGES)] == [
+        True,
+        False,
+        False,
+    ]
