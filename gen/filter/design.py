@@ -57,7 +57,8 @@ class Filter:
     order : int
         Number of poles; of an FIR filter, of taps less 1.
     cutoff : tuple of float or None
-        Hz, as the family defines it; None if the sections were given, or the filter is any inside its mask.
+        Hz, as the family defines it, also of a filter that is only near that of the family; None if the sections were
+        given.
     passband_edge, stopband_edge : tuple of float or None
         Hz; None if the specification does not state them.
     passband_loss, stopband_loss : float or None
@@ -262,7 +263,6 @@ def design(spec: FilterSpec, sample_rate: Fraction | float) -> Filter:
         return _fir(spec, spec.taps, fs)
     if spec.family in FIR_FAMILIES:
         return replace(_fir(spec, _designed(spec, fs), fs), family=spec.family, kind=spec.kind)
-    cutoff: tuple[float, ...] | None
     order, cutoff = evaluate(lambda: _order_and_cutoff(spec, fs))
     alias: Aliasing | None = None
     if spec.method == "impulse_invariant":
@@ -273,7 +273,6 @@ def design(spec: FilterSpec, sample_rate: Fraction | float) -> Filter:
     elif spec.freedom == "mask":
         short = _short(spec, fs)
         rows, exact = tuple(tuple(map(float, row)) for row in short), evaluate(lambda: given_form(short))
-        cutoff = None  # that of the family is not quite its own
     else:
         rows, exact = evaluate(lambda: _bilinear(spec, fs))
     doubled = 2 if spec.kind in {"bandpass", "bandstop"} else 1

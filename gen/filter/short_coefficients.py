@@ -33,9 +33,14 @@ Array = npt.NDArray[np.float64]
 ExactRow = tuple[Fraction, ...]
 """(b0, b1, b2, 1, a1, a2)."""
 
-_GRIDS = (range(7), range(7, 10))
-"""Bits by which grids are finer than the coarsest one; the second ones where the first lead to nothing. Values on
-coarser grids are among those of each."""
+_SPARES = (*range(7), *range(8, 20, 2))
+"""Bits by which the finest grid is finer than the coarsest one, in the order in which they are tried."""
+
+_ENOUGH = 3
+"""Grids with a filter inside the mask, after which no finer one is tried."""
+
+_WINDOW, _LINE = 64, 4096
+"""Most steps to both sides, of two coefficients and of one: with them, only the neighbourhood of fine grids is seen."""
 
 _CHEAPEST, _NEAREST = 400, 100
 """Values of a unit that are tried: those with the fewest digits, and those nearest to the family's."""
@@ -143,15 +148,19 @@ def short_rows(cascade: tuple[Nominal, ...], mask: LossMask, at: int | None) -> 
     """
     if at is not None and not all(_is_power_of_two(_value_at(section.over, at)) for section in cascade):
         at = None
-    for spares in _GRIDS:
-        for points in _POINTS:
-            limits = evaluate(partial(_limits, mask, points))
-            found = [each for spare in spares if (each := _Search(cascade, limits, at, spare).best()) is not None]
-            for _, rows in sorted(found):
-                if keeps_to(_multiplied([row[:3] for row in rows]), mask, _multiplied([row[3:] for row in rows])):
-                    return rows
-            if not found:  # nor will there be one on more frequencies
+    for points in _POINTS:
+        limits = evaluate(partial(_limits, mask, points))
+        found: list[tuple[int, tuple[ExactRow, ...]]] = []
+        for spare in _SPARES:
+            best = _Search(cascade, limits, at, spare).best()
+            found += [] if best is None else [best]
+            if len(found) == _ENOUGH:
                 break
+        for _, rows in sorted(found):
+            if keeps_to(_multiplied([row[:3] for row in rows]), mask, _multiplied([row[3:] for row in rows])):
+                return rows
+        if not found:  # nor will there be one on more frequencies
+            break
     raise ShortfallError(
         "filter.freedom must be left out for these edges and losses: no filter with short coefficients was found that "
         "keeps to them"
@@ -180,7 +189,7 @@ class _Search:
         self._cascade = cascade
         self._limits = limits
         self._at = at
-        self._scales = _scales(cascade, limits.places)
+        self._scales, level = _scales(cascade, limits.places)
         # Zeros at the same places stay there together.
         moving = sorted({over[1] for over, _ in cascade if not over[1].is_integer()})
         self._places = {middle: len(cascade) + k for k, middle in enumerate(moving)}
@@ -190,7 +199,7 @@ class _Search:
                 self._fixed = self._fixed * _square(over, limits.places)
         middles = [over[1] for over, _ in cascade]
         zeros = [_zeros(middle, middles.count(middle), limits.places, spare) for middle in moving]
-        self._units = [*(self._poles(k, spare) for k in range(len(cascade))), *zeros, self._levels()]
+        self._units = [*(self._poles(k, spare) for k in range(len(cascade))), *zeros, self._levels(level, spare)]
 
     def best(self) -> tuple[int, tuple[ExactRow, ...]] | None:
         """Return the cheapest filter that is found, with its cost; None if none keeps to the mask."""
@@ -276,19 +285,19 @@ class _Search:
 
         return _unit(costs, taps, frac, square, under[1:])
 
-    def _levels(self) -> _Unit:
-        one = 1 << _LEVEL_BITS
-        taps = np.array([np.arange(one // 4, 4 * one + 1)]) if self._at is None else np.array([[one]])
-        costs, taps = _worth_trying(_costs(taps, _LEVEL_BITS), taps, np.array([one]))
+    def _levels(self, nominal: float, spare: int) -> _Unit:
+        frac = _LEVEL_BITS + spare if self._at is None else 0
+        taps = np.array([_around(nominal, nominal / 2, frac, _LINE) if self._at is None else [1]])
+        costs, taps = _worth_trying(_costs(taps, frac), taps, np.array([nominal]) * 2.0**frac)
         shape = self._limits.places.shape
-        return _unit(costs, taps, _LEVEL_BITS, lambda level: np.full(shape, float(level) ** 2), (1.0,))
+        return _unit(costs, taps, frac, lambda level: np.full(shape, float(level) ** 2), (nominal,))
 
 
 def _zeros(middle: float, count: int, places: Array, spare: int) -> _Unit:
     """Return values of the middle coefficient, between -2 and 2, of zeros on the unit circle in `count` sections."""
     reach = _SPREAD * (2 - abs(middle))
     frac = _bits_for(reach, spare)
-    taps = np.array([_around(middle, reach, frac)])
+    taps = np.array([_around(middle, reach, frac, _LINE)])
     costs, taps = _worth_trying(count * _costs(taps, frac), taps, np.array([middle]) * 2.0**frac)
     return _unit(costs, taps, frac, lambda c: _square((1.0, float(c), 1.0), places) ** count, (middle,))
 
@@ -310,17 +319,17 @@ def _near_poles(under: tuple[float, ...], spare: int) -> tuple[Whole, int]:
     if a2 == 0:
         reach = _SPREAD * (1 - abs(a1))
         frac = _bits_for(reach, spare)
-        firsts = _around(a1, reach, frac)
+        firsts = _around(a1, reach, frac, _LINE)
         return np.array([firsts, np.zeros_like(firsts)])[:, np.abs(firsts) < 1 << frac], frac
     damping = _SPREAD * (1 - a2)
     across = damping * (math.sqrt(max(0.0, 4 * a2 - a1 * a1)) + damping) / 2
     coarse, frac = _bits_for(damping, spare), _bits_for(across, spare)
     frac = max(coarse, frac)
     pairs = [np.zeros((2, 0), dtype=np.int64)]
-    for second in _around(a2, damping, coarse):
+    for second in _around(a2, damping, coarse, _WINDOW):
         # With the same angle, a1 is in proportion to the radius.
         radius = math.sqrt(max(second / 2**coarse, 0.0) / a2) if a2 > 0 else 1.0
-        firsts = _around(a1 * radius, across, frac)
+        firsts = _around(a1 * radius, across, frac, _WINDOW)
         pairs.append(np.array([firsts, np.full_like(firsts, second << (frac - coarse))]))
     taps = np.concatenate(pairs, axis=1)
     one = 1 << frac
@@ -332,8 +341,9 @@ def _bits_for(reach: float, spare: int) -> int:
     return max(2, math.ceil(-math.log2(reach)) + spare)
 
 
-def _around(middle: float, reach: float, frac: int) -> Whole:
-    """Return the multiples of a step in an interval, as their numbers of steps."""
+def _around(middle: float, reach: float, frac: int, most: int) -> Whole:
+    """Return multiples of a step in an interval, as their numbers of steps, at most so many to both sides."""
+    reach = min(reach, most * 2.0**-frac)
     return np.arange(math.ceil((middle - reach) * 2**frac), math.floor((middle + reach) * 2**frac) + 1, dtype=np.int64)
 
 
@@ -359,14 +369,14 @@ def _worth_trying(costs: Whole, counts: Whole, nominal: Array) -> tuple[Whole, W
     return costs[kept], counts[:, kept]
 
 
-def _scales(cascade: Sequence[Nominal], places: Array) -> list[Fraction]:
-    """Return the powers of two that keep the largest gain of a cascade so far nearest to 1."""
+def _scales(cascade: Sequence[Nominal], places: Array) -> tuple[list[Fraction], float]:
+    """Return the powers of two that keep the largest gain of a cascade so far nearest to 1, and what is left of it."""
     scales, so_far = [], np.ones_like(places)
     for over, under in cascade:
         so_far = so_far * _square(over, places) / _square(under, places)
         scales.append(Fraction(2) ** round(-math.log2(float(so_far.max())) / 2))
         so_far = so_far * float(scales[-1]) ** 2
-    return scales
+    return scales, 1 / math.sqrt(float(so_far.max()))
 
 
 def _limits(mask: LossMask, points: int) -> _Limits:

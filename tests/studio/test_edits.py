@@ -83,6 +83,9 @@ def test_one_form_takes_the_place_of_the_other() -> None:
     edges = {"passband_edge": 80.0, "stopband_edge": 200.0}
     assert masked == {"family": "butterworth", "kind": "lowpass"} | edges | losses
     assert filter_after(masked, order=3, cutoff=90.0) == FILTER["filter"] | {"order": 3, "cutoff": 90.0}
+    free = filter_after(masked, freedom="mask")
+    assert free == masked | {"freedom": "mask"}
+    assert filter_after(free, order=3, cutoff=90.0) == FILTER["filter"] | {"order": 3, "cutoff": 90.0}
     # an edge of the passband that passes that of the stopband takes it along
     assert filter_after(masked, passband_edge=220.0)["stopband_edge"] == 360.0
 

@@ -14,6 +14,7 @@ from sosmith.gen.specification.choices import (
     ARCHITECTURES,
     FAMILIES,
     FIR_FAMILIES,
+    FREEDOMS,
     KINDS,
     LOSSES,
     METHODS,
@@ -282,6 +283,7 @@ class Specification(View):
             "filter.family": (*FAMILIES, *FIR_FAMILIES),
             "filter.kind": KINDS,
             "filter.method": METHODS,
+            "filter.freedom": FREEDOMS,
             "hardware.realization": REALIZATIONS,
             "hardware.architecture": ARCHITECTURES,
             "hardware.start": STARTS,
@@ -331,7 +333,7 @@ class Specification(View):
 
     @property
     def filter(self) -> Filter:
-        """The ideal filter, without any rounding; takes milliseconds.
+        """The ideal filter, without any rounding; takes milliseconds, with `freedom` seconds.
 
         Raises
         ------

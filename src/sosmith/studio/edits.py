@@ -9,6 +9,7 @@ from sosmith import Specification
 
 BY_ORDER = ("order", "cutoff")
 BY_MASK = ("passband_edge", "stopband_edge")
+FREEDOM = "freedom"
 GIVEN = ("sos", "sos_file", "taps", "taps_file")
 LOSSES = {"passband_loss": 1.0, "stopband_loss": 40.0}
 """Losses in dB, and what they are where a form needs one that is not there yet."""
@@ -88,6 +89,8 @@ def completed(table: Mapping[str, Any], rate: float, changes: Mapping[str, Any])
     by_mask = forms[-1] in BY_MASK if set(named) & {*BY_ORDER, *BY_MASK} else forms[0] in BY_MASK
     needed = (*BY_MASK, *LOSSES) if by_mask else (*BY_ORDER, *Specification.losses(str(table.get("family"))))
     gone = {key for key in (*BY_ORDER, *BY_MASK, *LOSSES, *GIVEN) if key in table and key not in needed}
+    if FREEDOM in table and not by_mask:
+        gone.add(FREEDOM)
     wanted: dict[str, Any] = {key: table.get(key, loss) for key, loss in LOSSES.items() if key in needed}
     edges = _edges(table.get("passband_edge" if by_mask else "cutoff"), kind, half)
     if by_mask and _numbers(edges):

@@ -132,6 +132,8 @@ function reform(to) {
   }
 }
 
+const fallbacks = { "hardware.start": "steady", "filter.method": "bilinear", "filter.freedom": "none" };
+
 function controls() {
   const now = form(), stale = known.preview.error !== null;
   for (const label of document.querySelectorAll("#controls label[data-form]")) {
@@ -148,7 +150,7 @@ function controls() {
     const path = field.dataset.key, value = numbers(asked(path))[Number(field.dataset.at || 0)];
     if (field === document.activeElement && field.tagName !== "SELECT") continue;
     field.removeAttribute("aria-invalid");
-    const fallback = field.tagName === "SELECT" ? (path.endsWith("start") ? "steady" : path.endsWith("method") ? "bilinear" : "auto") : "";
+    const fallback = field.tagName === "SELECT" ? (fallbacks[path] || "auto") : "";
     const text = value === undefined ? fallback : `${value}`;
     if (field.value !== text) field.value = text;
     if (field.tagName === "SELECT" && path.startsWith("filter.")) field.disabled = now === "sections";
