@@ -77,7 +77,7 @@ def _signals() -> Iterator[None]:
         signal.signal(number, handler)
 
 
-SEARCHING = ("word_lengths", "realizations", "proof", "test_core.py")
+SEARCHING = ("word_lengths", "realizations", "proof", "test_core.py", "test_blocks.py")
 """Below ``tests/gen``: tests that change what the search for formats does, or that are about it."""
 
 
