@@ -77,7 +77,7 @@ def _signals() -> Iterator[None]:
         signal.signal(number, handler)
 
 
-SEARCHING = ("word_lengths", "realizations", "proof", "test_core.py", "test_blocks.py")
+SEARCHING = ("word_lengths", "realizations", "proof", "test_core.py")
 """Below ``tests/gen``: tests that change what the search for formats does, or that are about it."""
 
 
@@ -92,7 +92,7 @@ def _formats(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def searches_anew(request: pytest.FixtureRequest) -> bool:
-    """Whether a test is about the search itself."""
+    """Whether a test is about the search itself; one elsewhere that changes the search has it as a parameter, True."""
     within = request.path.relative_to(request.config.rootpath).parts[1:3]
     return len(within) == 2 and within[0] == "gen" and within[1] in SEARCHING
 
