@@ -113,7 +113,7 @@ class SimulatorBench:
     def _building(self, folder: Path, tool: Simulator) -> str:
         """Name the step of building, with its duration if it takes long."""
         step = f"building with {self.simulator}"
-        if self.simulator == "verilator" and not _builder(tool, folder / "build").has_library(waves=self.waves):
+        if self.simulator == "verilator" and not _builder(tool, folder / "build").has_library():
             return f"{step}, which takes about {LIBRARY_SECONDS} s the first time"
         return step
 
@@ -161,7 +161,7 @@ def has_library() -> bool:
     """
     with tempfile.TemporaryDirectory(prefix="sosmith-") as folder:
         tool = find_simulator("verilator", Path(folder) / "bin")
-        return _builder(tool, Path(folder)).has_library(waves=False)
+        return _builder(tool, Path(folder)).has_library()
 
 
 def _builder(tool: Simulator, folder: Path) -> Builder:

@@ -1,7 +1,7 @@
 """Builds the executable of a Verilated core with cocotb and the compiled loop, or takes it from the cache.
 
-Verilator's own library, which takes far longer to compile than a core, is kept by its text, the compiler and the flags;
-a model is kept by the core's text and all that goes into it besides.
+Verilator's own library, which takes far longer to compile than a core, is kept by its text and the compiler; what
+writes waveforms is kept beside it. A model is kept by the core's text and all that goes into it besides.
 """
 
 from __future__ import annotations
@@ -11,9 +11,11 @@ import os
 import re
 import shutil
 import subprocess
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from functools import partial
 from importlib import metadata
 from pathlib import Path
 from typing import IO
@@ -101,10 +103,9 @@ class Builder:
             [hashlib.sha256(path.read_bytes()).hexdigest() for path in texts],
         ]
 
-    def has_library(self, *, waves: bool) -> bool:
+    def has_library(self) -> bool:
         """Whether Verilator's library is in the cache."""
-        flags = _flags(waves=waves)
-        return self._cache.has("library", self._library_key(_library(waves=waves), flags))
+        return self._cache.has("library", self._library_key(_LIBRARY))
 
     def build(self, model: Model, target: Path) -> None:
         """Write the model's executable to `target`.
@@ -158,12 +159,8 @@ class Builder:
             self._compilers.run(command, objects)
             sources = _together([*sorted(objects.glob("Vtop*.cpp")), main], objects)
             compiled = self._compile(sources, [*flags, f"-I{objects}", f"-I{header.parent}"], objects)
-            names = _library(waves=False)
-            library_key = self._library_key(names, _flags(waves=False))
-            with self._cache.entry(
-                "library", library_key, lambda place: self._make_library(names, _flags(waves=False), place)
-            ) as library:
-                parts = [*compiled, *(library / f"{name}.o" for name in names)]
+            with self._libraries() as library:
+                parts = [*compiled, *library]
                 self._compilers.run(["g++", "-pthread", "-o", str(entry / "program"), *map(str, parts)], objects)
 
         with self._cache.entry("program", key, make) as entry:
@@ -184,23 +181,33 @@ class Builder:
         command += [*_ARGUMENTS, *(["--trace"] if model.waves else []), "ports.vlt", str(model.source)]
         self._compilers.run(command, objects)
         classes = (objects / "Vtop_classes.mk").read_text(encoding="utf-8")
-        names = sorted({*_library(waves=model.waves), *re.findall(r"^\s+(verilated\w*) \\", classes, re.MULTILINE)})
+        others = sorted({*re.findall(r"^\s+(verilated\w*) \\", classes, re.MULTILINE)} - {*_LIBRARY})
         sources = _together([*sorted(objects.glob("Vtop*.cpp")), _MAIN], objects)
         compiled = self._compile(sources, [*flags, f"-I{objects}"], objects)
         libraries = cocotb_tools.config.libs_dir
-        plain = _flags(waves=model.waves)
-        key = self._library_key(names, plain)
-        with self._cache.entry("library", key, lambda entry: self._make_library(names, plain, entry)) as library:
-            parts = [*compiled, *(library / f"{name}.o" for name in names)]
+        with self._libraries(others) as library:
+            parts = [*compiled, *library]
             cocotb = [f"-Wl,-rpath,{libraries}", f"-L{libraries}", "-lcocotbvpi_verilator"]
             # The compiled loop is called by name.
             self._compilers.run(["g++", "-pthread", "-rdynamic", "-o", str(target), *map(str, parts), *cocotb], objects)
 
-    def _make_library(self, names: Sequence[str], flags: Sequence[str], entry: Path) -> None:
-        self._compile([self._include / f"{name}.cpp" for name in names], flags, entry)
+    @contextmanager
+    def _libraries(self, others: Sequence[str] = ()) -> Iterator[list[Path]]:
+        """Yield the object files of Verilator's library, and of other files of it that not every model needs."""
+        objects: list[Path] = []
+        with ExitStack() as locked:
+            for kind, names in (("library", _LIBRARY), ("extra", tuple(others))):
+                if names:
+                    make = partial(self._make_library, names)
+                    entry = locked.enter_context(self._cache.entry(kind, self._library_key(names), make))
+                    objects += [entry / f"{name}.o" for name in names]
+            yield objects
 
-    def _library_key(self, names: Sequence[str], flags: Sequence[str]) -> str:
-        return key_of(self._tools, sorted(names), list(flags))
+    def _make_library(self, names: Sequence[str], entry: Path) -> None:
+        self._compile([self._include / f"{name}.cpp" for name in names], _FLAGS, entry)
+
+    def _library_key(self, names: Sequence[str]) -> str:
+        return key_of(self._tools, names, _FLAGS)
 
     def _compile(self, sources: Sequence[Path], flags: Sequence[str], folder: Path) -> list[Path]:
         """Compile each file into `folder`, on all processors; return the object files."""
@@ -225,10 +232,6 @@ def _together(sources: list[Path], folder: Path) -> list[Path]:
     together = folder / "together.cpp"
     together.write_text("".join(f'#include "{path.resolve()}"\n' for path in sources), encoding="utf-8")
     return [together]
-
-
-def _library(*, waves: bool) -> list[str]:
-    return [*_LIBRARY, *(["verilated_vcd_c"] if waves else [])]
 
 
 def _flags(*, waves: bool) -> list[str]:

@@ -13,7 +13,13 @@ import pytest
 
 from tests.suite.sweeps import covering
 
-pytest_plugins = ["pytester"]
+pytest_plugins = ["pytester", "tests.suite.kept_designs"]
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers() -> int:
+    """Return one worker more than there are processors: some tests wait for devices, pipes and ends of processes."""
+    return len(os.sched_getaffinity(0)) + 1
 
 
 @pytest.hookimpl(tryfirst=True)  # before `-m` takes its choice
@@ -84,11 +90,16 @@ def _formats(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.fixture
+def searches_anew(request: pytest.FixtureRequest) -> bool:
+    """Whether a test is about the search itself; one elsewhere that changes the search has it as a parameter, True."""
+    within = request.path.relative_to(request.config.rootpath).parts[1:3]
+    return len(within) == 2 and within[0] == "gen" and within[1] in SEARCHING
+
+
 @pytest.fixture(autouse=True)
-def _formats_are_kept(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch, _formats: Path) -> None:
+def _formats_are_kept(searches_anew: bool, monkeypatch: pytest.MonkeyPatch, _formats: Path) -> None:
     """Search for the formats of a design once a run, as a user's commands do, but anew where the search is tested."""
     kept = sys.modules.get("sosmith.gen.realizations.kept_formats")
     if kept is not None:
-        within = request.path.relative_to(request.config.rootpath).parts[1:3]
-        anew = len(within) == 2 and within[0] == "gen" and within[1] in SEARCHING
-        monkeypatch.setattr(kept, "cache_folder", lambda: None if anew else _formats)
+        monkeypatch.setattr(kept, "cache_folder", lambda: None if searches_anew else _formats)

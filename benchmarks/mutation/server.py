@@ -40,6 +40,8 @@ MEMORY = 8 << 30
 """Bytes that a run may take: a wrong shift makes long numbers."""
 _MESSAGE = 300
 _PLUGIN = "_hypothesis_pytestplugin"
+_KEPT = "tests.suite.kept_designs"
+"""A plugin of the tests that is left out: a test is to execute what it looks at, whatever ran before it."""
 
 Request = dict[str, Any]
 Answer = dict[str, Any]
@@ -153,7 +155,8 @@ def run_tests(request: Request, notes: TextIO) -> NoReturn:
     hypothesis.settings.load_profile("mutation")
     watch = Watch(request, notes)
     os.environ["PYTEST_DISABLE_PLUGIN_AUTOLOAD"] = "1"
-    options = ["-x", "-q", "-m", "not slow", "-p", "no:cacheprovider", "-p", _PLUGIN, "--hypothesis-seed=0"]
+    options = ["-x", "-q", "-m", "not slow", "-p", "no:cacheprovider", "-p", f"no:{_KEPT}", "-p", _PLUGIN]
+    options += ["--hypothesis-seed=0"]
     if request["trace"]:  # a test that is left out in its middle closes nothing, and the next one is not to blame
         options += ["-W", "ignore::ResourceWarning", "-W", "ignore::pytest.PytestUnraisableExceptionWarning"]
     leave_out = [option for test in request["without"] for option in ("--deselect", test)]

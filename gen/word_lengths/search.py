@@ -63,12 +63,14 @@ class _Input(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _Base:
-    """Reference formats, which others differ from in a few coefficients, and their deviation and error.
+    """Reference formats, which others differ from in a few places, and their deviation and errors.
 
-    `errors` holds those of the others that are known, by the sections and coefficients in which they differ.
+    `roundings` holds the errors of each section's quantizers, `error` that of all coefficients. `errors` holds those of
+    the others that are known, by the sections and coefficients in which they differ.
     """
 
     formats: tuple[SectionFormat, ...]
+    roundings: tuple[float, ...]
     deviation: Array
     error: float
     errors: dict[tuple[object, ...], float]
@@ -397,10 +399,18 @@ class Search:
 
     def error(self, choice: Choice) -> float:
         """Estimated sum of the errors of input stage, coefficients and rounding, in output LSBs."""
-        rounding = sum(
-            estimate.rounding(form.fracs) for estimate, form in zip(self._estimates, choice.formats, strict=True)
-        )
+        rounding = sum(self._roundings(choice.formats))
         return self._inputs[choice.input_stage].error + rounding + self.coefficient_error(choice)
+
+    def _roundings(self, formats: tuple[SectionFormat, ...]) -> tuple[float, ...]:
+        """Estimated error of the quantizers of each section, in output LSBs."""
+        base = self._base
+        return tuple(
+            base.roundings[k]
+            if base is not None and form.fracs is base.formats[k].fracs
+            else self._estimates[k].rounding(form.fracs)
+            for k, form in enumerate(formats)
+        )
 
     def coefficient_error(self, choice: Choice) -> float:
         """Estimated error of the coefficients in output LSBs."""
@@ -424,9 +434,9 @@ class Search:
         if base is not None and all(
             form.coefficients is before.coefficients for form, before in zip(formats, base.formats, strict=True)
         ):
-            return replace(base, formats=formats)
+            return replace(base, formats=formats, roundings=self._roundings(formats))
         deviation = self._deviation(formats, None)
-        return _Base(formats, deviation, largest_magnitude(deviation, self._windows), {})
+        return _Base(formats, self._roundings(formats), deviation, largest_magnitude(deviation, self._windows), {})
 
     def _deviation(self, formats: Sequence[SectionFormat], base: _Base | None) -> Array:
         """Deviation of the impulse response due to the coefficients, updated from that of `base`."""

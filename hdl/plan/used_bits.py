@@ -23,26 +23,27 @@ from sosmith.model.dataflow.graph import Graph, Node, Op
 
 def used_bits(graph: Graph) -> list[int]:
     """Return the number of bits of each node that are used; all of one that nothing uses."""
-    nodes = graph.nodes
+    nodes, widths = graph.nodes, [node.width for node in graph.nodes]
     used = [0] * len(nodes)
     for index in [*graph.outputs, *(nodes[delay].operands[0] for delay in graph.delays)]:
-        used[index] = nodes[index].width
+        used[index] = widths[index]
     for index in reversed(range(len(nodes))):
         node = nodes[index]
-        used[index] = min(used[index], node.width) or node.width
+        used[index] = min(used[index], widths[index]) or widths[index]
         for i in node.operands if node.op is not Op.DELAY else ():
-            used[i] = max(used[i], min(_asked(node, nodes[i], used[index]), nodes[i].width))
+            used[i] = max(used[i], min(_asked(node, nodes[i].frac, widths[i], used[index]), widths[i]))
     return used
 
 
-def _asked(node: Node, operand: Node, used: int) -> int:
-    """Return how many bits of an operand a node asks for, of which so many are used."""
-    if node.op in {Op.ADD, Op.SUBTRACT}:
-        return max(used - (node.frac - operand.frac), 0)
-    if node.op in {Op.SHIFT, Op.BOUND}:
+def _asked(node: Node, frac: int, width: int, used: int) -> int:
+    """Return how many bits of an operand, of `frac` and `width`, a node asks for, of which so many are used."""
+    op = node.op
+    if op is Op.ADD or op is Op.SUBTRACT:
+        return max(used - (node.frac - frac), 0)
+    if op is Op.SHIFT or op is Op.BOUND:
         return used
-    if node.op is Op.FLOOR:
-        return used + operand.frac - node.frac
-    if node.op is Op.FRACTION:
-        return operand.frac - node.parameter
-    return operand.width
+    if op is Op.FLOOR:
+        return used + frac - node.frac
+    if op is Op.FRACTION:
+        return frac - node.parameter
+    return width

@@ -199,7 +199,7 @@ def build(
     with (place / "build.log").open("w", encoding="utf-8") as log:
         try:
             builder = Builder(tool.version, tool.environment, place / "build", log, alone=True)
-            time = "" if builder.has_library(waves=False) else f", which takes about {LIBRARY_SECONDS} s the first time"
+            time = "" if builder.has_library() else f", which takes about {LIBRARY_SECONDS} s the first time"
             progress(f"building with {tool.name}{time}")
             (place / "build").mkdir(exist_ok=True)
             builder.build_program(source.resolve(), top, _MAIN, _PINS, program)

@@ -14,7 +14,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
 
-import pyte
 import pytest
 from tests.commands.command_line import (
     FILTER,
@@ -26,6 +25,7 @@ from tests.commands.command_line import (
     processes_with,
     wait_for,
 )
+from tests.suite.extras import needed
 
 from sosmith import cli
 from sosmith.sim import simulators
@@ -56,6 +56,7 @@ class Terminal:
     """
 
     def __init__(self) -> None:
+        pyte = needed("pyte")
         self._reader, self.writer = os.openpty()
         self._screen = pyte.Screen(columns=120, lines=60)
         self._stream = pyte.ByteStream(self._screen)
@@ -147,6 +148,7 @@ class InterruptedTerminal(io.TextIOBase):
     def __init__(self, at: int, *, before: bool) -> None:
         self._at = at
         self._before = before
+        pyte = needed("pyte")
         self._screen = pyte.Screen(columns=120, lines=20)
         self._stream = pyte.Stream(self._screen)
         self.writes = 0

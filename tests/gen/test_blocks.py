@@ -126,7 +126,8 @@ def test_auto_keeps_plain_loops_where_look_ahead_is_no_faster() -> None:
 
 
 @pytest.mark.slow
-def test_formats_of_long_responses_are_not_trimmed(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("searches_anew", [True])
+def test_formats_of_long_responses_are_not_trimmed(searches_anew: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """They are proven as they are found first, and take a little more."""
     trimmed = designed()
     monkeypatch.setattr(quantize, "_MOST_WORK", 0)
@@ -275,7 +276,8 @@ def test_twelve_poles_look_ahead_eight_samples() -> None:
     assert verify(proven(made)).bound * made.datapath.output.lsb <= made.spec.max_error
 
 
-def test_a_wrong_recursion_exceeds_its_bound(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("searches_anew", [True])
+def test_a_wrong_recursion_exceeds_its_bound(searches_anew: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """With A(w) in place of A(-w), it is another filter, which no word lengths bring within the error allowed."""
     wrong = broken(realization, "{1 << k: -first, 2 << k: second}", "{1 << k: first, 2 << k: second}")
     monkeypatch.setattr(realization, "polynomials", wrong.polynomials)

@@ -175,7 +175,7 @@ def test_a_core_built_elsewhere_is_not_built_again(tmp_path: Path, monkeypatch: 
         model = Model(source=write(tmp_path / name, each), top="stand_in", ports=ports, signals=(), waves=False)
         builder = Builder(tool.version, tool.environment, tmp_path / name)
         builder.build(model, tmp_path / name / "model")
-        assert builder.has_library(waves=False)
+        assert builder.has_library()
     one, two, other = ((tmp_path / name / "model").read_bytes() for name in ("one", "two", "other"))
     assert one == two != other
     assert [(tmp_path / name / "objects").exists() for name in ("one", "two", "other")] == [True, False, True]

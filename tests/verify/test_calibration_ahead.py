@@ -3,7 +3,9 @@
 import copy
 import re
 from collections.abc import Callable
+from dataclasses import dataclass
 from fractions import Fraction
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
@@ -21,9 +23,6 @@ from sosmith.verify.graph import RejectedError
 from sosmith.verify.program.check import check_program
 from sosmith.verify.specified.stated_specification import check_specification
 from sosmith.verify.verification import verify
-
-TREE = tree_of(small())
-PART = TREE["decimation"]["calibration"]
 
 
 def rejected(sentence: str) -> pytest.RaisesExc[RejectedError]:
@@ -123,102 +122,145 @@ def told(value: Fraction) -> str:
     return f"{value} = {float(value):.6g}"
 
 
-OWN = Fraction(PART["claims"]["budget"]["calibration"])
-WHOLE = Fraction(TREE["claims"]["budget"]["calibration"])
-GAIN = Fraction(TREE["claims"]["peak_gain"])
-BITS, WIDTH = PART["output"]["bits"], TREE["decimation"]["width"]
-MOST = (2**BITS - 1) * 2 ** (WIDTH - BITS)
 UNIT = Fraction(1, 2**64)
-LAST = PART["stages"][-1]["nodes"][PART["stages"][-1]["outputs"][0]]
 
-WRONG: list[tuple[str, Callable[[Any], None], str]] = [
+
+@dataclass(frozen=True)
+class Numbers:
+    """What the certificate of the small instrument claims, for the sentences about it."""
+
+    tree: Any
+
+    @cached_property
+    def part(self) -> Any:
+        return calibration(self.tree)
+
+    @cached_property
+    def own(self) -> Fraction:
+        return Fraction(self.part["claims"]["budget"]["calibration"])
+
+    @cached_property
+    def whole(self) -> Fraction:
+        return Fraction(self.tree["claims"]["budget"]["calibration"])
+
+    @cached_property
+    def gain(self) -> Fraction:
+        return Fraction(self.tree["claims"]["peak_gain"])
+
+    @cached_property
+    def bits(self) -> int:
+        return int(self.part["output"]["bits"])
+
+    @cached_property
+    def width(self) -> int:
+        return int(self.tree["decimation"]["width"])
+
+    @cached_property
+    def last(self) -> Any:
+        stage = self.part["stages"][-1]
+        return stage["nodes"][stage["outputs"][0]]
+
+
+@cache
+def numbers() -> Numbers:
+    return Numbers(tree_of(small()))
+
+
+WRONG: list[tuple[str, Callable[[Any], object], Callable[[Numbers], str]]] = [
     (
         "a calibration that errs less than it does",
         lambda tree: of_budget(tree, "calibration", -UNIT),
-        f"the part calibration of the budget must be {told(OWN)}, not {told(OWN - UNIT)}",
+        lambda n: f"the part calibration of the budget must be {told(n.own)}, not {told(n.own - UNIT)}",
     ),
     (
         "a port that is rounded to for nothing",
         lambda tree: of_budget(tree, "output rounding", -Fraction(1, 2)),
-        "the part output rounding of the budget must be 1/2 = 0.5, not 0 = 0",
+        lambda _: "the part output rounding of the budget must be 1/2 = 0.5, not 0 = 0",
     ),
     (
         "its error without the filter's gain",
-        lambda tree: tree["claims"]["budget"].update(calibration=str(WHOLE / GAIN)),
-        f"the part calibration of the budget must be {told(WHOLE)}, not {told(WHOLE / GAIN)}",
+        lambda tree: tree["claims"]["budget"].update(calibration=str(numbers().whole / numbers().gain)),
+        lambda n: f"the part calibration of the budget must be {told(n.whole)}, not {told(n.whole / n.gain)}",
     ),
     (
         "its error left out",
         lambda tree: tree["claims"]["budget"].pop("calibration"),
-        f"the parts of the budget must be {', '.join(TREE['claims']['budget'])}, not "
-        f"{', '.join(list(TREE['claims']['budget'])[1:])}",
+        lambda n: (
+            f"the parts of the budget must be {', '.join(n.tree['claims']['budget'])}, not "
+            f"{', '.join(list(n.tree['claims']['budget'])[1:])}"
+        ),
     ),
     (
         "a smaller gain of the filter",
-        lambda tree: tree["claims"].update(peak_gain=str(GAIN - UNIT)),
-        f"the peak_gain of the filter must be {told(GAIN)}, not {told(GAIN - UNIT)}",
+        lambda tree: tree["claims"].update(peak_gain=str(numbers().gain - UNIT)),
+        lambda n: f"the peak_gain of the filter must be {told(n.gain)}, not {told(n.gain - UNIT)}",
     ),
     (
         "limited before the decimator",
         limited,
-        "the calibration before the decimator must pass on all that it can give, not limit it",
+        lambda _: "the calibration before the decimator must pass on all that it can give, not limit it",
     ),
     (
         "a port that is too narrow",
-        lambda tree: calibration(tree)["output"].update(bits=BITS - 1),
-        f"the output must be whole codes in 0..{2 ** (BITS - 1) - 1}, not in "
-        f"{LAST['low']}..{LAST['high']} with 0 fraction bits",
+        lambda tree: calibration(tree)["output"].update(bits=numbers().bits - 1),
+        lambda n: (
+            f"the output must be whole codes in 0..{2 ** (n.bits - 1) - 1}, not in "
+            f"{n.last['low']}..{n.last['high']} with 0 fraction bits"
+        ),
     ),
     (
         "a port in other steps",
-        lambda tree: calibration(tree)["output"].update(lsb=str(Fraction(PART["output"]["lsb"]) * 2)),
-        "the part calibration of the budget must be 382492197/62500 = 6119.88, not 56169/62500 = 0.898704",
+        lambda tree: calibration(tree)["output"].update(lsb=str(Fraction(numbers().part["output"]["lsb"]) * 2)),
+        lambda _: "the part calibration of the budget must be 382492197/62500 = 6119.88, not 56169/62500 = 0.898704",
     ),
     (
         "a port with an offset",
         lambda tree: calibration(tree)["output"].update(zero="1"),
-        "the part output rounding of the budget must be 2049/2 = 1024.5, not 1/2 = 0.5",
+        lambda _: "the part output rounding of the budget must be 2049/2 = 1024.5, not 1/2 = 0.5",
     ),
     (
         "a port of another quantity",
         lambda tree: calibration(tree)["output"].update(unit="V"),
-        "the calibration must give mm, not V",
+        lambda _: "the calibration must give mm, not V",
     ),
     (
         "another polynomial",
         coefficient,
-        "the part calibration of the budget must be 104919/62500 = 1.6787, not 56169/62500 = 0.898704",
+        lambda _: "the part calibration of the budget must be 104919/62500 = 1.6787, not 56169/62500 = 0.898704",
     ),
     (
         "no polynomial",
         lambda tree: tree["ideal"].update(polynomial=None),
-        "a calibration before the decimator must have a polynomial",
+        lambda _: "a calibration before the decimator must have a polynomial",
     ),
     (
         "no calibration",
         lambda tree: tree["decimation"].pop("calibration"),
-        "a decimator must have one input, not 2",
+        lambda _: "a decimator must have one input, not 2",
     ),
     (
         "a polynomial of the only input behind the decimator",
         lambda tree: (tree["decimation"].pop("calibration"), tree["inputs"].pop()),
-        "the calibration must stand before the decimator",
+        lambda _: "the calibration must stand before the decimator",
     ),
     (
         "registers a bit short",
-        lambda tree: tree["decimation"].update(width=WIDTH - 1),
-        f"the registers of the decimator must hold 0..{MOST}, which {WIDTH - 1} bits do not",
+        lambda tree: tree["decimation"].update(width=numbers().width - 1),
+        lambda n: (
+            f"the registers of the decimator must hold 0..{(2**n.bits - 1) * 2 ** (n.width - n.bits)}, "
+            f"which {n.width - 1} bits do not"
+        ),
     ),
 ]
 
 
 @pytest.mark.sweep(7)
 @pytest.mark.parametrize(("change", "sentence"), [pytest.param(*case, id=subject) for subject, *case in WRONG])
-def test_what_is_wrong_is_rejected(change: Callable[[Any], None], sentence: str) -> None:
-    tree = copy.deepcopy(TREE)
+def test_what_is_wrong_is_rejected(change: Callable[[Any], object], sentence: Callable[[Numbers], str]) -> None:
+    tree = copy.deepcopy(numbers().tree)
     verify(read(tree))
     change(tree)
-    with rejected(sentence):
+    with rejected(sentence(numbers())):
         verify(read(tree))
 
 

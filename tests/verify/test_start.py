@@ -89,7 +89,7 @@ def node(tree: Any, of: str, name: str) -> Any:
     return next(found for found in stage(tree, of)["nodes"] if found.get("name") == name)
 
 
-def lie(edit: Callable[[Any], object], spec: str = STEADY) -> Any:
+def lie(edit: Callable[[Any], object], spec: str) -> Any:
     tree = copy.deepcopy(tree_of(spec))
     edit(tree)
     return tree
@@ -114,48 +114,55 @@ def without_the_stage(tree: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("tree", "message"),
+    ("edit", "spec", "message"),
     [
         pytest.param(
-            lie(holds_every_sample),
+            holds_every_sample,
+            STEADY,
             r"node 3 \(delay first\) of start must keep what the first sample gave it",
             id="holds every sample",
         ),
         pytest.param(
-            lie(never_starts),
+            never_starts,
+            STEADY,
             r"node 5 \(subtract\) of start must have the range .*",
             id="never starts",
         ),
         pytest.param(
-            lie(lambda t: node(t, "start", "held").update(high=126)),
+            lambda t: node(t, "start", "held").update(high=126),
+            STEADY,
             r"node 3 \(delay first\) of start must have the range -128\.\.126, not -128\.\.127",
             id="narrow",
         ),
         pytest.param(
-            lie(lambda t: t["ideal"].pop("start")),
+            lambda t: t["ideal"].pop("start"),
+            STEADY,
             "there must be 0 start stages, as the ideal filter says, not 1",
             id="of a filter that starts from zero",
         ),
         pytest.param(
-            lie(lambda t: t["ideal"].update(start="steady"), PLAIN),
+            lambda t: t["ideal"].update(start="steady"),
+            PLAIN,
             "there must be 1 start stages, as the ideal filter says, not 0",
             id="of a filter without a start",
         ),
         pytest.param(
-            lie(lambda t: stage(t, "start").update(role="section")),
+            lambda t: stage(t, "start").update(role="section"),
+            STEADY,
             "there must be 1 start stages, as the ideal filter says, not 0",
             id="as a section",
         ),
         pytest.param(
-            lie(lambda t: t["claims"]["budget"].update(start="0")),
+            lambda t: t["claims"]["budget"].update(start="0"),
+            STEADY,
             r"the part start of the budget must be 1/18446744073709551616 = 5\.42101e-20, not 0 = 0",
             id="part too small",
         ),
-        pytest.param(lie(without_the_stage), "section0 must have 1 inputs, not 2", id="left out"),
+        pytest.param(without_the_stage, STEADY, "section0 must have 1 inputs, not 2", id="left out"),
     ],
 )
-def test_a_wrong_start(tree: Any, message: str) -> None:
-    rejected(tree, message)
+def test_a_wrong_start(edit: Callable[[Any], object], spec: str, message: str) -> None:
+    rejected(lie(edit, spec), message)
 
 
 @pytest.mark.parametrize(

@@ -58,7 +58,7 @@ def test_a_chain_from_the_specification_to_the_proof(sosmith: Command) -> None:
 
 def test_a_chain_in_a_simulator(sosmith: Command) -> None:
     Path("rx.toml").write_text(CHAIN, encoding="utf-8")
-    run = sosmith("simulate", "rx.toml", "--simulator", "icarus", "-o", "run", "--json")
+    run = sosmith("simulate", "rx.toml", "--simulator", "icarus", "--seconds", "0.2", "-o", "run", "--json")
     assert run.status == 0
     summary = json.loads(run.stdout)
     assert summary == json.loads(Path("run/report.json").read_text(encoding="utf-8"))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -29,21 +29,34 @@ CASES = {
 _NAMES = {"REG_INPUTA_CLK": "A", "REG_INPUTB_CLK": "B", "REG_OUTPUT_CLK": "P", "REGMODE_B": "DO"}
 
 
-@pytest.mark.parametrize("case", CASES)
-def test_a_register_moves_if_nothing_else_is_asked_of_it(case: str, tmp_path: Path) -> None:
-    clocked, other, wanted = CASES[case]
-    text = f"""module top ({PORTS});
+@pytest.fixture(scope="module")
+def netlists(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """Return the netlist of every case; one Yosys makes them all, as starting it takes longer than its work."""
+    folder = tmp_path_factory.mktemp("netlists")
+    synthesis = find_board("ulx3s_25f").device.synthesis
+    script = []
+    for number, (clocked, other, _) in enumerate(CASES.values()):
+        (folder / f"{number}.sv").write_text(
+            f"""module top ({PORTS});
 reg [17:0] a, b; reg [35:0] w; integer i;
 (* ram_style = "block" *) reg [35:0] words [0:255];
 initial for (i = 0; i < 256; i = i + 1) words[i] = i * 36'd4241838687;
 assign other = {other};
 always @(posedge clk) begin {clocked} end
 endmodule
-"""
-    (tmp_path / "top.sv").write_text(text, encoding="utf-8")
-    synthesis = find_board("ulx3s_25f").device.synthesis
-    run_yosys(f"read_verilog -sv top.sv; {synthesis} -top top; write_json top.json", tmp_path)
-    netlist = json.loads((tmp_path / "top.json").read_text(encoding="utf-8"))
+""",
+            encoding="utf-8",
+        )
+        commands = (f"read_verilog -sv {number}.sv", f"{synthesis} -top top", f"write_json {number}.json")
+        script += ["design -reset", *commands]
+    run_yosys("; ".join(script), folder)
+    return {case: json.loads((folder / f"{number}.json").read_text("utf-8")) for number, case in enumerate(CASES)}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_register_moves_if_nothing_else_is_asked_of_it(case: str, netlists: dict[str, Any]) -> None:
+    *_, wanted = CASES[case]
+    netlist = netlists[case]
     before = cells_of(netlist).get("TRELLIS_FF", 0)
     packed = with_block_registers(netlist)
     parameters = [cell["parameters"] for cell in packed["modules"]["top"]["cells"].values()]

@@ -7,6 +7,7 @@ from types import TracebackType
 from typing import NamedTuple, Self
 
 from sosmith.sim.simulators import find_simulator
+from sosmith.sim.verilated_model import Builder
 
 _MAIN = Path(__file__).with_name("line_main.cpp")
 _MOST = 50_000_000  # clocks
@@ -25,11 +26,9 @@ def built(verilog: str, top: str, folder: Path) -> Path:
     tool = find_simulator("verilator", folder / "bin")
     (folder / "top.sv").write_text(verilog, encoding="utf-8")
     # Registers and memories without an initial value start at random.
-    command = ["verilator", "--cc", "--exe", "--build", "-Wno-fatal", "-O3", "-CFLAGS", "-O1", "--x-initial", "unique"]
-    command += ["--top-module", top, "--prefix", "Vtop", "--Mdir", "build", "-o", "line", "top.sv", str(_MAIN)]
-    done = subprocess.run(command, cwd=folder, env=tool.environment, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
-    return folder / "build" / "line"
+    builder = Builder(tool.version, tool.environment, folder)
+    builder.build_program(folder / "top.sv", top, _MAIN, _MAIN, folder / "line")
+    return folder / "line"
 
 
 class Line:

@@ -17,9 +17,12 @@ import sosmith
 from sosmith.gen.chain import design as chain_design
 from sosmith.gen.chain.response import gain_into_passband
 from sosmith.model.errors import ShortfallError, SpecificationError
-from sosmith.verify.certificate_file import SectionEntry, entries_text, on_grid
+from sosmith.verify.certificate_file import Certificate, SectionEntry, entries_text, on_grid
+from sosmith.verify.chain import check
 from sosmith.verify.chain.chain_file import ChainCertificate, read_chain, sealed_chain
 from sosmith.verify.chain.responses import Part, peak_gain
+from sosmith.verify.verdict.door import Judgement, judge
+from sosmith.verify.verification import Progress
 
 TREE: dict[str, Any] = {
     "name": "rx",
@@ -47,6 +50,25 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def folder(written: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(written, tmp_path / "copy"))
+
+
+_JUDGED: dict[tuple[object, ...], Judgement] = {}
+
+
+@pytest.fixture(autouse=True)
+def _stages_are_judged_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Judge a stage once as long as its files are the same: most tests change what is around them."""
+
+    def once(core: Certificate, progress: Progress, *, folder: Path | None, **options: Any) -> Judgement:
+        own = [] if folder is None else sorted(folder.glob(f"{core.name}*"))
+        stated = options["stated"]
+        words = None if stated is None else replace(stated, folder=Path())  # a stage without measurements
+        key = (*((path.name, path.read_bytes()) for path in own), options["content"], words)
+        if key not in _JUDGED:
+            _JUDGED[key] = judge(core, progress, folder=folder, **options)
+        return _JUDGED[key]
+
+    monkeypatch.setattr(check, "judge", once)
 
 
 def proven(folder: Path, *, spec: bool = True) -> sosmith.ChainProof:
