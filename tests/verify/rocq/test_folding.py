@@ -13,9 +13,10 @@ from tests.verify.certificate_edits import is_rejected
 from tests.verify.rocq.small import DECIMATED, GRID, checked, designed, needs_coqc
 
 from sosmith.verify.certificate_file import Certificate, certificate_text
+from sosmith.verify.graph import RejectedError
 from sosmith.verify.rocq.check import theorems
 from sosmith.verify.rocq.claims import Claim
-from sosmith.verify.rocq.kernel import STANDARD, RejectedError
+from sosmith.verify.rocq.kernel import STANDARD
 
 NAMES = ("decimator_folds", "filter_folds", "droop_is_corrected")
 _NEEDED = r"^Definition (?:decimator_|exact_sections)\b.*?\.$"
