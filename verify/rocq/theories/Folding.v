@@ -6,9 +6,9 @@
 
        u^N B(u) <= g^2 (R sin (pi (k - p) / R))^(2 N) A(u).
 
-   The right side without A falls with p. On an interval of u, B and A are written as sums of c_i X^i Y^(n - i), where X and Y are
-   the distances from its ends as shares of its length: the largest quotient of two coefficients then bounds that of the sums. Intervals are halved
-   until that is enough for all k. *)
+   The right side without A falls with p. On an interval of u, the quotient of u^N B(u) and A(u) is at most the largest one of
+   their coefficients (Forms.v); the right side is at least that at the interval's end. Intervals are halved until that is
+   enough for all k. A gain is then right whatever the numbers of the search were: they only decide whether it is found so. *)
 Require Import Bool ZArith Reals List Lia Lra. Import ListNotations.
 From Sosmith Require Import Definitions Streams Responses Angles Waves Forms.
 Open Scope R_scope.
