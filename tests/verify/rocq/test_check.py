@@ -303,7 +303,7 @@ def other_polynomial(tree: Any) -> None:
     ("text", "edit", "name"),
     [
         (SETTLING, sooner, "flagged"),
-        (DECIMATED, narrower, "decimated_within"),
+        (DECIMATED, narrower, "ranges_are_tight_"),
         (DECIMATED, less_decimation, "error_in_parts"),
         (BOTH, less_before, "ahead_is_bounded"),
         (BOTH, other_polynomial, "ahead_is_bounded"),
