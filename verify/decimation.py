@@ -56,14 +56,30 @@ def at_lower_rate(certificate: Certificate) -> Certificate:
     entry = certificate.decimation
     if entry is None:
         return certificate
-    require(bool(certificate.ideal.sections), "a decimator must have a filter behind it")
+    behind = handed_on(certificate)
     require(
         entry.factor & (entry.factor - 1) == 0,
         f"the factor of the decimator must be a power of two, not {entry.factor}",
     )
-    code = _behind(entry, _taken(certificate, entry))
+    _check_widths(entry, _taken(certificate, entry), behind.inputs[0])
     _check_aliasing(entry)
     _check_correction(entry, certificate.ideal.sections[-1])
+    return behind
+
+
+def handed_on(certificate: Certificate) -> Certificate:
+    """Return the certificate of what is behind a decimator, of which no figure is checked.
+
+    Raises
+    ------
+    RejectedError
+        If there is no filter behind it, or it does not take one code and hand on another.
+    """
+    entry = certificate.decimation
+    if entry is None:
+        return certificate
+    require(bool(certificate.ideal.sections), "a decimator must have a filter behind it")
+    code = _behind(entry, _taken(certificate, entry))
     ideal = certificate.ideal.model_copy(update={"polynomial": None})
     return certificate.model_copy(update={"inputs": (code,), "ideal": ideal, "decimation": None})
 
@@ -145,7 +161,15 @@ def _step(entry: DecimationEntry, port: PortEntry) -> Fraction:
 
 
 def _behind(entry: DecimationEntry, port: PortEntry) -> PortEntry:
-    """Check the widths of a decimator, and return the port of what leaves it."""
+    """Return the port of what leaves a decimator."""
+    bits = entry.width - entry.dropped
+    require(2 <= bits <= _MAX_BITS, f"what leaves the decimator must have 2 to {_MAX_BITS} bits, not {bits}")
+    lsb = _step(entry, port)
+    return PortEntry(name=port.name, bits=bits, signed=port.signed, lsb=lsb, zero=port.zero, unit=port.unit)
+
+
+def _check_widths(entry: DecimationEntry, port: PortEntry, output: PortEntry) -> None:
+    """Check that the words of a decimator and what leaves it hold all results."""
     ones = fmpz_poly([1] * entry.factor) ** entry.stages
     taps = [int(tap) for tap in ones.coeffs()]
     require(min(taps) > 0 and sum(taps) == entry.factor**entry.stages, "the taps of the decimator must be positive")
@@ -155,10 +179,6 @@ def _behind(entry: DecimationEntry, port: PortEntry) -> PortEntry:
         low <= least and most <= high,
         f"the registers of the decimator must hold {least}..{most}, which {entry.width} bits do not",
     )
-    bits = entry.width - entry.dropped
-    require(2 <= bits <= _MAX_BITS, f"what leaves the decimator must have 2 to {_MAX_BITS} bits, not {bits}")
-    lsb = _step(entry, port)
-    output = PortEntry(name=port.name, bits=bits, signed=port.signed, lsb=lsb, zero=port.zero, unit=port.unit)
     half = 1 << entry.dropped >> 1
     for result in (least, most):
         rounded = (result + half) >> entry.dropped
@@ -166,7 +186,6 @@ def _behind(entry: DecimationEntry, port: PortEntry) -> PortEntry:
             output.lowest <= rounded <= output.highest,
             f"what leaves the decimator must be in {output.lowest}..{output.highest}, not {rounded}",
         )
-    return output
 
 
 def _check_aliasing(entry: DecimationEntry) -> None:

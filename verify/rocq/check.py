@@ -8,13 +8,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from sosmith.model.errors import ToolError
-from sosmith.verify.bounds.largest_gain import check_bands
 from sosmith.verify.certificate_file import Certificate
-from sosmith.verify.decimation import at_lower_rate
+from sosmith.verify.decimation import handed_on
 from sosmith.verify.rocq.bound import bound_claims, why_no_bound
 from sosmith.verify.rocq.cascade import cascade_of
 from sosmith.verify.rocq.claims import Claim, gain_claims
 from sosmith.verify.rocq.flat import flattened
+from sosmith.verify.rocq.folding import folding_claims
 from sosmith.verify.rocq.kernel import LIBRARY, THEORIES, ending, mark, run_kernel, theory_texts
 from sosmith.verify.rocq.ranges import core_definitions, range_claims, tight_claim
 from sosmith.verify.rocq.settling import counter_of
@@ -150,9 +150,7 @@ def theorems(certificate: Certificate) -> Theorems:
     RejectedError
         If its claims cannot be written as theorems.
     """
-    behind = at_lower_rate(certificate)
-    if certificate.decimation is not None:  # what no theorem is about, but has to be right
-        check_bands(certificate.decimation, certificate.ideal.sections)
+    behind = handed_on(certificate)
     graph = flattened(behind)
     claims = list(gain_claims(certificate))
     unchecked = list(_beside(certificate))
@@ -165,8 +163,11 @@ def theorems(certificate: Certificate) -> Theorems:
     why = why_no_bound(certificate)
     if why is not None or cascade is None:
         unchecked.insert(0, f"error bound: {why}")
+        if certificate.decimation is not None:
+            unchecked.append("what folds into the pass band at the decimator")
     else:
         claims += bound_claims(certificate, behind, cascade, start, counter)
+        claims += folding_claims(certificate)
     return Theorems(core_definitions(graph), claims, tuple(unchecked))
 
 
@@ -174,8 +175,6 @@ def _beside(certificate: Certificate) -> Iterator[str]:
     """Name the claims that no theorem is about."""
     if certificate.claims.online is not None:
         yield "the units of sections in on-line arithmetic"
-    if certificate.decimation is not None:
-        yield "what folds into the pass band at the decimator"
 
 
 def _texts(made: Theorems) -> dict[str, str]:

@@ -60,3 +60,11 @@ def test_what_it_rests_on_needs_no_proof(text: str) -> None:
     assert re.findall(r"^(?:From|Require)\b.*", general, re.MULTILINE) == [
         "Require Import ZArith Reals List. Import ListNotations. Open Scope Z_scope."
     ]
+
+
+def test_what_folds_is_said_in_few_lines() -> None:
+    texts = rocq_texts(designed(DECIMATED))
+    parts = to_read(texts, "filter_folds")
+    names = {re.split(r"\W+", part, maxsplit=2)[1] for part in parts}
+    assert names == {"filter_folds", "decimator_", "exact_sections", "pass_edge", "passing_gains", "band_gains"}
+    assert sum(text.count("\n") + 1 for text in (texts["Definitions.v"], *parts)) < LIMIT

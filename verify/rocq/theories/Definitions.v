@@ -131,3 +131,23 @@ Definition averaged (d : decimator) (u : nat -> R) (n : nat) : R :=
 
 (* 6. A filter of which every R-th result leaves: the first sample goes in so many times before it counts. *)
 Definition filled (count : nat) (x : nat -> nat -> Z) : nat -> nat -> Z := fun n => x (n - count)%nat.
+
+(* 7. What folds. A sinusoid of a frequency, in units of the sample rate, and of an amplitude of at most g. *)
+Definition wave (frequency g : R) (u : signal) : Prop := exists a b, (a * a + b * b <= g * g)%R
+  /\ forall k, u k = (a * cos (2 * PI * frequency * IZR k) + b * sin (2 * PI * frequency * IZR k))%R.
+(* What sections in a row answer to it for ever: such a sinusoid behind each. *)
+Fixpoint steady_answer (frequency : R) (sections : list (list Z * list Z)) (x y : signal) : Prop :=
+  match sections with
+  | [] => forall k, y k = x k
+  | (B, A) :: others => exists m, (exists g, wave frequency g m) /\ (forall k, taps A m k = taps B x k)
+      /\ steady_answer frequency others m y
+  end.
+(* The means of a decimator at the lower rate, without rounding. *)
+Definition lowered (d : decimator) (u : signal) : signal := fun n => Nat.iter (stages d) (mean (factor d)) u (n * Z.of_nat (factor d)).
+(* A sinusoid of amplitude 1 whose frequency is p, in units of the lower rate, away from the k-th multiple of that rate comes
+   out at the frequency p: of an amplitude of at most the k-th of these gains, for all p up to an edge and all k. *)
+Definition folds_at_most (d : decimator) (sections : list (list Z * list Z)) (edge : R) (gains : list ratio) : Prop :=
+  forall k p f, (1 <= k <= factor d / 2)%nat -> (0 <= p <= edge)%R ->
+    f = ((INR k - p) / INR (factor d))%R \/ f = ((INR k + p) / INR (factor d))%R ->
+    forall x y, wave f 1 x -> steady_answer p sections (lowered d x) y ->
+    forall n, (Rabs (y n) <= real (nth (k - 1) gains (0, 1)%Z))%R.
