@@ -48,6 +48,7 @@ def chain_texts(design: ChainDesign, progress: Progress = lambda step: None) -> 
     for stage, proven in zip(design.stages, claims, strict=True):
         progress(f"stage {stage.spec.name}")
         texts |= generated(stage.design, claims=proven)
+        texts[f"{proven.name}.toml"] = stage.design.spec.text
     own = {
         f"{name}.sv": top_text(design),
         f"{name}.json": to_json(_manifest(design, claims)),

@@ -5,18 +5,13 @@ Only one text says that, apart from comments and blanks, so that it is compared 
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
 
+from sosmith.verify.c_model.tokens import tokens_of
 from sosmith.verify.certificate_file import Certificate
 from sosmith.verify.chain.chain_file import ChainCertificate
 from sosmith.verify.chain.responses import factor_of, parts_of
 from sosmith.verify.graph import require
-
-_COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
-_TOKEN = re.compile(r"\w+|\S", re.ASCII)
-_SPLICES = ("\\", "??/")
-"""What joins a line to the next before comments are found, so that one may end where it does not seem to."""
 
 
 def check_chain_model(source: str, header: str, chain: ChainCertificate, cores: Sequence[Certificate]) -> None:
@@ -62,16 +57,9 @@ def _calls(chain: ChainCertificate, cores: Sequence[Certificate]) -> Iterator[st
 
 
 def _same(text: str, wanted: Sequence[str], what: str) -> None:
-    require(not any(splice in text for splice in _SPLICES), f"{what} must be without lines that are joined")
-    own = [token for line in _COMMENT.sub(" ", text).split("\n") for token in _tokens(line)]
-    other = [token for line in wanted for token in _tokens(line)]
+    own = [token.text for token in tokens_of(text, what)]
+    other = [token.text for token in tokens_of("\n".join(wanted), what)]
     for k, token in enumerate(other):
         read = own[k] if k < len(own) else ""
         require(read == token, f"{what} must have {token} after {' '.join(other[max(0, k - 4) : k])!r}, not {read!r}")
     require(len(own) == len(other), f"{what} must end after {' '.join(other[-4:])!r}, not go on")
-
-
-def _tokens(line: str) -> list[str]:
-    """Return the tokens of a line; a line for the preprocessor is one, since it ends what it says."""
-    bare = line.strip(" \t\r")
-    return [bare] if bare.startswith("#") else _TOKEN.findall(line)

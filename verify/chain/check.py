@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path
 
 from sosmith.verify.bounds.l1_response import UndecidedError
-from sosmith.verify.certificate_file import Certificate, ItemEntry, PortEntry, entries_text, on_grid, read_certificate
+from sosmith.verify.certificate_file import Certificate, ItemEntry, PortEntry, entries_in, entries_text, on_grid
 from sosmith.verify.chain.c_model import check_chain_model
 from sosmith.verify.chain.chain_file import ChainCertificate, sealed_chain
 from sosmith.verify.chain.folding import check_folding
@@ -106,9 +106,9 @@ def judge_chain(
             f"the certificate of stage {entry.name} must be {name}.certificate.json, not {entry.certificate.name}",
         )
         path = folder / entry.certificate.name
-        own = content_of(path)
+        own = content_of(path, links=False)
         _compare(str(path), entry.certificate.sha256, own)
-        core = read_certificate(path)
+        core = entries_in(own, path, Certificate)
         require(
             entries_text(core).encode() == own,
             f"the certificate of stage {entry.name} must have the layout in which it was written, not another one",
@@ -267,7 +267,7 @@ def _check_files(
     require(names == wanted, f"the files of the chain must be {', '.join(wanted)}, not {', '.join(names)}")
     contents = {}
     for entry in chain.files:
-        contents[entry.name] = content_of(folder / entry.name)
+        contents[entry.name] = content_of(folder / entry.name, links=False)
         _compare(str(folder / entry.name), entry.sha256, contents[entry.name])
     sv, json, c, h = wanted
     texts = [

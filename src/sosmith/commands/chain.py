@@ -17,8 +17,10 @@ if TYPE_CHECKING:
     from sosmith.interface.chain.specification import ChainSpecification
 
 
-def refuse(**options: Any) -> None:
+def refuse(instead: str = "", **options: Any) -> None:
     """Refuse options of a command that a chain does not take, by their names; None and False are not given.
+
+    `instead` says what to do, and begins with a colon.
 
     Raises
     ------
@@ -29,6 +31,7 @@ def refuse(**options: Any) -> None:
         if value is not None and value is not False:
             raise SpecificationError(
                 f"--{name.replace('_', '-')} must be left out with a chain of stages, as it is for a single core only"
+                f"{instead}"
             )
 
 

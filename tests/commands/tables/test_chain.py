@@ -86,5 +86,29 @@ def test_other_commands_say_that_they_take_no_chain(sosmith: Command) -> None:
     assert refused.status == 2
     assert refused.messages[-1] == (
         "sosmith: error: rx.toml: not yet available: stage must be left out here, as only design, generate, simulate "
-        "and verify take a chain, not [a table, a table]"
+        "and verify take a chain: `sosmith generate` writes a specification of each stage beside the chain's files, "
+        "for what takes a single core, not [a table, a table]"
+    )
+
+
+def test_a_stage_alone_goes_where_a_chain_does_not(sosmith: Command) -> None:
+    Path("rx.toml").write_text(CHAIN, encoding="utf-8")
+    sosmith("generate", "rx.toml", "-o", "rx")
+    refused = sosmith("verify", "rx/rx.certificate.json", "--rocq")
+    assert refused.status == 2
+    assert refused.messages[-1] == (
+        "sosmith: error: --rocq must be left out with a chain of stages, as it is for a single core only: give it with "
+        "the certificate of each stage, such as rx/rx_slow.certificate.json"
+    )
+    assert sosmith("verify", "rx/rx_slow.certificate.json", "--spec", "rx/rx_slow.toml").status == 0
+
+
+def test_the_studio_opens_no_chain(sosmith: Command) -> None:
+    Path("rx.toml").write_text(CHAIN, encoding="utf-8")
+    refused = sosmith("studio", "rx.toml", "--no-browser")
+    assert refused.status == 2
+    assert refused.messages[-1] == (
+        "sosmith: error: rx.toml: the specification must be that of a single core, not of a chain: `sosmith design "
+        "rx.toml` shows a chain, and `sosmith generate rx.toml` writes a specification of each stage, which the studio "
+        "opens"
     )

@@ -55,7 +55,7 @@ def test_two_runs_write_the_same_bytes(chain: sosmith.Chain, tmp_path: Path) -> 
     first = {path.name: path.read_bytes() for path in chain.generate(tmp_path / "one")}
     again = {path.name: path.read_bytes() for path in sosmith.design_chain(TREE).generate(tmp_path / "two")}
     assert first == again
-    assert len(first) == 5 + 6 * 3
+    assert len(first) == 5 + 7 * 3
 
 
 def test_stages_have_the_architecture_that_each_asks_for(chain: sosmith.Chain) -> None:

@@ -32,6 +32,7 @@ TREE: dict[str, Any] = {
     ],
     "output": {"bits": 10, "range": [-1.0, 1.0], "signed": True},
 }
+COMMENT = r"^line \d+ of rx\.c must have a comment of plain letters$"
 CERTIFICATE = "rx.certificate.json"
 
 
@@ -155,6 +156,15 @@ def test_a_stage_that_was_changed_is_refused(folder: Path) -> None:
         proven(folder)
 
 
+@pytest.mark.parametrize("name", ["rx_low.certificate.json", "rx.sv", "rx_slow.sv"])
+def test_a_link_out_of_the_folder_is_not_followed(name: str, folder: Path) -> None:
+    elsewhere = folder.parent / name
+    (folder / name).rename(elsewhere)
+    (folder / name).symlink_to(elsewhere)
+    with pytest.raises(ShortfallError, match=r"must be a file that can be read, not: it is a symbolic link$"):
+        proven(folder, spec=False)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "sentence"),
     [
@@ -193,9 +203,21 @@ def test_another_wire_is_refused(old: str, new: str, sentence: str, folder: Path
     [
         ("rx.c", "result, status))", "result, NULL))", r"^rx\.c must have status after "),
         ("rx.c", "return 1;", "return 0;", r"^rx\.c must have 1 after "),
-        ("rx.c", "return 1;", "/* *\\\n/ return 0; /* */ return 1;", r"^rx\.c must be without lines that are joined$"),
-        ("rx.c", "return 1;", "/* *??/\n/ return 0; /* */ return 1;", r"^rx\.c must be without lines that are joined$"),
-        ("rx.c", "return 1;", "return\u00a01;", r"^rx\.c must have 1 after "),
+        (
+            "rx.c",
+            "return 1;",
+            "/* *\\\n/ return 0; /* */ return 1;",
+            r"^line \d+ of rx\.c must have a comment of plain letters$",
+        ),
+        (
+            "rx.c",
+            "return 1;",
+            "/* *??/\n/ return 0; /* */ return 1;",
+            r"^line \d+ of rx\.c must have a comment of plain letters$",
+        ),
+        ("rx.c", "return 1;", "return\u00a01;", r"^line \d+ of rx\.c must be of the C that is written for a model$"),
+        ("rx.c", "return 1;", "return 1; // 0", r"^line \d+ of rx\.c must not have what means something else$"),
+        ("rx.c", "return 1;", "return 1%:;", r"^line \d+ of rx\.c must not have what means something else$"),
         ("rx.h", "rx_low_state stage_low;", "rx_slow_state stage_low;", r"^rx\.h must have rx_low_state after "),
         ("rx.json", '"decimate": 4', '"decimate": 2', r"^decimate of the manifest must be 4, not 2$"),
         ("rx.json", '"channels": 1', '"channels": true', r"^channels of the manifest must be 1, not True$"),
