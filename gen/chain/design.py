@@ -23,6 +23,8 @@ from sosmith.gen.fpga.boards import Board
 from sosmith.gen.specification.specification import Specification
 from sosmith.gen.word_lengths.selection import Progress
 from sosmith.model.arrays import Codes
+from sosmith.model.dataflow.downsampler import gathered
+from sosmith.model.dataflow.status import Flag
 from sosmith.model.errors import ShortfallError
 from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
@@ -128,6 +130,22 @@ class ChainDesign:
             return None
         return gain_into_passband(self.parts, self.edge)
 
+    @property
+    def carried_flags(self) -> int:
+        """Flags of the inputs that a result can have: `input_at_rail`, and `outside_calibration` where some is."""
+        first = self.stages[0].design.datapath
+        everything = tuple((port.lowest, port.highest) for port in first.inputs)
+        return 1 if first.calibrated == everything else 2
+
+    @property
+    def settling(self) -> int:
+        """Results of a channel that are flagged as settling: until all stages have settled, one after the other."""
+        samples, step = 0, 1
+        for stage in self.stages:
+            samples += stage.design.quantized.settling * step
+            step *= stage.design.datapath.samples_per_result
+        return -(-samples // step)
+
     def compute(self, codes: Codes) -> Codes:
         """Compute the output codes of input codes, bit for bit as the hardware does.
 
@@ -142,10 +160,24 @@ class ChainDesign:
         return self.compute_with_status(codes)[0]
 
     def compute_with_status(self, codes: Codes) -> tuple[Codes, npt.NDArray[np.uint8]]:
-        """Compute the output codes and the flags of the last stage, both of the shape (results, channels)."""
-        for stage in self.stages[:-1]:
-            codes = stage.design.datapath.compute(codes)[:, :, None]
-        return self.stages[-1].design.datapath.compute_with_status(codes)
+        """Compute the output codes and the flags, both of the shape (results, channels).
+
+        A result has the flags of all samples of its channel since the result before.
+        """
+        *early, last = self.stages
+        gathering = np.zeros((len(codes), codes.shape[1]), dtype=np.uint8)
+        for stage in early:
+            codes, status = stage.design.datapath.compute_with_status(codes)
+            codes = codes[:, :, None]
+            if stage is early[0]:
+                gathering = status & np.uint8((1 << self.carried_flags) - 1)
+        results, status = last.design.datapath.compute_with_status(codes)
+        if early:
+            factor = self.factor // early[0].design.datapath.samples_per_result
+            columns = [gathered(gathering[:, k], factor) for k in range(gathering.shape[1])]
+            status = status | np.stack(columns, axis=1)
+            status[: self.settling] |= np.uint8(1 << Flag.SETTLING)
+        return results, status
 
 
 def design_chain(spec: ChainSpec, *, board: Board | None = None, progress: Progress = lambda step: None) -> ChainDesign:

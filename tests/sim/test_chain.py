@@ -66,6 +66,32 @@ def instrument() -> dict[str, Any]:
     }
 
 
+def test_a_fault_of_an_early_stage_reaches_every_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A stage whose flags say so from one of its results on: so do those of the chain from the same sample on."""
+    whole = simulation.whole_text
+
+    def faulty(design: Any, directory: Path) -> str:
+        text = whole(design, directory)
+        assert ".stage_cal_tuser(stage_cal_tuser)" in text
+        return text.replace(
+            ".stage_cal_tuser(stage_cal_tuser)", f".stage_cal_tuser({{1'b0, stage_cal_tdata[{bit}], 6'b0}})"
+        )
+
+    monkeypatch.setattr(simulation, "whole_text", faulty)
+    tree = instrument()
+    tree["stage"][0]["protect"] = "detect"
+    chain = sosmith.design_chain(tree)
+    volts = np.repeat([0.01, 9.9], 20)
+    ports = chain.core.spec.base.inputs
+    codes = np.stack([ports[0].encode(volts), ports[1].encode(np.full(40, 20.0))], axis=1)
+    between = chain.core.stages[0].design.datapath.compute(codes)
+    bit = int(~between[0] & between[-1] & -(~between[0] & between[-1])).bit_length() - 1
+    report = chain.simulate({"voltage": volts, "temperature": [20.0] * 40}, folder=tmp_path, simulator="icarus")
+    wrong = int((between[::2] >> bit & 1).sum())
+    assert 0 < wrong < len(between) // 2
+    assert wrong <= report.summary["mismatches"] <= wrong + 2  # a result on its way may already say so
+
+
 def test_a_core_that_gives_another_result_is_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A top in which a stage is taken twice is no chain, and the run says so."""
     whole = simulation.whole_text
