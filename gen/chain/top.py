@@ -44,18 +44,28 @@ def chain_interface(design: ChainDesign) -> InterfaceFacts:
     )
 
 
+def top_ports(design: ChainDesign) -> list[tuple[str, str, int]]:
+    """Return direction, name and width of the ports: clock and reset, streams, and the registers of each stage."""
+    face = chain_interface(design)
+    return [
+        ("input", "aclk", 1),
+        ("input", "aresetn", 1),
+        *_stream("s_axis", face.inputs, "input"),
+        *_stream("m_axis", face.outputs, "output"),
+        *(
+            (way, f"{_port_of(stage)}_{signal}", width)
+            for stage in design.stages
+            for way, signal, width in _registers(stage)
+        ),
+    ]
+
+
 def top_text(design: ChainDesign) -> str:
     """SystemVerilog of the top module and its flags; the modules of the cores stand in their own files."""
     faces = [interface_facts(stage.design) for stage in design.stages]
     names = [f"stage_{stage.spec.name}" for stage in design.stages]
-    inputs, outputs, unit = faces[0].inputs, faces[-1].outputs, flags_unit(design)
-    ports = [("input", "aclk", 1), ("input", "aresetn", 1)]
-    ports += [*_stream("s_axis", inputs, "input"), *_stream("m_axis", outputs, "output")]
-    ports += [
-        (way, f"{_port_of(stage)}_{signal}", width)
-        for stage in design.stages
-        for way, signal, width in _registers(stage)
-    ]
+    outputs, unit = faces[-1].outputs, flags_unit(design)
+    ports = top_ports(design)
     lines = [f"module {design.name}({', '.join(name for _, name, _ in ports)});"]
     for direction, name, width in ports:
         lines += [f"  {direction} {_range(width)}{name};", f"  wire {_range(width)}{name};"]

@@ -1,4 +1,4 @@
-"""What `design`, `generate`, `simulate` and `verify` do with a chain of stages."""
+"""What `design`, `generate`, `package`, `simulate` and `verify` do with a chain of stages."""
 
 from __future__ import annotations
 
@@ -62,6 +62,16 @@ def write_chain(asked: ChainSpecification, board: str | None, output: Path | Non
 
     with show_progress() as step:
         paths = design_chain(asked, board=board, progress=step).generate(output or default_folder(asked.name), step)
+    for path in paths:
+        click.echo(path)
+
+
+def pack_chain(asked: ChainSpecification, board: str | None, folder: Path, vlnv: str | None) -> None:
+    """Pack a chain for other tools, and print the paths of the files."""
+    from sosmith.interface.chain.design import design_chain
+
+    with show_progress() as step:
+        paths = design_chain(asked, board=board, progress=step).package(folder, vlnv=vlnv, progress=step)
     for path in paths:
         click.echo(path)
 

@@ -56,6 +56,14 @@ def test_a_chain_from_the_specification_to_the_proof(sosmith: Command) -> None:
     assert "stage out: " in refused.messages[-1]
 
 
+def test_a_chain_in_a_package(sosmith: Command) -> None:
+    Path("rx.toml").write_text(CHAIN, encoding="utf-8")
+    paths = sosmith("package", "rx.toml", "-o", "packed").stdout.split()
+    assert {"packed/README.md", "packed/rx.core", "packed/core/rx.sv", "packed/bench/rx_bench.sv"} <= set(paths)
+    refused = sosmith("package", "rx.toml", "--core", "filter")
+    assert refused.status == 2
+
+
 def test_a_chain_in_a_simulator(sosmith: Command) -> None:
     Path("rx.toml").write_text(CHAIN, encoding="utf-8")
     run = sosmith("simulate", "rx.toml", "--simulator", "icarus", "-o", "run", "--json")
@@ -85,9 +93,9 @@ def test_other_commands_say_that_they_take_no_chain(sosmith: Command) -> None:
     refused = sosmith("explore", "rx.toml")
     assert refused.status == 2
     assert refused.messages[-1] == (
-        "sosmith: error: rx.toml: not yet available: stage must be left out here, as only design, generate, simulate "
-        "and verify take a chain: `sosmith generate` writes a specification of each stage beside the chain's files, "
-        "for what takes a single core, not [a table, a table]"
+        "sosmith: error: rx.toml: not yet available: stage must be left out here, as only design, generate, package, "
+        "simulate and verify take a chain: `sosmith generate` writes a specification of each stage beside the chain's "
+        "files, for what takes a single core, not [a table, a table]"
     )
 
 

@@ -171,6 +171,23 @@ class Chain(View):
         """
         return generate_chain(self.core, Path(fspath(folder)), lambda step: progress(step, 0, 0))
 
+    def package(
+        self,
+        folder: str | PathLike[str],
+        *,
+        vlnv: str | None = None,
+        progress: Progress = lambda step, done, total: None,
+    ) -> list[Path]:
+        """Write the chain and what other tools need to take it in into `folder`; return the paths of the files.
+
+        Parameters and errors are those of `Design.package`.
+        """
+        from sosmith.gen.chain.package import package_chain
+        from sosmith.gen.output.packages.vlnv import Vlnv
+
+        named = None if vlnv is None else Vlnv.read(vlnv)
+        return package_chain(self.core, Path(fspath(folder)), lambda step: progress(step, 0, 0), vlnv=named)
+
     def simulate(
         self,
         trace: str | PathLike[str] | Mapping[str, npt.ArrayLike] | None = None,
