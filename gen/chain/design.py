@@ -233,13 +233,8 @@ class _Budget:
             return (Part(sections, response.factor),)
         return cic(pre_stage.decimator.factor, pre_stage.decimator.stages), Part(sections)
 
-    def _gains(self, parts: Sequence[tuple[Part, ...]]) -> list[Fraction]:
-        """Return how much of an error behind each stage reaches the end."""
-        behind = [tuple(part for each in parts[k + 1 :] for part in each) for k in range(len(parts))]
-        return [on_grid(peak_gain(each)) if each else Fraction(1) for each in behind]
-
     def _first_shares(self, parts: Sequence[tuple[Part, ...]]) -> _Shares:
-        gains = self._gains(parts)
+        gains = gains_to_the_end(parts)
         early = len(parts) - 1
         spare = (self.allowed - self.last.lsb / 2) * _EARLY_SHARE
         errors = [_rounded(spare / early / gain) for gain in gains[:-1]]
@@ -253,13 +248,13 @@ class _Budget:
 
     def _chain(self, shares: _Shares, parts: Sequence[tuple[Part, ...]]) -> ChainDesign:
         """Design all stages: the last one may make what the others leave of the error allowed."""
-        gains, left = self._gains(parts), self.allowed
+        gains, left = gains_to_the_end(parts), self.allowed
         inputs, error = self.spec.base.inputs, Fraction(0)
         stages: list[StageDesign] = []
         for k, stage in enumerate(self.spec.stages):
             is_last = k == len(parts) - 1
             self.progress(f"stage {stage.name}")
-            reach = self._reach(stage, parts[: k + 1])
+            reach = reach_behind(self.spec, parts[: k + 1])
             allowed = _rounded(left) if is_last else shares.errors[k]
             if is_last and allowed <= self.last.lsb / 2:
                 raise ShortfallError(f"stage {stage.name}: the stages before it leave no room for its rounding")
@@ -273,16 +268,6 @@ class _Budget:
         chain = ChainDesign(spec=self.spec, stages=tuple(stages))
         now = [_parts_of(stage.design) for stage in stages]
         return chain if now == list(parts) else self._chain(shares, now)
-
-    def _reach(self, stage: StageSpec, parts: Sequence[tuple[Part, ...]]) -> Fraction:
-        """Bound the exact magnitude behind the last of these stages."""
-        base = self.spec.base
-        largest = max(abs(end) for port in base.inputs[:1] for end in _limits(port))
-        if self.spec.stages[0].kind == "polynomial":
-            polynomial, _ = polynomial_of(base)
-            largest = polynomial_reach(polynomial, base.inputs)
-        whole = tuple(part for each in parts for part in each)
-        return largest * on_grid(peak_gain(whole)) if whole else largest
 
     def _port(self, stage: StageSpec, step: Fraction, reach: Fraction) -> Port:
         """Return the narrowest signed port that holds a magnitude without its first and last code."""
@@ -322,6 +307,23 @@ class _Budget:
             return self._chain(_Shares(tuple(errors), tuple(steps)), [stage.parts for stage in chain.stages])
         except ShortfallError:
             return None
+
+
+def gains_to_the_end(parts: Sequence[tuple[Part, ...]]) -> list[Fraction]:
+    """Return how much of an error behind each stage reaches the end."""
+    behind = [tuple(part for each in parts[k + 1 :] for part in each) for k in range(len(parts))]
+    return [on_grid(peak_gain(each)) if each else Fraction(1) for each in behind]
+
+
+def reach_behind(spec: ChainSpec, parts: Sequence[tuple[Part, ...]]) -> Fraction:
+    """Bound the exact magnitude behind the last of these stages, which are the first ones of a chain."""
+    base = spec.base
+    largest = max(abs(end) for port in base.inputs[:1] for end in _limits(port))
+    if spec.stages[0].kind == "polynomial":
+        polynomial, _ = polynomial_of(base)
+        largest = polynomial_reach(polynomial, base.inputs)
+    whole = tuple(part for each in parts for part in each)
+    return largest * on_grid(peak_gain(whole)) if whole else largest
 
 
 def _parts_of(design: CoreDesign) -> tuple[Part, ...]:

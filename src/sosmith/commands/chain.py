@@ -1,4 +1,4 @@
-"""What `design`, `generate`, `package`, `simulate` and `verify` do with a chain of stages."""
+"""What `design`, `generate`, `package`, `reload`, `simulate` and `verify` do with a chain of stages."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sosmith.commands.options import print_tables
-from sosmith.interface.files import default_folder
+from sosmith.interface.files import default_folder, to_json, write_file
 from sosmith.model.errors import ShortfallError, SpecificationError
 from sosmith.terminal import note, print_json, reader_may_leave, show_progress
 
@@ -74,6 +74,30 @@ def pack_chain(asked: ChainSpecification, board: str | None, folder: Path, vlnv:
         paths = design_chain(asked, board=board, progress=step).package(folder, vlnv=vlnv, progress=step)
     for path in paths:
         click.echo(path)
+
+
+def reload_chain(
+    asked: ChainSpecification,
+    other: Path,
+    board: str | None,
+    path: Path,
+    *,
+    reset: bool,
+    version: int,
+    as_json: bool,
+) -> None:
+    """Prove other coefficients of a stage, write the register writes into the file `path`, and show what is proven."""
+    from sosmith.interface.chain.design import design_chain
+
+    with show_progress() as step:
+        chain = design_chain(asked, board=board, progress=step)
+        proven = chain.reload(other, reset=reset, version=version, progress=step)
+    write_file(path, to_json(proven.writes))
+    if as_json:
+        print_json(proven.writes)
+    else:
+        print_tables(proven.tables())
+    note(f"wrote {path}")
 
 
 def run_chain(

@@ -64,6 +64,21 @@ def test_a_chain_in_a_package(sosmith: Command) -> None:
     assert refused.status == 2
 
 
+def test_other_coefficients_for_a_stage(sosmith: Command) -> None:
+    filter_ = 'kind = "iir"\nfamily = "butterworth"\norder = 2\ncutoff = 400.0\nreload = true'
+    text = CHAIN.replace('kind = "fir"\ntaps = [0.25, 0.5, 0.25]', filter_) + "max_error = 0.01\n"
+    Path("rx.toml").write_text(text, encoding="utf-8")
+    Path("other.toml").write_text(text.replace("400.0", "390.0"), encoding="utf-8")
+    loaded = sosmith("reload", "rx.toml", "other.toml", "--reset", "-o", "set.json", "--json")
+    assert loaded.status == 0, loaded.messages
+    tree = json.loads(Path("set.json").read_text(encoding="utf-8"))
+    assert tree == json.loads(loaded.stdout)
+    assert (tree["name"], tree["chain"]["stage"]) == ("rx_out", "out")
+    refused = sosmith("reload", "rx.toml", "other.toml", "--port", "nowhere")
+    assert refused.status == 2
+    assert refused.messages[-1].startswith("sosmith: error: --port must be left out with a chain of stages")
+
+
 def test_a_chain_in_a_simulator(sosmith: Command) -> None:
     Path("rx.toml").write_text(CHAIN, encoding="utf-8")
     run = sosmith("simulate", "rx.toml", "--simulator", "icarus", "-o", "run", "--json")
@@ -94,8 +109,8 @@ def test_other_commands_say_that_they_take_no_chain(sosmith: Command) -> None:
     assert refused.status == 2
     assert refused.messages[-1] == (
         "sosmith: error: rx.toml: not yet available: stage must be left out here, as only design, generate, package, "
-        "simulate and verify take a chain: `sosmith generate` writes a specification of each stage beside the chain's "
-        "files, for what takes a single core, not [a table, a table]"
+        "reload, simulate and verify take a chain: `sosmith generate` writes a specification of each stage beside the "
+        "chain's files, for what takes a single core, not [a table, a table]"
     )
 
 
