@@ -15,6 +15,31 @@ import sosmith
 _GRID = 1 << 220
 """Recursions are computed to this step: what it rounds is far below any claim."""
 
+PLAIN: dict[str, Any] = {
+    "name": "rx",
+    "sample_rate": 8000.0,
+    "input": {"x": {"bits": 8, "range": [-1.0, 1.0], "signed": True}},
+    "stage": [
+        {"name": "slow", "kind": "cic", "order": 2, "decimate": 2},
+        {"name": "double", "kind": "fir", "taps": [0.5, 0.5], "architecture": "parallel"},
+        {"name": "out", "kind": "fir", "taps": [0.25, 0.5, 0.25], "decimate": 2},
+    ],
+    "output": {"bits": 10, "range": [-1.0, 1.0], "signed": True},
+}
+GUARDED: dict[str, Any] = {
+    "name": "rx",
+    "sample_rate": 8000.0,
+    "channels": 2,
+    "input": {"x": {"bits": 8, "range": [-1.0, 1.0], "signed": True}},
+    "stage": [
+        {"name": "slow", "kind": "cic", "order": 2, "decimate": 2},
+        {"name": "low", "kind": "iir", "family": "butterworth", "order": 2, "cutoff": 400.0, "protect": "detect"},
+        {"name": "out", "kind": "fir", "taps": [0.25, 0.5, 0.25], "reload": True},
+    ],
+    "output": {"bits": 10, "range": [-1.0, 1.0], "signed": True},
+    "hardware": {"start": "zero"},
+}
+
 KINDS = ("gain", "fir", "cic", "halfband", "iir", "decimated iir")
 
 

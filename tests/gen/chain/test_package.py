@@ -7,15 +7,14 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from tests.gen.chain.test_files import TREE
+from tests.gen.chain.chains import GUARDED, PLAIN
 from tests.gen.output.packages.made import called
-from tests.verify.chain.test_flags import TREE as GUARDED
 
 import sosmith
 from sosmith.gen.chain.package import packed_chain
 
 PASS = re.compile(r"^PASS: (\d+) results, 0 mismatches$", re.MULTILINE)
-TREES = {"plain": TREE, "guarded": GUARDED}
+TREES = {"plain": PLAIN, "guarded": GUARDED}
 
 
 @cache

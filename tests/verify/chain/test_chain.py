@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import shutil
 from collections.abc import Callable
@@ -12,13 +11,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.verify.chain.sealing import CERTIFICATE, sealed_again
 
 import sosmith
 from sosmith.gen.chain import design as chain_design
 from sosmith.gen.chain.response import gain_into_passband
 from sosmith.model.errors import ShortfallError, SpecificationError
-from sosmith.verify.certificate_file import SectionEntry, entries_text, on_grid
-from sosmith.verify.chain.chain_file import ChainCertificate, read_chain, sealed_chain
+from sosmith.verify.certificate_file import SectionEntry, on_grid
 from sosmith.verify.chain.responses import Part, peak_gain
 
 TREE: dict[str, Any] = {
@@ -33,7 +32,6 @@ TREE: dict[str, Any] = {
     "output": {"bits": 10, "range": [-1.0, 1.0], "signed": True},
 }
 COMMENT = r"^line \d+ of rx\.c must have a comment of plain letters$"
-CERTIFICATE = "rx.certificate.json"
 
 
 @pytest.fixture(scope="module")
@@ -54,16 +52,6 @@ def proven(folder: Path, *, spec: bool = True) -> sosmith.ChainProof:
     return sosmith.ChainCertificate.load(folder / CERTIFICATE).verify(
         files=folder, spec=folder / "rx.toml" if spec else None
     )
-
-
-def sealed_again(folder: Path, change: Callable[[dict[str, Any]], None] = lambda tree: None) -> None:
-    """Change claims, and give the certificate the digests of the files as they are, and its own."""
-    tree = read_chain(folder / CERTIFICATE).model_dump(mode="json")
-    change(tree)
-    for entry in (*tree["files"], *(stage["certificate"] for stage in tree["stages"])):
-        entry["sha256"] = hashlib.sha256((folder / entry["name"]).read_bytes()).hexdigest()
-    certificate = sealed_chain(ChainCertificate.model_validate(tree))
-    (folder / CERTIFICATE).write_text(entries_text(certificate), encoding="utf-8")
 
 
 def test_all_of_a_chain_is_proven(folder: Path) -> None:

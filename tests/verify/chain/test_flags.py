@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.verify.chain.test_chain import CERTIFICATE, sealed_again
+from tests.gen.chain.chains import GUARDED
+from tests.verify.chain.sealing import CERTIFICATE, sealed_again
 
 import sosmith
 from sosmith.gen.chain.flags import FlagsUnit
@@ -83,25 +84,10 @@ def test_a_queue_of_another_depth_is_refused(depth: int) -> None:
         check_flags(module, claim)
 
 
-TREE: dict[str, Any] = {
-    "name": "rx",
-    "sample_rate": 8000.0,
-    "channels": 2,
-    "input": {"x": {"bits": 8, "range": [-1.0, 1.0], "signed": True}},
-    "stage": [
-        {"name": "slow", "kind": "cic", "order": 2, "decimate": 2},
-        {"name": "low", "kind": "iir", "family": "butterworth", "order": 2, "cutoff": 400.0, "protect": "detect"},
-        {"name": "out", "kind": "fir", "taps": [0.25, 0.5, 0.25], "reload": True},
-    ],
-    "output": {"bits": 10, "range": [-1.0, 1.0], "signed": True},
-    "hardware": {"start": "zero"},
-}
-
-
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("flags")
-    chain = sosmith.design_chain(TREE)
+    chain = sosmith.design_chain(GUARDED)
     chain.generate(folder)
     (folder / "rx.toml").write_text(chain.specification.toml(), encoding="utf-8")
     return folder
