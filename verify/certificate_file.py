@@ -413,10 +413,28 @@ def read_entries(path: Path, kind: type[Entries]) -> Entries:
         If the file cannot be read or is no certificate.
     """
     try:
-        text = read_given(path, _MAX_BYTES).decode("utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8"
-        raise SpecificationError(f"{path}: the certificate must be a file that can be read, not: {reason}") from None
+        content = read_given(path, _MAX_BYTES)
+    except OSError as error:
+        raise _unreadable(path, error.strerror) from None
+    return entries_in(content, path, kind)
+
+
+def _unreadable(path: Path, reason: str | None) -> SpecificationError:
+    return SpecificationError(f"{path}: the certificate must be a file that can be read, not: {reason}")
+
+
+def entries_in(content: bytes, path: Path, kind: type[Entries]) -> Entries:
+    """Return the claims in the content of a file, and check their form; `path` is for messages.
+
+    Raises
+    ------
+    SpecificationError
+        If it is no certificate.
+    """
+    try:
+        text = content.decode("utf-8")
+    except UnicodeDecodeError:
+        raise _unreadable(path, "it is not UTF-8") from None
     try:
         tree = json.loads(
             text,

@@ -8,7 +8,7 @@ import stat
 from pathlib import Path
 
 
-def read_given(path: Path, max_bytes: int) -> bytes:
+def read_given(path: Path, max_bytes: int, *, links: bool = True) -> bytes:
     """Return the bytes of a file.
 
     Parameters
@@ -17,6 +17,8 @@ def read_given(path: Path, max_bytes: int) -> bytes:
         The file.
     max_bytes : int
         Most bytes of it.
+    links : bool
+        Whether the file itself may be a symbolic link, which can lead anywhere.
 
     Raises
     ------
@@ -24,7 +26,13 @@ def read_given(path: Path, max_bytes: int) -> bytes:
         If it cannot be read, is no regular file, or is longer; its `strerror` says why.
     """
     # Without this flag, a pipe is opened once somebody writes into it, and not before.
-    number = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
+    flags = os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK
+    try:
+        number = os.open(path, flags if links else flags | os.O_NOFOLLOW)
+    except OSError as error:
+        if links or error.errno != errno.ELOOP:
+            raise
+        raise OSError(errno.ELOOP, "it is a symbolic link", str(path)) from None
     try:
         if not stat.S_ISREG(os.fstat(number).st_mode):
             raise OSError(errno.EINVAL, "it is no regular file", str(path))

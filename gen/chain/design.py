@@ -23,6 +23,8 @@ from sosmith.gen.fpga.boards import Board
 from sosmith.gen.specification.specification import Specification
 from sosmith.gen.word_lengths.selection import Progress
 from sosmith.model.arrays import Codes
+from sosmith.model.dataflow.downsampler import gathered
+from sosmith.model.dataflow.status import Flag
 from sosmith.model.errors import ShortfallError
 from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
@@ -128,6 +130,22 @@ class ChainDesign:
             return None
         return gain_into_passband(self.parts, self.edge)
 
+    @property
+    def carried_flags(self) -> int:
+        """Flags of the inputs that a result can have: `input_at_rail`, and `outside_calibration` where some is."""
+        first = self.stages[0].design.datapath
+        everything = tuple((port.lowest, port.highest) for port in first.inputs)
+        return 1 if first.calibrated == everything else 2
+
+    @property
+    def settling(self) -> int:
+        """Results of a channel that are flagged as settling: until all stages have settled, one after the other."""
+        samples, step = 0, 1
+        for stage in self.stages:
+            samples += stage.design.quantized.settling * step
+            step *= stage.design.datapath.samples_per_result
+        return -(-samples // step)
+
     def compute(self, codes: Codes) -> Codes:
         """Compute the output codes of input codes, bit for bit as the hardware does.
 
@@ -142,10 +160,24 @@ class ChainDesign:
         return self.compute_with_status(codes)[0]
 
     def compute_with_status(self, codes: Codes) -> tuple[Codes, npt.NDArray[np.uint8]]:
-        """Compute the output codes and the flags of the last stage, both of the shape (results, channels)."""
-        for stage in self.stages[:-1]:
-            codes = stage.design.datapath.compute(codes)[:, :, None]
-        return self.stages[-1].design.datapath.compute_with_status(codes)
+        """Compute the output codes and the flags, both of the shape (results, channels).
+
+        A result has the flags of all samples of its channel since the result before.
+        """
+        *early, last = self.stages
+        gathering = np.zeros((len(codes), codes.shape[1]), dtype=np.uint8)
+        for stage in early:
+            codes, status = stage.design.datapath.compute_with_status(codes)
+            codes = codes[:, :, None]
+            if stage is early[0]:
+                gathering = status & np.uint8((1 << self.carried_flags) - 1)
+        results, status = last.design.datapath.compute_with_status(codes)
+        if early:
+            factor = self.factor // early[0].design.datapath.samples_per_result
+            columns = [gathered(gathering[:, k], factor) for k in range(gathering.shape[1])]
+            status = status | np.stack(columns, axis=1)
+            status[: self.settling] |= np.uint8(1 << Flag.SETTLING)
+        return results, status
 
 
 def design_chain(spec: ChainSpec, *, board: Board | None = None, progress: Progress = lambda step: None) -> ChainDesign:
@@ -201,13 +233,8 @@ class _Budget:
             return (Part(sections, response.factor),)
         return cic(pre_stage.decimator.factor, pre_stage.decimator.stages), Part(sections)
 
-    def _gains(self, parts: Sequence[tuple[Part, ...]]) -> list[Fraction]:
-        """Return how much of an error behind each stage reaches the end."""
-        behind = [tuple(part for each in parts[k + 1 :] for part in each) for k in range(len(parts))]
-        return [on_grid(peak_gain(each)) if each else Fraction(1) for each in behind]
-
     def _first_shares(self, parts: Sequence[tuple[Part, ...]]) -> _Shares:
-        gains = self._gains(parts)
+        gains = gains_to_the_end(parts)
         early = len(parts) - 1
         spare = (self.allowed - self.last.lsb / 2) * _EARLY_SHARE
         errors = [_rounded(spare / early / gain) for gain in gains[:-1]]
@@ -221,13 +248,13 @@ class _Budget:
 
     def _chain(self, shares: _Shares, parts: Sequence[tuple[Part, ...]]) -> ChainDesign:
         """Design all stages: the last one may make what the others leave of the error allowed."""
-        gains, left = self._gains(parts), self.allowed
+        gains, left = gains_to_the_end(parts), self.allowed
         inputs, error = self.spec.base.inputs, Fraction(0)
         stages: list[StageDesign] = []
         for k, stage in enumerate(self.spec.stages):
             is_last = k == len(parts) - 1
             self.progress(f"stage {stage.name}")
-            reach = self._reach(stage, parts[: k + 1])
+            reach = reach_behind(self.spec, parts[: k + 1])
             allowed = _rounded(left) if is_last else shares.errors[k]
             if is_last and allowed <= self.last.lsb / 2:
                 raise ShortfallError(f"stage {stage.name}: the stages before it leave no room for its rounding")
@@ -241,16 +268,6 @@ class _Budget:
         chain = ChainDesign(spec=self.spec, stages=tuple(stages))
         now = [_parts_of(stage.design) for stage in stages]
         return chain if now == list(parts) else self._chain(shares, now)
-
-    def _reach(self, stage: StageSpec, parts: Sequence[tuple[Part, ...]]) -> Fraction:
-        """Bound the exact magnitude behind the last of these stages."""
-        base = self.spec.base
-        largest = max(abs(end) for port in base.inputs[:1] for end in _limits(port))
-        if self.spec.stages[0].kind == "polynomial":
-            polynomial, _ = polynomial_of(base)
-            largest = polynomial_reach(polynomial, base.inputs)
-        whole = tuple(part for each in parts for part in each)
-        return largest * on_grid(peak_gain(whole)) if whole else largest
 
     def _port(self, stage: StageSpec, step: Fraction, reach: Fraction) -> Port:
         """Return the narrowest signed port that holds a magnitude without its first and last code."""
@@ -290,6 +307,23 @@ class _Budget:
             return self._chain(_Shares(tuple(errors), tuple(steps)), [stage.parts for stage in chain.stages])
         except ShortfallError:
             return None
+
+
+def gains_to_the_end(parts: Sequence[tuple[Part, ...]]) -> list[Fraction]:
+    """Return how much of an error behind each stage reaches the end."""
+    behind = [tuple(part for each in parts[k + 1 :] for part in each) for k in range(len(parts))]
+    return [on_grid(peak_gain(each)) if each else Fraction(1) for each in behind]
+
+
+def reach_behind(spec: ChainSpec, parts: Sequence[tuple[Part, ...]]) -> Fraction:
+    """Bound the exact magnitude behind the last of these stages, which are the first ones of a chain."""
+    base = spec.base
+    largest = max(abs(end) for port in base.inputs[:1] for end in _limits(port))
+    if spec.stages[0].kind == "polynomial":
+        polynomial, _ = polynomial_of(base)
+        largest = polynomial_reach(polynomial, base.inputs)
+    whole = tuple(part for each in parts for part in each)
+    return largest * on_grid(peak_gain(whole)) if whole else largest
 
 
 def _parts_of(design: CoreDesign) -> tuple[Part, ...]:

@@ -9,12 +9,14 @@ from sosmith.gen.chain.design import ChainDesign
 from sosmith.gen.facts.design_tables import ErrorUnit
 from sosmith.gen.facts.table import Fact, Table
 from sosmith.gen.filter.largest_gain import Peak
-from sosmith.gen.quantity import count, decibels, frequency, plain_number, scale
+from sosmith.gen.quantity import count, decibels, frequency, plain_number, quantity, scale
 
 
 def chain_tables(design: ChainDesign) -> list[Table]:
     """Say what the stages are, what the bound is made of, and how much aliases."""
     tables = [_stages(design), _budget(design)]
+    if design.settling:
+        tables.append(_start(design))
     if design.folding is not None:
         tables.append(_folding(design, design.folding))
     return tables
@@ -62,6 +64,20 @@ def _budget(design: ChainDesign) -> Table:
     head = ("stage", shown.titled("error at most"), "gain to the end", shown.titled("adds"), "LSB")
     title = "End-to-end error budget, proven for all inputs in range"
     return Table(title, rows, head, {"sum": "bold"}, numbers=(1, 2, 3, 4))
+
+
+def _start(design: ChainDesign) -> Table:
+    seconds = quantity(float(design.settling * design.factor / design.spec.base.sample_rate), "s")
+    return Table(
+        "Start from zero",
+        [
+            Fact(
+                "Flagged as settling",
+                str(design.settling),
+                sentence=f"results of a channel, {seconds}: until each stage has settled, one after the other",
+            )
+        ],
+    )
 
 
 def _folding(design: ChainDesign, folding: Peak) -> Table:

@@ -48,6 +48,7 @@ def chain_texts(design: ChainDesign, progress: Progress = lambda step: None) -> 
     for stage, proven in zip(design.stages, claims, strict=True):
         progress(f"stage {stage.spec.name}")
         texts |= generated(stage.design, claims=proven)
+        texts[f"{proven.name}.toml"] = stage.design.spec.text
     own = {
         f"{name}.sv": top_text(design),
         f"{name}.json": to_json(_manifest(design, claims)),
@@ -88,6 +89,7 @@ def _manifest(design: ChainDesign, claims: Sequence[Certificate]) -> dict[str, A
             for stage, error in zip(design.stages, errors, strict=True)
         ],
         "decimate": design.factor,
+        "settling_results": design.settling,
         "error_bound": float(sum(shares, Fraction(0))),
         "error_parts": {stage.spec.name: float(share) for stage, share in zip(design.stages, shares, strict=True)},
         "error_unit": design.spec.base.output.unit,
@@ -135,6 +137,7 @@ def _certified(
             channels=base.channels,
             stages=entries,
             bound=sum((entry.error * entry.gain for entry in entries), Fraction(0)),
+            settling=design.settling,
             folding=_folding(design),
             files=tuple(_file(name, text) for name, text in own.items()),
             certificate="0" * 64,

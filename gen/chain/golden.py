@@ -34,7 +34,10 @@ def _column(design: ChainDesign, codes: Codes) -> Values:
 
 
 def _filtered(stage: StageDesign, values: Values) -> Values:
-    """Filter values and take every so many of the results, as if the first value had been there for ever."""
+    """Filter values and take every so many of the results.
+
+    Before a start from the steady state, the first value was there for ever; before one from zero, there was 0.
+    """
     quantized, datapath = stage.design.quantized, stage.design.datapath
     if quantized.filter is None:
         return values
@@ -46,8 +49,9 @@ def _filtered(stage: StageDesign, values: Values) -> Values:
         before = np.concatenate([np.full(len(taps) - 1, values[0]), values])
         values = np.asarray(np.convolve(before, taps, mode="valid")[:: decimator.factor], dtype=np.float64)
     sos = quantized.filter.sos
-    results = sosfilt(sos, values - values[0], np.zeros((len(sos), sos.shape[1] // 2 - 1)))
-    results = results + dc_gain(sos) * values[0]
+    initial: float = values[0] if stage.design.spec.hardware.start == "steady" else 0.0
+    results = sosfilt(sos, values - initial, np.zeros((len(sos), sos.shape[1] // 2 - 1)))
+    results = results + dc_gain(sos) * initial
     return results if decimator is not None else np.asarray(results[:: datapath.samples_per_result])
 
 

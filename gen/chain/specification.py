@@ -39,7 +39,10 @@ MAX_STAGES = 8
 """Most stages of a chain."""
 
 _EDGES = ("passband_edge", "stopband_edge", "passband_loss", "stopband_loss")
-_COMMON = ("name", "kind", "architecture", "realization", "multipliers")
+_OF_ONE = ("architecture", "realization", "multipliers", "protect", "reload", "reload_lock")
+"""Keys of ``[hardware]`` that a stage can have of its own."""
+
+_COMMON = ("name", "kind", *_OF_ONE)
 _KEYS: dict[str, tuple[str, ...]] = {
     "polynomial": ("coefficients", "data"),
     "gain": ("factor",),
@@ -51,9 +54,11 @@ _KEYS: dict[str, tuple[str, ...]] = {
 """Keys of a stage by its kind, beside those of all."""
 
 KINDS = tuple(_KEYS)
-_OF_HARDWARE = ("architecture", "realization", "multipliers")
-_OF_ALL = ("architecture", "multipliers", "keep")
+_OF_ALL = ("architecture", "multipliers", "protect", "reload", "reload_lock", "start", "keep")
 """Keys of ``[hardware]`` that hold for all stages; the realization of one filter is none of another."""
+
+_TAKEN = "flags"
+"""What a module of the chain itself is called behind its name."""
 
 _TOP = ("name", "sample_rate", "channels", "input", STAGE, "output", "hardware")
 _WIRE = {"sos": [[1, 0, 0, 1, 0, 0]]}
@@ -309,7 +314,7 @@ def _stage(table: Mapping[str, Any], kind: str, k: int, rate: Fraction) -> Stage
         name=name,
         kind=kind,
         tables=_tables(table, kind, where, rate, factor),
-        hardware={key: table[key] for key in _OF_HARDWARE if key in table},
+        hardware={key: table[key] for key in _OF_ONE if key in table},
         factor=factor,
         rate=rate,
         edge=_edge(table, kind),
@@ -423,6 +428,10 @@ def _edge(table: Mapping[str, Any], kind: str) -> Fraction | None:
 def _check_names(names: list[str]) -> None:
     small = [name.lower() for name in names]
     for k, name in enumerate(names):
+        if small[k] == _TAKEN:
+            raise UnfitError(
+                f"another name than {_TAKEN}, which a module of the chain has", literal(name), where=f"stage[{k}].name"
+            )
         if small[k] in small[:k]:
             raise UnfitError(
                 "different from the names of the stages before, in small letters too, as files are named after it",

@@ -1,60 +1,132 @@
-"""The top module of a chain: an instance of each core, and wires between their streams.
+"""The top module of a chain: an instance of each core, wires between their streams, and what joins their flags.
 
 ::
 
-    s_axis ──> stage_1 ──tdata, tvalid [, tdest]──> stage_2 ── .. ──> stage_n ──> m_axis
-                       <──tready──                                         ──> tuser of the last stage
+    s_axis ──> stage_1 ──> gate ──> stage_2 ── .. ──> stage_n ──> m_axis
+                  │          │                           │
+                  └─ tuser ──┴──────> flags <── tuser ───┘
+                                        └─────────────────────> tuser of m_axis
 
     Every core registers its output and takes samples by tvalid and tready alone, so that back-pressure of a core
     reaches the one before it, and the whole keeps the rules of the streams that each core keeps.
+    The gate belongs to the flags: `sosmith.gen.chain.flags`. A stage whose constants can be loaded has its own
+    AXI4-Lite port, s_axil_NAME.
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
-from sosmith.gen.chain.design import ChainDesign
+from amaranth.hdl import Shape
+from amaranth.lib.wiring import Out
+
+from sosmith.gen.chain.design import ChainDesign, StageDesign
+from sosmith.gen.chain.flags import FlagsUnit, flags_unit
 from sosmith.gen.output.core_facts import InterfaceFacts, StreamFacts, interface_facts
 from sosmith.gen.version import __version__
+from sosmith.hdl.bus.axi_lite import slave_members
+from sosmith.model.reload.registers import ADDRESS_BITS
 from sosmith.model.templates import in_comment
 
 
 def chain_interface(design: ChainDesign) -> InterfaceFacts:
     """Facts needed to drive a chain: the streams of its ends, and the clocks of all stages together."""
-    faces = [interface_facts(stage.design) for stage in design.stages]
+    faces, unit = [interface_facts(stage.design) for stage in design.stages], flags_unit(design)
+    waits = 0 if unit is None else unit.clearing
     return InterfaceFacts(
         name=design.name,
         inputs=faces[0].inputs,
         outputs=faces[-1].outputs,
         reset_cycles=max(face.reset_cycles for face in faces),
-        latency_cycles=sum(face.reset_cycles + face.latency_cycles for face in faces),
+        latency_cycles=sum(face.reset_cycles + face.latency_cycles for face in faces) + waits,
         samples_per_result=design.factor,
     )
 
 
+def top_ports(design: ChainDesign) -> list[tuple[str, str, int]]:
+    """Return direction, name and width of the ports: clock and reset, streams, and the registers of each stage."""
+    face = chain_interface(design)
+    return [
+        ("input", "aclk", 1),
+        ("input", "aresetn", 1),
+        *_stream("s_axis", face.inputs, "input"),
+        *_stream("m_axis", face.outputs, "output"),
+        *(
+            (way, f"{_port_of(stage)}_{signal}", width)
+            for stage in design.stages
+            for way, signal, width in _registers(stage)
+        ),
+    ]
+
+
 def top_text(design: ChainDesign) -> str:
-    """SystemVerilog of the top module alone; the modules of the cores stand in their own files."""
+    """SystemVerilog of the top module and its flags; the modules of the cores stand in their own files."""
     faces = [interface_facts(stage.design) for stage in design.stages]
     names = [f"stage_{stage.spec.name}" for stage in design.stages]
-    inputs, outputs = faces[0].inputs, faces[-1].outputs
-    ports = [("input", "aclk", 1), ("input", "aresetn", 1)]
-    ports += [*_stream("s_axis", inputs, "input"), *_stream("m_axis", outputs, "output")]
+    outputs, unit = faces[-1].outputs, flags_unit(design)
+    ports = top_ports(design)
     lines = [f"module {design.name}({', '.join(name for _, name, _ in ports)});"]
     for direction, name, width in ports:
         lines += [f"  {direction} {_range(width)}{name};", f"  wire {_range(width)}{name};"]
-    for k, (name, face) in enumerate(zip(names, faces, strict=True)):
-        if k < len(names) - 1:
-            lines += [f"  wire {_range(width)}{net};" for _, net, width in _stream(name, face.outputs, "output")]
-    for k, (name, face) in enumerate(zip(names, faces, strict=True)):
+    nets = [net for name, face in zip(names[:-1], faces, strict=False) for net in _stream(name, face.outputs, "output")]
+    if unit is not None:
+        nets += [("", "gated_tvalid", 1), ("", "gated_tready", 1), ("", "last_tuser", outputs.user_width)]
+    lines += [f"  wire {_range(width)}{net};" for _, net, width in nets]
+    for k, (stage, name, face) in enumerate(zip(design.stages, names, faces, strict=True)):
         before = "s_axis" if k == 0 else names[k - 1]
         behind = "m_axis" if k == len(names) - 1 else name
-        pins = [("aclk", "aclk"), ("aresetn", "aresetn")]
-        pins += _pins("s_axis", before, face.inputs) + _pins("m_axis", behind, face.outputs)
-        lines.append(f"  {face.name} {name} (")
-        lines += [f"    .{pin}({net})," for pin, net in pins[:-1]]
-        lines += [f"    .{pins[-1][0]}({pins[-1][1]})", "  );"]
-    return _header(design, chain_interface(design)) + "\n".join([*lines, "endmodule", ""])
+        pins = {"aclk": "aclk", "aresetn": "aresetn"}
+        pins |= _pins("s_axis", before, face.inputs) | _pins("m_axis", behind, face.outputs)
+        pins |= {f"s_axil_{signal}": f"{_port_of(stage)}_{signal}" for _, signal, _ in _registers(stage)}
+        if unit is not None and k == 0:
+            pins["m_axis_tready"] = "gated_tready"
+        if unit is not None and k == 1:
+            pins["s_axis_tvalid"] = "gated_tvalid"
+        if unit is not None and behind == "m_axis":
+            pins["m_axis_tuser"] = "last_tuser"
+        lines += _instance(face.name, name, pins)
+    if unit is not None:
+        lines += _instance(unit.name, "flags", _joined(unit, names[0]))
+    before = "" if unit is None else unit.text() + "\n"
+    return _header(design, chain_interface(design)) + before + "\n".join([*lines, "endmodule", ""])
+
+
+def _joined(unit: FlagsUnit, first: str) -> dict[str, str]:
+    """Nets at the ports of the flags, between the first two stages and beside the last."""
+    nets = {
+        "i_tuser": f"{first}_tuser",
+        "i_tdest": f"{first}_tdest",
+        "i_tvalid": f"{first}_tvalid",
+        "i_tready": "gated_tready",
+        "o_tvalid": "gated_tvalid",
+        "o_tready": f"{first}_tready",
+        "r_tuser": "last_tuser",
+        "r_tvalid": "m_axis_tvalid",
+        "m_tready": "m_axis_tready",
+        "m_tuser": "m_axis_tuser",
+    }
+    return {name: nets.get(name, name) for _, name, _ in unit.ports}
+
+
+def _instance(module: str, name: str, pins: Mapping[str, str]) -> list[str]:
+    rows = [f"    .{pin}({net})" for pin, net in pins.items()]
+    return [f"  {module} {name} (", *(f"{row}," for row in rows[:-1]), rows[-1], "  );"]
+
+
+def _port_of(stage: StageDesign) -> str:
+    return f"s_axil_{stage.spec.name}"
+
+
+def _registers(stage: StageDesign) -> list[tuple[str, str, int]]:
+    """Direction, name and width of the signals of a stage's registers, if it has any."""
+    if stage.design.architecture.fingerprint is None:
+        return []
+    members = slave_members(ADDRESS_BITS).items()
+    return [
+        ("output" if member.flow is Out else "input", name.removeprefix("s_axil_"), Shape.cast(member.shape).width)
+        for name, member in members
+    ]
 
 
 def _stream(prefix: str, stream: StreamFacts, direction: str) -> list[tuple[str, str, int]]:
@@ -67,9 +139,9 @@ def _stream(prefix: str, stream: StreamFacts, direction: str) -> list[tuple[str,
     return [(way, f"{prefix}_{signal}", width) for way, signal, width in rows]
 
 
-def _pins(prefix: str, net: str, stream: StreamFacts) -> list[tuple[str, str]]:
+def _pins(prefix: str, net: str, stream: StreamFacts) -> dict[str, str]:
     names = [name.removeprefix(prefix) for _, name, _ in _stream(prefix, stream, "input")]
-    return [(f"{prefix}{name}", f"{net}{name}") for name in names]
+    return {f"{prefix}{name}": f"{net}{name}" for name in names}
 
 
 def _range(width: int) -> str:

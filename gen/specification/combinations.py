@@ -244,19 +244,11 @@ ONLINE = Terms(
 TERMS = {terms.name: terms for terms in (PARALLEL, FOLDED, SERIAL, ONLINE)}
 """All architectures by name; `sosmith.gen.architectures.registry` has a class for each."""
 
-_OF_ONE_CORE = "the bound of a chain holds for fixed coefficients, and the registers are those of one core"
 CHAIN = Terms(
     "chain",
     {
-        RELOAD: Refusal(Verdict.LATER, _OF_ONE_CORE),
-        PROTECT: Refusal(
-            Verdict.LATER, "the flag fault is of a stage's own results, which the next stage does not pass on"
-        ),
         SEVERAL: Refusal(Verdict.LATER, "a stage after one that decimates gets single samples, not beats of several"),
         LOOK_AHEAD: Refusal(Verdict.LATER, "there is no rule yet for which stages of a chain need it"),
-        ZERO: Refusal(
-            Verdict.LATER, "the flag settling is of a stage's own results, which the next stage does not pass on"
-        ),
     },
 )
 """What a chain of stages takes: what its stages take by themselves, but for these options."""

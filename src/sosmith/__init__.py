@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from sosmith.interface.certificate import Certificate, Proof
     from sosmith.interface.chain.certificate import ChainCertificate, ChainProof
     from sosmith.interface.chain.design import Chain, design_chain
+    from sosmith.interface.chain.reload import ChainReload
     from sosmith.interface.chain.report import ChainReport
     from sosmith.interface.chain.specification import ChainSpecification
     from sosmith.interface.coefficients import Coefficients
@@ -54,6 +55,7 @@ __all__ = [
     "Chain",
     "ChainCertificate",
     "ChainProof",
+    "ChainReload",
     "ChainReport",
     "ChainSpecification",
     "Coefficient",
@@ -97,6 +99,7 @@ _MODULES = {
     "interface.certificate": ("Certificate", "Proof"),
     "interface.chain.certificate": ("ChainCertificate", "ChainProof"),
     "interface.chain.design": ("Chain", "design_chain"),
+    "interface.chain.reload": ("ChainReload",),
     "interface.chain.report": ("ChainReport",),
     "interface.chain.specification": ("ChainSpecification",),
     "interface.coefficients": ("Coefficients",),

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.gen.chain.chains import draw, stimulus
+from tests.gen.chain.chains import PLAIN, draw, stimulus
 
 import sosmith
+from sosmith.gen.chain import flags
 from sosmith.sim import chain as simulation
 
 SEEDS = range(24)
@@ -64,6 +65,49 @@ def instrument() -> dict[str, Any]:
         ],
         "output": {"bits": 12, "range": [0.0, 16.0], "unit": "mm"},
     }
+
+
+def test_a_fault_of_an_early_stage_reaches_every_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A stage whose flags say so from one of its results on: so do those of the chain from the same sample on."""
+    whole = simulation.whole_text
+
+    def faulty(design: Any, directory: Path) -> str:
+        text = whole(design, directory)
+        assert ".stage_cal_tuser(stage_cal_tuser)" in text
+        return text.replace(
+            ".stage_cal_tuser(stage_cal_tuser)", f".stage_cal_tuser({{1'b0, stage_cal_tdata[{bit}], 6'b0}})"
+        )
+
+    monkeypatch.setattr(simulation, "whole_text", faulty)
+    tree = instrument()
+    tree["stage"][0]["protect"] = "detect"
+    chain = sosmith.design_chain(tree)
+    volts = np.repeat([0.01, 9.9], 20)
+    ports = chain.core.spec.base.inputs
+    codes = np.stack([ports[0].encode(volts), ports[1].encode(np.full(40, 20.0))], axis=1)
+    between = chain.core.stages[0].design.datapath.compute(codes)
+    bit = int(~between[0] & between[-1] & -(~between[0] & between[-1])).bit_length() - 1
+    report = chain.simulate({"voltage": volts, "temperature": [20.0] * 40}, folder=tmp_path, simulator="icarus")
+    wrong = int((between[::2] >> bit & 1).sum())
+    assert 0 < wrong < len(between) // 2
+    assert wrong <= report.summary["mismatches"] <= wrong + 2  # a result on its way may already say so
+
+
+def test_a_shallow_queue_of_flags_is_slow_and_not_wrong(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pipelines hold more results than two entries are for, so that the gate holds samples back again and again."""
+    tree = PLAIN | {"stage": [{"name": f"s{k}", "kind": "fir", "taps": [0.25, 0.5, 0.25]} for k in range(4)]}
+    tree |= {"hardware": {"architecture": "parallel"}}
+    chain = sosmith.design_chain(tree)
+    codes = stimulus(chain, 400, 1)
+    (port,) = chain.core.spec.base.inputs
+    clocks = []
+    for depth in (flags._depth(chain.core), 2):
+        monkeypatch.setattr(flags, "_depth", lambda design, depth=depth: depth)
+        report = chain.simulate({"x": port.decode(codes)}, folder=tmp_path, simulator="icarus", idle=0.0, stall=0.2)
+        assert report.passed
+        sosmith.ChainCertificate.load(tmp_path / "rx.certificate.json").verify(files=tmp_path)
+        clocks.append(report.summary["cycles"])
+    assert clocks[1] > 1.5 * clocks[0]
 
 
 def test_a_core_that_gives_another_result_is_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -58,8 +58,10 @@ class ChainCertificate(Entry):
     """The certificate of a chain.
 
     The exact result is that of the stages' exact calculations one behind the other, limited to the output's range once,
-    at the end. `specification` is the whole text, TOML, and `files` are those of the whole: those of the stages stand
-    in their own certificates. `certificate` is the SHA-256 of this file's own text with 64 zeros in this place.
+    at the end. `settling` is the number of results of a channel that are flagged after a start from zero: those until
+    all stages have settled, one after the other. `specification` is the whole text, TOML, and `files` are those of the
+    whole: those of the stages stand in their own certificates. `certificate` is the SHA-256 of this file's own text
+    with 64 zeros in this place.
     """
 
     format: Literal["sosmith chain certificate 1"]
@@ -71,6 +73,7 @@ class ChainCertificate(Entry):
     channels: Annotated[int, Field(strict=True, ge=1, le=1 << 16)]
     stages: Annotated[tuple[ChainStageEntry, ...], Field(min_length=1, max_length=8)]
     bound: Rational
+    settling: Annotated[int, Field(strict=True, ge=0, le=1 << 30)] = 0
     folding: FoldingEntry | None = None
     files: Annotated[tuple[FileEntry, ...], Field(max_length=8)] = ()
     certificate: Sha256

@@ -14,12 +14,13 @@ from functools import partial
 from pathlib import Path
 
 from sosmith.verify.bounds.l1_response import UndecidedError
-from sosmith.verify.certificate_file import Certificate, ItemEntry, PortEntry, entries_text, on_grid, read_certificate
+from sosmith.verify.certificate_file import Certificate, ItemEntry, PortEntry, entries_in, entries_text, on_grid
 from sosmith.verify.chain.c_model import check_chain_model
 from sosmith.verify.chain.chain_file import ChainCertificate, sealed_chain
+from sosmith.verify.chain.flags import FlagsClaim
 from sosmith.verify.chain.folding import check_folding
 from sosmith.verify.chain.manifest import check_chain_manifest
-from sosmith.verify.chain.responses import Part, parts_of, peak_gain, reach_of
+from sosmith.verify.chain.responses import Part, factor_of, parts_of, peak_gain, reach_of
 from sosmith.verify.chain.top import check_top
 from sosmith.verify.chain.words import check_words
 from sosmith.verify.graph import RejectedError, require
@@ -106,9 +107,9 @@ def judge_chain(
             f"the certificate of stage {entry.name} must be {name}.certificate.json, not {entry.certificate.name}",
         )
         path = folder / entry.certificate.name
-        own = content_of(path)
+        own = content_of(path, links=False)
         _compare(str(path), entry.certificate.sha256, own)
-        core = read_certificate(path)
+        core = entries_in(own, path, Certificate)
         require(
             entries_text(core).encode() == own,
             f"the certificate of stage {entry.name} must have the layout in which it was written, not another one",
@@ -140,6 +141,7 @@ def judge_chain(
     with limited(seconds):
         progress("chain", 0, 0)
         items = _check_joints(chain, cores)
+        flags = _flags(chain, cores, items)
         budget = _check_bound(chain, cores)
         progress("folding", 0, 0)
         try:
@@ -151,7 +153,7 @@ def judge_chain(
         files = sum(len(stage.files) for stage in stages.values())
         if with_files:
             progress("files", 0, 0)
-            files += _check_files(chain, folder, cores, items, stages)
+            files += _check_files(chain, folder, cores, items, stages, flags)
     return ChainJudgement(stages, chain.bound, budget, files, _scope(chain, stages, text is not None, with_files))
 
 
@@ -185,7 +187,7 @@ def _compare(what: str, stated: str, content: bytes) -> None:
 
 def _check_joints(chain: ChainCertificate, cores: Sequence[Certificate]) -> list[ItemEntry]:
     """Check that each stage takes what the one before it gives, and that none has what a chain lacks."""
-    items = []
+    items, starts = [], set[str]()
     names = [entry.name for entry in chain.stages]
     require(len(set(names)) == len(names), "the stages of a chain must have names of their own")
     for k, (entry, core) in enumerate(zip(chain.stages, cores, strict=True)):
@@ -193,10 +195,9 @@ def _check_joints(chain: ChainCertificate, cores: Sequence[Certificate]) -> list
         item = about_of(core).item
         if item is None:
             raise RejectedError(f"the certificate of {what} must state what the item is")
-        plain = not item.reload and not item.hold and item.samples == 1 and item.protect == "none"
-        require(plain, f"{what} must be without reload, hold, protection and several samples a clock")
-        steady = item.start == "steady" or entry.kind == "polynomial"
-        require(steady, f"{what} must start from the steady state of its first sample, not from {item.start}")
+        require(not item.hold and item.samples == 1, f"{what} must be without hold and several samples a clock")
+        if entry.kind != "polynomial":
+            starts.add(item.start)
         require(item.channels == chain.channels, f"{what} must have {chain.channels} channels, not {item.channels}")
         require(
             (core.ideal.polynomial is not None) == (entry.kind == "polynomial"),
@@ -210,7 +211,31 @@ def _check_joints(chain: ChainCertificate, cores: Sequence[Certificate]) -> list
         require(own == taken, f"{what} must take what is before it, {taken}, not {own}")
         items.append(item)
     require(_unnamed(cores[-1].output) == _unnamed(chain.output), "the last stage must give the output of the chain")
+    require(len(starts) < 2, f"all stages must start alike, not from {' and '.join(sorted(starts))}")
     return items
+
+
+def _flags(chain: ChainCertificate, cores: Sequence[Certificate], items: Sequence[ItemEntry]) -> FlagsClaim | None:
+    """Check for how many results a chain settles, and return what its flags must be; None for a single stage."""
+    samples, step = 0, 1
+    for core in cores:
+        samples += (core.claims.settling or 0) * step
+        step *= factor_of(parts_of(core))
+    settling = -(-samples // step)
+    require(chain.settling == settling, f"settling of the chain must be {settling} results, not {chain.settling}")
+    if len(cores) == 1:
+        return None
+    return FlagsClaim(
+        name=f"{chain.name}_flags",
+        carried=2 if items[0].calibrated else 1,
+        factor=step // factor_of(parts_of(cores[0])),
+        settling=settling,
+        channels=chain.channels,
+        dest=items[0].given.dest_width,
+        guarded=tuple(
+            entry.name for entry, item in zip(chain.stages[:-1], items, strict=False) if item.protect != "none"
+        ),
+    )
 
 
 def _unnamed(port: PortEntry) -> PortEntry:
@@ -260,6 +285,7 @@ def _check_files(
     cores: Sequence[Certificate],
     items: Sequence[ItemEntry],
     stages: Mapping[str, Judgement],
+    flags: FlagsClaim | None,
 ) -> int:
     """Check the files of the whole; return how many there are."""
     names = [entry.name for entry in chain.files]
@@ -267,16 +293,17 @@ def _check_files(
     require(names == wanted, f"the files of the chain must be {', '.join(wanted)}, not {', '.join(names)}")
     contents = {}
     for entry in chain.files:
-        contents[entry.name] = content_of(folder / entry.name)
+        contents[entry.name] = content_of(folder / entry.name, links=False)
         _compare(str(folder / entry.name), entry.sha256, contents[entry.name])
     sv, json, c, h = wanted
     texts = [
         ascii_text(f"{core.name}.sv", stage.files[f"{core.name}.sv"])
         for core, stage in zip(cores, stages.values(), strict=True)
     ]
-    check_top(texts, ascii_text(sv, contents[sv]), chain.name, [core.name for core in cores], items)
+    top, names = ascii_text(sv, contents[sv]), [entry.name for entry in chain.stages]
+    check_top(texts, top, chain.name, [core.name for core in cores], items, names, flags)
     check_chain_manifest(contents[json], chain, cores, items)
-    check_chain_model(unicode_text(c, contents[c]), unicode_text(h, contents[h]), chain, cores)
+    check_chain_model(unicode_text(c, contents[c]), unicode_text(h, contents[h]), chain, cores, flags)
     return len(contents)
 
 
@@ -295,7 +322,7 @@ def _scope(
     if with_files:
         chained["top"] = ScopePart(
             State.PROVEN,
-            "it has instances of the cores and the wires between their streams; manifest and C model follow",
+            "it has the cores, wires between their streams, and what joins their flags; manifest and C model follow",
         )
     return chained | scope
 

@@ -77,6 +77,7 @@ def _wanted(chain: ChainCertificate, cores: Sequence[Certificate], items: Sequen
             for entry, core, item, own in zip(chain.stages, cores, items, parts, strict=True)
         ],
         "decimate": factor_of([part for own in parts for part in own]),
+        "settling_results": chain.settling,
         "error_bound": float(chain.bound),
         "error_parts": {entry.name: float(entry.error * entry.gain) for entry in chain.stages},
         "error_unit": chain.output.unit,

@@ -19,14 +19,14 @@ from sosmith.verify.specified.words import words_of
 from sosmith.verify.verdict.generated_files import about_of
 
 _TABLES = ("name", "sample_rate", "channels", "input", "output", "calibration", "filter", "hardware")
-_OF_ALL = ("architecture", "multipliers", "keep")
-_OF_ONE = ("architecture", "realization", "multipliers")
+_OF_ALL = ("architecture", "multipliers", "protect", "reload", "reload_lock", "start", "keep")
+_OF_ONE = ("architecture", "realization", "multipliers", "protect", "reload", "reload_lock")
 _CLOCK = 12_000_000
 """Clock of hardware whose specification has none, in Hz."""
 
 _BY_ITSELF = ("taps", "taps_file", "sos", "sos_file")
 _WITH_EDGES = ("iir", "fir", "halfband")
-_OF_STAGES = ("name", "kind", "architecture", "realization", "multipliers", "band", "order", "decimate", "factor")
+_OF_STAGES = ("name", "kind", *_OF_ONE, "band", "order", "decimate", "factor")
 
 
 def check_words(chain: ChainCertificate, text: str, cores: Sequence[Certificate]) -> None:

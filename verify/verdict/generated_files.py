@@ -95,18 +95,19 @@ def about_of(certificate: Certificate) -> AboutEntry:
 def check_files(about: AboutEntry, directory: Path) -> dict[str, bytes]:
     """Check that all files in `directory` are those that were written with a certificate; return their contents.
 
-    Each is read once: what is proven is what has the digest, whatever becomes of the file meanwhile.
+    Each is read once: what is proven is what has the digest, whatever becomes of the file meanwhile. None may be a
+    symbolic link, which can lead out of the folder.
 
     Raises
     ------
     RejectedError
-        If a file is missing or was changed.
+        If a file is missing, a link, or was changed.
     """
     contents = {}
     for entry in about.files:
         require(Path(entry.name).name == entry.name, f"{entry.name!r} must be the name of a file without a folder")
         path = directory / entry.name
-        contents[entry.name] = content_of(path)
+        contents[entry.name] = content_of(path, links=False)
         _compare(str(path), entry.sha256, contents[entry.name])
     return contents
 
@@ -186,8 +187,8 @@ def check_texts(about: AboutEntry, texts: Mapping[str, str]) -> int:
     return len(names)
 
 
-def content_of(path: Path) -> bytes:
-    """Return the bytes of a file.
+def content_of(path: Path, *, links: bool = True) -> bytes:
+    """Return the bytes of a file, which may be a symbolic link unless `links` says no.
 
     Raises
     ------
@@ -195,7 +196,7 @@ def content_of(path: Path) -> bytes:
         If it cannot be read.
     """
     try:
-        return read_given(path, _MAX_BYTES)
+        return read_given(path, _MAX_BYTES, links=links)
     except OSError as error:
         raise RejectedError(f"{path} must be a file that can be read, not: {error.strerror}") from None
 

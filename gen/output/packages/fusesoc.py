@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from sosmith.gen.output.packages.facts import PackageFacts
+from sosmith.gen.output.packages.vlnv import Vlnv
 from sosmith.model.templates import render
 
 
 def fusesoc_files(facts: PackageFacts) -> dict[str, str]:
     """Return the core file by its path in the package."""
-    text = render(__package__, "fusesoc.core.jinja", name=facts.name, vlnv=facts.vlnv, description=facts.description)
-    return {f"{facts.name}.core": text}
+    return {f"{facts.name}.core": core_file([facts.name], facts.vlnv, facts.description)}
+
+
+def core_file(modules: Sequence[str], vlnv: Vlnv, description: str) -> str:
+    """Return the text of a core file for these modules, of a file each, the last of which is the top."""
+    values = {"name": modules[-1], "modules": modules, "vlnv": vlnv, "description": description}
+    return render(__package__, "fusesoc.core.jinja", **values)

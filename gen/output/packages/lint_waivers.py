@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from sosmith.model.templates import render
 
 WAIVERS = {
@@ -13,6 +15,6 @@ WAIVERS = {
 """Warnings of Verilator's ``-Wall`` that generated cores cause, and why each is harmless."""
 
 
-def verilator_waivers(name: str) -> str:
-    """Return a configuration file for Verilator that waives them in the file of the core `name`, and nowhere else."""
-    return render(__package__, "waivers.vlt.jinja", name=name, waivers=WAIVERS)
+def verilator_waivers(modules: Sequence[str]) -> str:
+    """Return a configuration file for Verilator that waives them in the files of `modules`, the last the top."""
+    return render(__package__, "waivers.vlt.jinja", name=modules[-1], modules=modules, waivers=WAIVERS)

@@ -1,4 +1,4 @@
-"""What `design`, `generate`, `simulate` and `verify` do with a chain of stages."""
+"""What `design`, `generate`, `package`, `reload`, `simulate` and `verify` do with a chain of stages."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sosmith.commands.options import print_tables
-from sosmith.interface.files import default_folder
+from sosmith.interface.files import default_folder, to_json, write_file
 from sosmith.model.errors import ShortfallError, SpecificationError
 from sosmith.terminal import note, print_json, reader_may_leave, show_progress
 
@@ -17,8 +17,10 @@ if TYPE_CHECKING:
     from sosmith.interface.chain.specification import ChainSpecification
 
 
-def refuse(**options: Any) -> None:
+def refuse(instead: str = "", **options: Any) -> None:
     """Refuse options of a command that a chain does not take, by their names; None and False are not given.
+
+    `instead` says what to do, and begins with a colon.
 
     Raises
     ------
@@ -29,6 +31,7 @@ def refuse(**options: Any) -> None:
         if value is not None and value is not False:
             raise SpecificationError(
                 f"--{name.replace('_', '-')} must be left out with a chain of stages, as it is for a single core only"
+                f"{instead}"
             )
 
 
@@ -61,6 +64,40 @@ def write_chain(asked: ChainSpecification, board: str | None, output: Path | Non
         paths = design_chain(asked, board=board, progress=step).generate(output or default_folder(asked.name), step)
     for path in paths:
         click.echo(path)
+
+
+def pack_chain(asked: ChainSpecification, board: str | None, folder: Path, vlnv: str | None) -> None:
+    """Pack a chain for other tools, and print the paths of the files."""
+    from sosmith.interface.chain.design import design_chain
+
+    with show_progress() as step:
+        paths = design_chain(asked, board=board, progress=step).package(folder, vlnv=vlnv, progress=step)
+    for path in paths:
+        click.echo(path)
+
+
+def reload_chain(
+    asked: ChainSpecification,
+    other: Path,
+    board: str | None,
+    path: Path,
+    *,
+    reset: bool,
+    version: int,
+    as_json: bool,
+) -> None:
+    """Prove other coefficients of a stage, write the register writes into the file `path`, and show what is proven."""
+    from sosmith.interface.chain.design import design_chain
+
+    with show_progress() as step:
+        chain = design_chain(asked, board=board, progress=step)
+        proven = chain.reload(other, reset=reset, version=version, progress=step)
+    write_file(path, to_json(proven.writes))
+    if as_json:
+        print_json(proven.writes)
+    else:
+        print_tables(proven.tables())
+    note(f"wrote {path}")
 
 
 def run_chain(

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from sosmith.commands.chain import refuse, reload_chain
 from sosmith.commands.options import BAUD, BOARD, CORE, PORT, REALIZATION, SPEC, WIDTHS_OF, print_tables
 from sosmith.interface.files import default_folder, to_json, write_file
 from sosmith.output_paths import output_option
@@ -73,6 +74,9 @@ def reload_command(
     A core that judges wear restarts with the new set, as after a reset, and needs no more than the proof of its error.
     Exits with 1 and the reason if the set is refused; do not load it then.
 
+    Of a chain, OTHER has other coefficients of one stage with `reload = true`, and is otherwise as SPEC. The bound of
+    the chain is proven anew, and that no port behind the stage limits what passes.
+
     With --port, the set is loaded into the board there, and what became active is read back.
 
     `writes` in the JSON file are pairs of a byte address and a data word for the AXI4-Lite port, in order. Check first
@@ -82,10 +86,16 @@ def reload_command(
         sosmith reload my.toml recalibrated.toml
         sosmith reload my.toml recalibrated.toml --version 2 --port /dev/ttyUSB1
     """
+    from sosmith.interface.chain.specification import ChainSpecification, specification_in
     from sosmith.interface.specification import Specification
 
     if lock and port is None:
         raise click.UsageError("--lock must have --port, the board to lock")
+    if isinstance(chain := specification_in(spec), ChainSpecification):
+        refuse(core=core, realization=realization, widths_of=widths_of, active=active, port=port)
+        path = output or default_folder(chain.name) / f"{other.stem}.reload.json"
+        reload_chain(chain, other, board, path, reset=reset, version=version, as_json=as_json)
+        return
     asked, wanted = Specification.load(spec), Specification.load(other)
     running = None if active is None else Specification.load(active)
     with show_progress() as step:

@@ -11,6 +11,7 @@ from typing import Any
 
 from sosmith import SosmithError, Specification, SpecificationError
 from sosmith.host.loopback import MessageError
+from sosmith.interface.chain.specification import describes_chain
 from sosmith.interface.files import read_text, write_file, write_files
 from sosmith.studio.edits import changed
 from sosmith.studio.lane import Lane, warm_up
@@ -385,6 +386,11 @@ def opened(spec: Path | None, output: Path | None, folder: Path) -> Session:
         raise SpecificationError(f"{spec}: the specification must be a readable file") from None
     if len(text) > MAX_TEXT:
         raise SpecificationError(f"{spec}: the specification must be at most {MAX_TEXT} characters, not longer")
+    if describes_chain(text):
+        raise SpecificationError(
+            f"{spec}: the specification must be that of a single core, not of a chain: `sosmith design {spec}` shows a "
+            f"chain, and `sosmith generate {spec}` writes a specification of each stage, which the studio opens"
+        )
     same = output is None or output.resolve() == spec.resolve()
     return Session(output or spec, text, text if same else None, folder)
 

@@ -56,6 +56,29 @@ def test_a_chain_from_the_specification_to_the_proof(sosmith: Command) -> None:
     assert "stage out: " in refused.messages[-1]
 
 
+def test_a_chain_in_a_package(sosmith: Command) -> None:
+    Path("rx.toml").write_text(CHAIN, encoding="utf-8")
+    paths = sosmith("package", "rx.toml", "-o", "packed").stdout.split()
+    assert {"packed/README.md", "packed/rx.core", "packed/core/rx.sv", "packed/bench/rx_bench.sv"} <= set(paths)
+    refused = sosmith("package", "rx.toml", "--core", "filter")
+    assert refused.status == 2
+
+
+def test_other_coefficients_for_a_stage(sosmith: Command) -> None:
+    filter_ = 'kind = "iir"\nfamily = "butterworth"\norder = 2\ncutoff = 400.0\nreload = true'
+    text = CHAIN.replace('kind = "fir"\ntaps = [0.25, 0.5, 0.25]', filter_) + "max_error = 0.01\n"
+    Path("rx.toml").write_text(text, encoding="utf-8")
+    Path("other.toml").write_text(text.replace("400.0", "390.0"), encoding="utf-8")
+    loaded = sosmith("reload", "rx.toml", "other.toml", "--reset", "-o", "set.json", "--json")
+    assert loaded.status == 0, loaded.messages
+    tree = json.loads(Path("set.json").read_text(encoding="utf-8"))
+    assert tree == json.loads(loaded.stdout)
+    assert (tree["name"], tree["chain"]["stage"]) == ("rx_out", "out")
+    refused = sosmith("reload", "rx.toml", "other.toml", "--port", "nowhere")
+    assert refused.status == 2
+    assert refused.messages[-1].startswith("sosmith: error: --port must be left out with a chain of stages")
+
+
 def test_a_chain_in_a_simulator(sosmith: Command) -> None:
     Path("rx.toml").write_text(CHAIN, encoding="utf-8")
     run = sosmith("simulate", "rx.toml", "--simulator", "icarus", "--seconds", "0.2", "-o", "run", "--json")
@@ -85,6 +108,30 @@ def test_other_commands_say_that_they_take_no_chain(sosmith: Command) -> None:
     refused = sosmith("explore", "rx.toml")
     assert refused.status == 2
     assert refused.messages[-1] == (
-        "sosmith: error: rx.toml: not yet available: stage must be left out here, as only design, generate, simulate "
-        "and verify take a chain, not [a table, a table]"
+        "sosmith: error: rx.toml: not yet available: stage must be left out here, as only design, generate, package, "
+        "reload, simulate and verify take a chain: `sosmith generate` writes a specification of each stage beside the "
+        "chain's files, for what takes a single core, not [a table, a table]"
+    )
+
+
+def test_a_stage_alone_goes_where_a_chain_does_not(sosmith: Command) -> None:
+    Path("rx.toml").write_text(CHAIN, encoding="utf-8")
+    sosmith("generate", "rx.toml", "-o", "rx")
+    refused = sosmith("verify", "rx/rx.certificate.json", "--rocq")
+    assert refused.status == 2
+    assert refused.messages[-1] == (
+        "sosmith: error: --rocq must be left out with a chain of stages, as it is for a single core only: give it with "
+        "the certificate of each stage, such as rx/rx_slow.certificate.json"
+    )
+    assert sosmith("verify", "rx/rx_slow.certificate.json", "--spec", "rx/rx_slow.toml").status == 0
+
+
+def test_the_studio_opens_no_chain(sosmith: Command) -> None:
+    Path("rx.toml").write_text(CHAIN, encoding="utf-8")
+    refused = sosmith("studio", "rx.toml", "--no-browser")
+    assert refused.status == 2
+    assert refused.messages[-1] == (
+        "sosmith: error: rx.toml: the specification must be that of a single core, not of a chain: `sosmith design "
+        "rx.toml` shows a chain, and `sosmith generate rx.toml` writes a specification of each stage, which the studio "
+        "opens"
     )

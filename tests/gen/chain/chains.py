@@ -15,6 +15,31 @@ import sosmith
 _GRID = 1 << 220
 """Recursions are computed to this step: what it rounds is far below any claim."""
 
+PLAIN: dict[str, Any] = {
+    "name": "rx",
+    "sample_rate": 8000.0,
+    "input": {"x": {"bits": 8, "range": [-1.0, 1.0], "signed": True}},
+    "stage": [
+        {"name": "slow", "kind": "cic", "order": 2, "decimate": 2},
+        {"name": "double", "kind": "fir", "taps": [0.5, 0.5], "architecture": "parallel"},
+        {"name": "out", "kind": "fir", "taps": [0.25, 0.5, 0.25], "decimate": 2},
+    ],
+    "output": {"bits": 10, "range": [-1.0, 1.0], "signed": True},
+}
+GUARDED: dict[str, Any] = {
+    "name": "rx",
+    "sample_rate": 8000.0,
+    "channels": 2,
+    "input": {"x": {"bits": 8, "range": [-1.0, 1.0], "signed": True}},
+    "stage": [
+        {"name": "slow", "kind": "cic", "order": 2, "decimate": 2},
+        {"name": "low", "kind": "iir", "family": "butterworth", "order": 2, "cutoff": 400.0, "protect": "detect"},
+        {"name": "out", "kind": "fir", "taps": [0.25, 0.5, 0.25], "reload": True},
+    ],
+    "output": {"bits": 10, "range": [-1.0, 1.0], "signed": True},
+    "hardware": {"start": "zero"},
+}
+
 KINDS = ("gain", "fir", "cic", "halfband", "iir", "decimated iir")
 
 
@@ -27,6 +52,13 @@ def draw(seed: int) -> dict[str, Any]:
         stage = _stage(rng, kind, rate)
         stages.append({"name": f"s{k}", **stage})
         rate /= stage.get("decimate", 1)
+    options = random.Random(f"hardware of chain {seed}")
+    start: dict[str, Any] = {}
+    if options.random() < 0.4 and not any(s["kind"] == "iir" and "decimate" in s for s in stages):
+        start = {"start": "zero"}
+    for stage in stages:
+        if "decimate" not in stage:
+            stage.update(options.choice([{}, {"protect": "detect"}, {"protect": "correct"}, {"reload": True}]))
     bits, low = rng.randint(6, 16), rng.choice([0.0, -1.0])
     return {
         "name": f"chain{seed}",
@@ -35,7 +67,7 @@ def draw(seed: int) -> dict[str, Any]:
         "input": {"x": {"bits": bits, "range": [low, 1.0], "signed": low < 0}},
         "stage": stages,
         "output": {"bits": rng.randint(8, 16), "range": [-0.5, 0.5], "signed": True},
-        "hardware": {"clock": 48e6},
+        "hardware": {"clock": 48e6, **start},
     }
 
 
@@ -81,16 +113,27 @@ def steps_of(chain: sosmith.Chain) -> list[tuple[list[tuple[Sequence[Fraction], 
 
 
 def exact(chain: sosmith.Chain, values: Sequence[Fraction]) -> list[Fraction]:
-    """Results of one channel by definition, not limited: as if the first value had been there for ever."""
+    """Results of one channel by definition, not limited: as if the first value had been there for ever, or 0."""
+    steady = chain.core.spec.base.hardware.start == "steady"
     for sections, factor in steps_of(chain):
         for numerator, denominator in sections:
-            values = _filtered(numerator, denominator, values)
+            values = _filtered(numerator, denominator, values, steady=steady)
         values = values[::factor]
     return list(values)
 
 
-def _filtered(b: Sequence[Fraction], a: Sequence[Fraction], values: Sequence[Fraction]) -> list[Fraction]:
-    first = values[0]
+def flags(chain: sosmith.Chain, codes: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+    """Return `input_at_rail` of the results of one channel, by definition: of any sample since the result before."""
+    (port,) = chain.core.spec.base.inputs
+    at_rail = (codes == port.lowest) | (codes == port.highest)
+    ends = range(0, len(codes), chain.factor)
+    return np.array([at_rail[max(end - chain.factor + 1, 0) : end + 1].any() for end in ends])
+
+
+def _filtered(
+    b: Sequence[Fraction], a: Sequence[Fraction], values: Sequence[Fraction], *, steady: bool
+) -> list[Fraction]:
+    first = values[0] if steady else Fraction(0)
     steady = first * sum(b, Fraction(0)) / sum(a, Fraction(0))
     past, results = [first] * (len(b) - 1), list[Fraction]()
     before = [steady] * (len(a) - 1)

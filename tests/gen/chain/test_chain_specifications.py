@@ -77,8 +77,8 @@ REFUSED: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
     ),
     "unknown key": (
         stage(3, order=2),
-        "stage[3].order must be one of the keys name, kind, architecture, realization, multipliers, factor in a stage "
-        "of the kind gain, not an unknown one",
+        "stage[3].order must be one of the keys name, kind, architecture, realization, multipliers, protect, reload, "
+        "reload_lock, factor in a stage of the kind gain, not an unknown one",
     ),
     "kind": (
         stage(0, kind="fft"),
@@ -167,20 +167,9 @@ REFUSED: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
         "hardware, not a table",
     ),
     "none": (lambda tree: tree.update(stage=[]), "stage must be a list of 1 to 8 tables [[stage]], not 0 of them"),
-    "reload": (
-        hardware(reload=True),
-        "not yet available: hardware.reload must be false with [[stage]], as the bound of a chain holds for fixed "
-        "coefficients, and the registers are those of one core, not true",
-    ),
-    "protect": (
-        hardware(protect="detect"),
-        "not yet available: hardware.protect must be 'none' with [[stage]], as the flag fault is of a stage's own "
-        "results, which the next stage does not pass on, not 'detect'",
-    ),
-    "start": (
-        hardware(start="zero"),
-        "not yet available: hardware.start must be 'steady' with [[stage]], as the flag settling is of a stage's own "
-        "results, which the next stage does not pass on, not 'zero'",
+    "flags": (
+        stage(1, name="flags"),
+        "stage[1].name must be another name than flags, which a module of the chain has, not 'flags'",
     ),
     "samples": (
         hardware(samples_per_clock=2),
@@ -203,6 +192,22 @@ def test_what_a_chain_does_not_take_is_refused(name: str) -> None:
     assert str(refused.value) == f"specification: {sentence}"
 
 
+def test_what_a_decimating_stage_does_not_take_is_refused_with_its_name() -> None:
+    with pytest.raises(SpecificationError) as refused:
+        loaded(hardware(protect="detect"))
+    assert str(refused.value) == (
+        "specification: stage slow: not yet available: hardware.protect must be 'none' with an FIR filter that "
+        "decimates, not 'detect'"
+    )
+    tree = copy.deepcopy(TREE)
+    tree["hardware"] = {"protect": "detect"}
+    for k in (0, 2):
+        tree["stage"][k]["protect"] = "none"
+    spec = sosmith.ChainSpecification.load(tree).checked
+    stages = [each.ordinary(spec, (ANY_INPUT,), ANY_OUTPUT) for each in spec.stages]
+    assert [each.hardware.protect for each in stages] == ["none", "detect", "none", "detect"]
+
+
 def test_a_stage_that_breaks_a_rule_of_filters_is_named() -> None:
     with pytest.raises(SpecificationError) as refused:
         loaded(stage(2, cutoff=900.0))
@@ -213,8 +218,9 @@ def test_a_chain_is_no_specification_of_a_core() -> None:
     with pytest.raises(SpecificationError) as refused:
         sosmith.Specification.load(TREE)
     assert str(refused.value) == (
-        "specification: not yet available: stage must be left out here, as only design, generate, simulate and verify "
-        "take a chain, not [a table, a table, a table, a table]"
+        "specification: not yet available: stage must be left out here, as only design, generate, package, reload, "
+        "simulate and verify take a chain: `sosmith generate` writes a specification of each stage beside the chain's "
+        "files, for what takes a single core, not [a table, a table, a table, a table]"
     )
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.gen.chain.chains import KINDS, draw, exact, response, steps_of, stimulus
+from tests.gen.chain.chains import KINDS, draw, exact, flags, response, steps_of, stimulus
 
 import sosmith
 
@@ -39,6 +39,13 @@ def test_a_chain_keeps_to_what_it_claims(seed: int, tmp_path: Path) -> None:
     assert worst <= bound
     assert worst > bound / 4 or within < 20
 
+    _, status = chain.core.compute_with_status(codes[:, :, None])
+    for k in range(base.channels):
+        assert np.array_equal(status[:, k] & 1, flags(chain, codes[:, k]))
+        settling = np.flatnonzero(status[:, k] & 32)
+        assert np.array_equal(settling, np.arange(min(chain.core.settling, len(status))))
+    assert (chain.core.settling > 0) == (base.hardware.start == "zero")
+
     between: np.ndarray = codes[:, :, None]
     for stage in chain.core.stages[:-1]:
         between = stage.design.datapath.compute(between)[:, :, None]
@@ -53,7 +60,9 @@ def test_a_chain_keeps_to_what_it_claims(seed: int, tmp_path: Path) -> None:
     )
     states = {name: part.state.value for name, part in proof.scope.items()}
     assert {states[name] for name in ("chain", "stages", "top", "arithmetic", "filter", "c_model")} == {"proven"}
-    assert not proof.missing or any("decimated" in kind for kind in kinds_of(draw(seed)))
+    table = draw(seed)
+    guarded = any("protect" in stage or "reload" in stage for stage in table["stage"])
+    assert not proof.missing or guarded or any("decimated" in kind for kind in kinds_of(table))
     assert proof.bound == pytest.approx(chain.bound, rel=1e-9)
 
 
@@ -110,3 +119,10 @@ def test_the_draws_are_of_all_kinds() -> None:
     assert {kind for table in tables for kind in kinds_of(table)} == set(KINDS)
     assert {len(table["stage"]) for table in tables} == {2, 3, 4}
     assert {table["channels"] for table in tables} == {1, 3}
+    assert {table["hardware"].get("start", "steady") for table in tables} == {"steady", "zero"}
+    assert {stage.get("protect", "none") for table in tables for stage in table["stage"]} == {
+        "none",
+        "detect",
+        "correct",
+    }
+    assert {stage.get("reload", False) for table in tables for stage in table["stage"]} == {False, True}

@@ -6,27 +6,15 @@ import json
 import shutil
 import subprocess
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from tests.gen.chain.chains import stimulus
+from tests.gen.chain.chains import PLAIN, stimulus
 from tests.sim.lint import icarus_check, lint
 
 import sosmith
 from sosmith.sim.chain import whole_text
 
-TREE: dict[str, Any] = {
-    "name": "rx",
-    "sample_rate": 8000.0,
-    "input": {"x": {"bits": 8, "range": [-1.0, 1.0], "signed": True}},
-    "stage": [
-        {"name": "slow", "kind": "cic", "order": 2, "decimate": 2},
-        {"name": "double", "kind": "fir", "taps": [0.5, 0.5], "architecture": "parallel"},
-        {"name": "out", "kind": "fir", "taps": [0.25, 0.5, 0.25], "decimate": 2},
-    ],
-    "output": {"bits": 10, "range": [-1.0, 1.0], "signed": True},
-}
 MAIN = """
 #include "rx.h"
 #include <stdio.h>
@@ -48,14 +36,14 @@ int main(void)
 
 @pytest.fixture(scope="module")
 def chain() -> sosmith.Chain:
-    return sosmith.design_chain(TREE)
+    return sosmith.design_chain(PLAIN)
 
 
 def test_two_runs_write_the_same_bytes(chain: sosmith.Chain, tmp_path: Path) -> None:
     first = {path.name: path.read_bytes() for path in chain.generate(tmp_path / "one")}
-    again = {path.name: path.read_bytes() for path in sosmith.design_chain(TREE).generate(tmp_path / "two")}
+    again = {path.name: path.read_bytes() for path in sosmith.design_chain(PLAIN).generate(tmp_path / "two")}
     assert first == again
-    assert len(first) == 5 + 6 * 3
+    assert len(first) == 5 + 7 * 3
 
 
 def test_stages_have_the_architecture_that_each_asks_for(chain: sosmith.Chain) -> None:
@@ -63,8 +51,8 @@ def test_stages_have_the_architecture_that_each_asks_for(chain: sosmith.Chain) -
 
 
 def test_names_of_nets_are_kept_in_all_stages(tmp_path: Path) -> None:
-    sosmith.design_chain(TREE | {"hardware": {"keep": True}}).generate(tmp_path)
-    for stage in TREE["stage"]:
+    sosmith.design_chain(PLAIN | {"hardware": {"keep": True}}).generate(tmp_path)
+    for stage in PLAIN["stage"]:
         text = (tmp_path / f"rx_{stage['name']}.certificate.json").read_text(encoding="utf-8")
         assert json.loads(text)["about"]["item"]["keep"] is True
 

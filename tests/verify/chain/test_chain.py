@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import shutil
 from collections.abc import Callable
@@ -12,14 +11,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.verify.chain.sealing import CERTIFICATE, sealed_again
 
 import sosmith
 from sosmith.gen.chain import design as chain_design
 from sosmith.gen.chain.response import gain_into_passband
 from sosmith.model.errors import ShortfallError, SpecificationError
-from sosmith.verify.certificate_file import Certificate, SectionEntry, entries_text, on_grid
+from sosmith.verify.certificate_file import Certificate, SectionEntry, on_grid
 from sosmith.verify.chain import check
-from sosmith.verify.chain.chain_file import ChainCertificate, read_chain, sealed_chain
 from sosmith.verify.chain.responses import Part, peak_gain
 from sosmith.verify.verdict.door import Judgement, judge
 from sosmith.verify.verification import Progress
@@ -35,7 +34,7 @@ TREE: dict[str, Any] = {
     ],
     "output": {"bits": 10, "range": [-1.0, 1.0], "signed": True},
 }
-CERTIFICATE = "rx.certificate.json"
+COMMENT = r"^line \d+ of rx\.c must have a comment of plain letters$"
 
 
 @pytest.fixture(scope="module")
@@ -75,16 +74,6 @@ def proven(folder: Path, *, spec: bool = True) -> sosmith.ChainProof:
     return sosmith.ChainCertificate.load(folder / CERTIFICATE).verify(
         files=folder, spec=folder / "rx.toml" if spec else None
     )
-
-
-def sealed_again(folder: Path, change: Callable[[dict[str, Any]], None] = lambda tree: None) -> None:
-    """Change claims, and give the certificate the digests of the files as they are, and its own."""
-    tree = read_chain(folder / CERTIFICATE).model_dump(mode="json")
-    change(tree)
-    for entry in (*tree["files"], *(stage["certificate"] for stage in tree["stages"])):
-        entry["sha256"] = hashlib.sha256((folder / entry["name"]).read_bytes()).hexdigest()
-    certificate = sealed_chain(ChainCertificate.model_validate(tree))
-    (folder / CERTIFICATE).write_text(entries_text(certificate), encoding="utf-8")
 
 
 def test_all_of_a_chain_is_proven(folder: Path) -> None:
@@ -151,6 +140,7 @@ def more(text: str) -> str:
         ("folding.anywhere.gain", more, r"^the largest gain of what folds must be that at .* or little more, not .*$"),
         ("folding.passing.gain", less, r"^the largest gain into the pass band must be at least .*, not .*$"),
         ("folding.factor", lambda _: 8, r"^the factor of the chain must be 4, not 8$"),
+        ("settling", lambda _: 1, r"^settling of the chain must be 0 results, not 1$"),
         ("channels", lambda _: 2, r"^stage slow must have 2 channels, not 1$"),
         ("stages.2.kind", lambda _: "polynomial", r"^stage out must have a polynomial if it is one, and no other$"),
     ],
@@ -177,14 +167,29 @@ def test_a_stage_that_was_changed_is_refused(folder: Path) -> None:
         proven(folder)
 
 
+@pytest.mark.parametrize("name", ["rx_low.certificate.json", "rx.sv", "rx_slow.sv"])
+def test_a_link_out_of_the_folder_is_not_followed(name: str, folder: Path) -> None:
+    elsewhere = folder.parent / name
+    (folder / name).rename(elsewhere)
+    (folder / name).symlink_to(elsewhere)
+    with pytest.raises(ShortfallError, match=r"must be a file that can be read, not: it is a symbolic link$"):
+        proven(folder, spec=False)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "sentence"),
     [
         (
+            ".s_axis_tvalid(gated_tvalid)",
             ".s_axis_tvalid(stage_slow_tvalid)",
-            ".s_axis_tvalid(s_axis_tvalid)",
-            r"^s_axis_tvalid of rx_low must be the ",
+            r"^s_axis_tvalid of rx_low must be the net gated_tvalid, not stage_slow_tvalid$",
         ),
+        (
+            ".i_tuser(stage_slow_tuser)",
+            ".i_tuser(stage_low_tuser)",
+            r"^i_tuser of rx_flags must be the net stage_slow_",
+        ),
+        (".m_axis_tuser(last_tuser)", ".m_axis_tuser(m_axis_tuser)", r"."),
         (".s_axis_tdata(stage_low_tdata)", ".s_axis_tdata(stage_slow_tdata)", r"^s_axis_tdata of rx_out must be the "),
         (
             ".aresetn(aresetn),\n    .s_axis_tdata(stage_low",
@@ -204,7 +209,8 @@ def test_another_wire_is_refused(old: str, new: str, sentence: str, folder: Path
     path = folder / "rx.sv"
     text = path.read_text(encoding="utf-8")
     assert old in text
-    path.write_text(text.replace(old, new, 1), encoding="utf-8")
+    before, after = text.rsplit(old, 1)
+    path.write_text(before + new + after, encoding="utf-8")
     sealed_again(folder)
     with pytest.raises(ShortfallError, match=sentence):
         proven(folder, spec=False)
@@ -213,11 +219,25 @@ def test_another_wire_is_refused(old: str, new: str, sentence: str, folder: Path
 @pytest.mark.parametrize(
     ("file", "old", "new", "sentence"),
     [
-        ("rx.c", "result, status))", "result, NULL))", r"^rx\.c must have status after "),
+        ("rx.c", "result, &flags))", "result, NULL))", r"^rx\.c must have & after "),
+        ("rx.c", "flags & 1", "flags & 3", r"^rx\.c must have 1 after "),
+        ("rx.c", "state->kept = 0;", "", r"^rx\.c must have state after "),
         ("rx.c", "return 1;", "return 0;", r"^rx\.c must have 1 after "),
-        ("rx.c", "return 1;", "/* *\\\n/ return 0; /* */ return 1;", r"^rx\.c must be without lines that are joined$"),
-        ("rx.c", "return 1;", "/* *??/\n/ return 0; /* */ return 1;", r"^rx\.c must be without lines that are joined$"),
-        ("rx.c", "return 1;", "return\u00a01;", r"^rx\.c must have 1 after "),
+        (
+            "rx.c",
+            "return 1;",
+            "/* *\\\n/ return 0; /* */ return 1;",
+            r"^line \d+ of rx\.c must have a comment of plain letters$",
+        ),
+        (
+            "rx.c",
+            "return 1;",
+            "/* *??/\n/ return 0; /* */ return 1;",
+            r"^line \d+ of rx\.c must have a comment of plain letters$",
+        ),
+        ("rx.c", "return 1;", "return\u00a01;", r"^line \d+ of rx\.c must be of the C that is written for a model$"),
+        ("rx.c", "return 1;", "return 1; // 0", r"^line \d+ of rx\.c must not have what means something else$"),
+        ("rx.c", "return 1;", "return 1%:;", r"^line \d+ of rx\.c must not have what means something else$"),
         ("rx.h", "rx_low_state stage_low;", "rx_slow_state stage_low;", r"^rx\.h must have rx_low_state after "),
         ("rx.json", '"decimate": 4', '"decimate": 2', r"^decimate of the manifest must be 4, not 2$"),
         ("rx.json", '"channels": 1', '"channels": true', r"^channels of the manifest must be 1, not True$"),

@@ -30,6 +30,7 @@ from sosmith.model.errors import SpecificationError, falling_short
 if TYPE_CHECKING:
     from sosmith.interface.certificate import Progress
     from sosmith.interface.chain.certificate import ChainCertificate
+    from sosmith.interface.chain.reload import ChainReload
     from sosmith.interface.chain.report import ChainReport
 
 
@@ -170,6 +171,52 @@ class Chain(View):
             If Yosys fails, or the disk is full.
         """
         return generate_chain(self.core, Path(fspath(folder)), lambda step: progress(step, 0, 0))
+
+    def package(
+        self,
+        folder: str | PathLike[str],
+        *,
+        vlnv: str | None = None,
+        progress: Progress = lambda step, done, total: None,
+    ) -> list[Path]:
+        """Write the chain and what other tools need to take it in into `folder`; return the paths of the files.
+
+        Parameters and errors are those of `Design.package`.
+        """
+        from sosmith.gen.chain.package import package_chain
+        from sosmith.gen.output.packages.vlnv import Vlnv
+
+        named = None if vlnv is None else Vlnv.read(vlnv)
+        return package_chain(self.core, Path(fspath(folder)), lambda step: progress(step, 0, 0), vlnv=named)
+
+    def reload(
+        self,
+        other: ChainSpecification | str | PathLike[str] | Mapping[str, Any],
+        *,
+        reset: bool = False,
+        version: int = 1,
+        progress: Progress = lambda step, done, total: None,
+    ) -> ChainReload:
+        """Prove that a stage of the running chain can load the coefficients of another specification.
+
+        Parameters
+        ----------
+        other : ChainSpecification, path or mapping
+            The same chain with other coefficients of one stage, which must have `reload`, or another allowed error.
+        reset, version, progress
+            As for `Design.reload`.
+
+        Raises
+        ------
+        SpecificationError
+            If the stage cannot reload, or `other` differs in more.
+        ShortfallError
+            If the set does not fit the stage, the ports behind it or the error allowed.
+        """
+        from sosmith.interface.chain.reload import ChainReload
+
+        wanted = other if isinstance(other, ChainSpecification) else ChainSpecification.load(other)
+        return ChainReload.proven(self.core, wanted.checked, reset=reset, version=version, progress=progress)
 
     def simulate(
         self,

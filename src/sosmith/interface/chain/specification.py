@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from os import PathLike
@@ -110,6 +111,14 @@ class ChainSpecification(View):
             f"<sosmith.ChainSpecification {self.name}: {' -> '.join(self.stages)}, "
             f"{rate:g} Hz to {rate / self.factor:g} Hz>"
         )
+
+
+def describes_chain(text: str) -> bool:
+    """Say whether a text is the specification of a chain, as far as it is TOML."""
+    try:
+        return is_chain(tomllib.loads(text))
+    except tomllib.TOMLDecodeError:
+        return False
 
 
 def specification_in(source: str | PathLike[str]) -> Specification | ChainSpecification:

@@ -1,0 +1,122 @@
+"""Other coefficients for one stage of a running chain: proven to fit the stage, and the bound of the chain anew.
+
+The stage is proven as a core of its own. With its new response, errors of the stages before it reach the end with other
+gains, and other magnitudes reach the ports behind it: none of them may limit what passes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+from sosmith.gen.chain.design import ChainDesign, StageDesign, gains_to_the_end, reach_behind
+from sosmith.gen.chain.response import Part, peak_gain
+from sosmith.gen.chain.specification import ChainSpec
+from sosmith.gen.quantity import quantity
+from sosmith.gen.reload.reload import Swap, check_swap, own_set, set_for
+from sosmith.model.errors import ShortfallError, SpecificationError
+
+
+@dataclass(frozen=True, kw_only=True)
+class ChainSwap:
+    """A swap of the coefficients of a stage.
+
+    Attributes
+    ----------
+    stage : StageDesign
+        The stage as it was generated.
+    swap : Swap
+        The set, as proven for the stage.
+    bound : Fraction
+        Bound of the chain with the set, in the unit of its output: from a reset on, or once the swap has faded.
+    """
+
+    stage: StageDesign
+    swap: Swap
+    bound: Fraction
+
+
+def reload_chain(design: ChainDesign, wanted: ChainSpec, *, reset: bool) -> ChainSwap:
+    """Prove the set of the one stage in which another specification differs.
+
+    Parameters
+    ----------
+    design : ChainDesign
+        The chain as it was generated.
+    wanted : ChainSpec
+        The same chain, with other coefficients of a stage, and another `max_error` if it must have one.
+    reset : bool
+        Whether the chain is reset between the swap and the next sample.
+
+    Raises
+    ------
+    SpecificationError
+        If anything else differs, or the stage cannot be loaded.
+    ShortfallError
+        If the set does not fit the stage, a port behind it, or the error allowed.
+    """
+    k = _changed(design, wanted)
+    stage, spec, base = design.stages[k], wanted.stages[k], wanted.base
+    ordinary = spec.ordinary(wanted, stage.design.spec.inputs, stage.output, base.max_error)
+    new = set_for(stage.design, ordinary)
+    swap = check_swap(stage.design, None if reset else own_set(stage.design), new)
+    quantized = swap.new_set.quantized
+    assert quantized.filter is not None
+    parts = [each.parts for each in design.stages]
+    parts[k] = (Part(quantized.filter.exact, stage.design.datapath.samples_per_result),)
+    errors = [each.bound for each in design.stages]
+    errors[k] = quantized.bound * stage.output.lsb
+    _check_ports(design, parts, errors)
+    bound = sum((error * gain for error, gain in zip(errors, gains_to_the_end(parts), strict=True)), Fraction(0))
+    if bound > base.max_error:
+        allowed, reached = (quantity(float(value), base.output.unit) for value in (base.max_error, bound))
+        raise ShortfallError(
+            f"the chain must keep its error within {allowed} with the set, and is proven to {reached} only: nothing is "
+            "to be loaded"
+        )
+    return ChainSwap(stage=stage, swap=swap, bound=bound)
+
+
+def _changed(design: ChainDesign, wanted: ChainSpec) -> int:
+    """Return the number of the stage that differs."""
+    spec = design.spec
+    for name, have, other in (
+        ("name", spec.name, wanted.name),
+        ("sample_rate", spec.base.sample_rate, wanted.base.sample_rate),
+        ("channels", spec.base.channels, wanted.base.channels),
+        ("inputs", spec.base.inputs, wanted.base.inputs),
+        ("output", spec.base.output, wanted.base.output),
+        ("stage", *([(s.name, s.kind, s.factor) for s in each.stages] for each in (spec, wanted))),
+    ):
+        if have != other:
+            raise SpecificationError(
+                f"{wanted.base.path}: {name} must be as in {spec.base.path} for a set to be loaded there"
+            )
+    changed = [
+        k for k, (own, other) in enumerate(zip(spec.stages, wanted.stages, strict=True)) if own.tables != other.tables
+    ]
+    if len(changed) != 1:
+        names = " and ".join(spec.stages[k].name for k in changed) or "none"
+        raise SpecificationError(
+            f"{wanted.base.path}: one stage must differ from {spec.base.path}, as each has registers of its own, "
+            f"not {names}"
+        )
+    (k,) = changed
+    if spec.stages[k].kind == "polynomial":
+        raise SpecificationError(
+            f"{wanted.base.path}: stage {spec.stages[k].name} must be a filter for a set to be proven for the chain, "
+            "not a polynomial"
+        )
+    return k
+
+
+def _check_ports(design: ChainDesign, parts: list[tuple[Part, ...]], errors: list[Fraction]) -> None:
+    carried = Fraction(0)
+    for m, stage in enumerate(design.stages[:-1]):
+        carried = (carried * peak_gain(parts[m]) if parts[m] else Fraction(0)) + errors[m]
+        most, end = reach_behind(design.spec, parts[: m + 1]) + carried, stage.output.highest * stage.output.lsb
+        if most >= end:
+            raise ShortfallError(
+                f"the set must keep results behind stage {stage.spec.name} below {float(end):.6g}, where its port "
+                f"ends, not reach {float(most):.6g}"
+            )
