@@ -26,20 +26,26 @@ module TRELLIS_FF (input CLK, LSR, CE, DI, M, output reg Q);
 endmodule
 
 // Multiplier block with its registers for both operands, for the product, or without; its operands from its own inputs.
-// Registers are always enabled and never reset, and start at 0.
+// CE0 enables the registers of the operands, CE1 that of the product; they are never reset, and start at 0.
 module MULT18X18D (
   input A17, A16, A15, A14, A13, A12, A11, A10, A9, A8, A7, A6, A5, A4, A3, A2, A1, A0,
   input B17, B16, B15, B14, B13, B12, B11, B10, B9, B8, B7, B6, B5, B4, B3, B2, B1, B0,
   input C17, C16, C15, C14, C13, C12, C11, C10, C9, C8, C7, C6, C5, C4, C3, C2, C1, C0,
-  input SIGNEDA, SIGNEDB, SOURCEA, SOURCEB, CLK0, CE0, RST0,
+  input SIGNEDA, SIGNEDB, SOURCEA, SOURCEB, CLK0, CE0, CE1, RST0,
   output P35, P34, P33, P32, P31, P30, P29, P28, P27, P26, P25, P24, P23, P22, P21, P20, P19, P18, P17, P16, P15, P14,
   P13, P12, P11, P10, P9, P8, P7, P6, P5, P4, P3, P2, P1, P0
 );
   parameter REG_INPUTA_CLK = "NONE";
+  parameter REG_INPUTA_CE = "CE0";
+  parameter REG_INPUTA_RST = "RST0";
   parameter REG_INPUTB_CLK = "NONE";
+  parameter REG_INPUTB_CE = "CE0";
+  parameter REG_INPUTB_RST = "RST0";
   parameter REG_INPUTC_CLK = "NONE";
   parameter REG_PIPELINE_CLK = "NONE";
   parameter REG_OUTPUT_CLK = "NONE";
+  parameter REG_OUTPUT_CE = "CE0";
+  parameter REG_OUTPUT_RST = "RST0";
   parameter MULT_BYPASS = "DISABLED";
   parameter [127:0] RESETMODE = "SYNC";
   parameter [127:0] GSR = "ENABLED";
@@ -64,15 +70,17 @@ module MULT18X18D (
   } = REG_OUTPUT_CLK == "CLK0" ? held_product : product[35:0];
 
   always @(posedge CLK0) begin
-    held_a <= next_a;
-    held_b <= next_b;
-    held_product <= product[35:0];
-    if (!CE0 || RST0) $fatal(1, "MULT18X18D must have registers that are always enabled and never reset, unlike %m");
+    if (CE0) held_a <= next_a;
+    if (CE0) held_b <= next_b;
+    if (CE1) held_product <= product[35:0];
+    if (RST0) $fatal(1, "MULT18X18D must have registers that are never reset, unlike %m");
   end
 
   initial
     if ((REG_INPUTA_CLK != "NONE" && REG_INPUTA_CLK != "CLK0") ||
         (REG_INPUTB_CLK != "NONE" && REG_INPUTB_CLK != "CLK0") || REG_INPUTC_CLK != "NONE" ||
+        REG_INPUTA_CE != "CE0" || REG_INPUTB_CE != "CE0" ||
+        (REG_OUTPUT_CLK != "NONE" && REG_OUTPUT_CE != "CE1") ||
         REG_PIPELINE_CLK != "NONE" || (REG_OUTPUT_CLK != "NONE" && REG_OUTPUT_CLK != "CLK0") ||
         MULT_BYPASS != "DISABLED" || RESETMODE != "SYNC" || (GSR != "ENABLED" && GSR != "DISABLED"))
       $fatal(1, "MULT18X18D must have no other register and no bypass, unlike %m");

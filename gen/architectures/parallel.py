@@ -61,7 +61,7 @@ class Parallel(Architecture):
         if self._is_block:
             lanes = self.samples_per_clock
             return parallel_clocks.block_latency_cycles(self.datapath, lanes, look_ahead=self.look_ahead)
-        return parallel_clocks.latency_cycles(self.built, self.channels, protect=self.protect)
+        return parallel_clocks.latency_cycles(self.built, self.channels, protect=self.protect, adders=self.adders)
 
     @property
     def _cycles_per_sample(self) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 from sosmith.hdl.plan.interleaving import schedule
@@ -38,6 +38,8 @@ class Pipelined:
         Least number of samples from one of a channel to its next.
     block_ram : bool
         Whether the memories are asked to be block RAM.
+    writes : mapping of int to int
+        Pipeline stage in which each such memory is written, where that is not the one of the state.
     shares : bool
         Whether an output that is the upper part of a state's next value takes no register of its own.
     """
@@ -49,6 +51,7 @@ class Pipelined:
     words: int = 1
     distance: int = 1
     block_ram: bool = False
+    writes: Mapping[int, int] = field(default_factory=dict)
     shares: bool = False
 
     @classmethod
@@ -59,8 +62,9 @@ class Pipelined:
     @classmethod
     def of_channels(cls, graph: Graph, channels: int, adders: Collection[int], *, rewrites: bool) -> Pipelined:
         """Return the plan for several channels; `rewrites` as in `schedule`."""
-        plan = schedule(graph, channels, rewrites=rewrites)
-        return cls(graph, plan.pipeline_stages, adders, graph.delays, channels, plan.distance, plan.reading > 1)
+        plan = schedule(graph, channels, rewrites=rewrites, adders=adders)
+        block = plan.reading > 1
+        return cls(graph, plan.pipeline_stages, adders, graph.delays, channels, plan.distance, block, plan.writes)
 
     @classmethod
     def of_turns(cls, plan: TurnPlan) -> Pipelined:
@@ -86,7 +90,7 @@ class Pipelined:
 
         for user, node in enumerate(nodes):
             for operand in node.operands if node.op is not Op.SHIFT else ():
-                use(operand, self.stages[user])
+                use(operand, self.writes.get(user, self.stages[user]))
         for output in self.graph.outputs:
             use(output, self.depth - 1)
         return found

@@ -12,7 +12,7 @@ from sosmith.gen.fpga.boards import Board
 from sosmith.gen.fpga.yosys import run_yosys, yosys_version
 from sosmith.model.text_files import to_json, write_files
 
-_PACKING = "block registers 1"
+_PACKING = "block registers 2"
 """Version of `sosmith.gen.fpga.block_registers`."""
 
 

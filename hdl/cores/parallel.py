@@ -297,7 +297,7 @@ class Core(Shell):
 
     @property
     def _depth_of_stages(self) -> int:
-        return sum(depths(self.datapath, self.channels, self.protect))
+        return sum(depths(self.datapath, self.channels, self.protect, self.adders))
 
     @property
     def _reads_limits(self) -> bool:

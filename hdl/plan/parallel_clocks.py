@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from sosmith.hdl.plan.interleaving import schedule
+from collections.abc import Collection, Sequence
+
+from sosmith.hdl.plan.interleaving import Schedule, schedule
 from sosmith.hdl.plan.look_ahead import period, plans
 from sosmith.hdl.plan.pipeline import longest_time, pipeline_depth
 from sosmith.hdl.plan.unfolding import unfolded_stages
@@ -16,31 +18,39 @@ wires. From placed cores on an ECP5 of speed grade 6: audio_lowpass with look-ah
 examples and realizations in docs/cost.md."""
 
 
-def latency_cycles(datapath: Datapath, channels: int = 1, *, protect: str = "none") -> int:
+def latency_cycles(
+    datapath: Datapath, channels: int = 1, *, protect: str = "none", adders: Sequence[Collection[int]] = ()
+) -> int:
     """Most clocks from the edge that accepts a sample to the edge that can hand its result on, without a stall.
 
-    With several channels, a sample waits for a scrub of its channel, though not for one of another.
+    With several channels, a sample waits for a scrub of its channel, though not for one of another. Products in
+    `adders`, by stage and node, are made of adders.
     """
-    scrub = scrub_cycles(datapath, channels) if protect != "none" else 0
-    return sum(depths(datapath, channels, protect)) + 1 + (channels > 1) + (len(datapath.wear) > 1) + scrub
+    scrub = 0
+    if protect != "none" and channels > 1:  # states of one channel are registers, and are not scrubbed
+        scrub = max(plan.distance for plan in schedules(datapath, channels, protect, adders)) - 1
+    return sum(depths(datapath, channels, protect, adders)) + 1 + (channels > 1) + (len(datapath.wear) > 1) + scrub
 
 
-def scrub_cycles(datapath: Datapath, channels: int) -> int:
-    """Most clocks that a sample waits for a scrub of its channel, which goes through the stages as a sample does."""
-    if channels == 1:
-        return 0  # states are registers, and are not scrubbed
-    return max(schedule(stage.graph, channels, rewrites=True).distance for stage in datapath.stages) - 1
+def schedules(
+    datapath: Datapath, channels: int, protect: str, adders: Sequence[Collection[int]] = ()
+) -> list[Schedule]:
+    """Return the schedule of each datapath stage for several channels."""
+    made_of_adders = adders or [()] * len(datapath.stages)
+    return [
+        schedule(stage.graph, channels, rewrites=protect != "none", adders=own)
+        for stage, own in zip(datapath.stages, made_of_adders, strict=True)
+    ]
 
 
-def depths(datapath: Datapath, channels: int, protect: str) -> list[int]:
+def depths(datapath: Datapath, channels: int, protect: str, adders: Sequence[Collection[int]] = ()) -> list[int]:
     """Return the number of pipeline stages of each datapath stage."""
     if channels == 1:
         return [
             1 if protect == "none" and isinstance(stage, StartStage) else pipeline_depth(stage.graph)
             for stage in datapath.stages
         ]
-    rewrites = protect != "none"
-    return [schedule(stage.graph, channels, rewrites=rewrites).depth for stage in datapath.stages]
+    return [plan.depth for plan in schedules(datapath, channels, protect, adders)]
 
 
 def block_latency_cycles(datapath: Datapath, lanes: int, *, look_ahead: bool) -> int:

@@ -14,6 +14,9 @@ ADDITION, _MULTIPLICATION, _PARTIAL_PRODUCT = 5, 12, 2
 """Delays of operations, in units of about half a nanosecond of an ECP5; a product of several multiplier blocks takes
 more, because its partial products are added up."""
 
+REGISTERED_MULTIPLICATION = 7
+"""Delay of a product of one block that a register follows at once, which is inside the block."""
+
 _BLOCK_BITS = 18
 """Bits of each operand of a multiplier block, its sign bit included."""
 
@@ -214,10 +217,27 @@ def operation_time(graph: Graph, node: Node, *, powers: bool = False) -> int:
     if node.op in NO_LOGIC or graph.concatenated(node) is not None:
         return 0
     if node.op in {Op.SCALE, Op.MULTIPLY} and not graph.is_gate(node):
-        operands = [(graph.nodes[i].width, graph.nodes[i].signed) for i in node.operands]
-        if node.op is Op.SCALE:
-            operands.append((abs(node.parameter).bit_length() + (node.parameter < 0), node.parameter < 0))
-        signed = any(sign for _, sign in operands)  # a block takes both operands signed or neither
-        several = any(bits + (signed and not sign) > _BLOCK_BITS for bits, sign in operands)
-        return _MULTIPLICATION + several * _PARTIAL_PRODUCT
+        return _MULTIPLICATION + _takes_several(graph, node) * _PARTIAL_PRODUCT
     return ADDITION
+
+
+def is_block_product(graph: Graph, node: Node) -> bool:
+    """Whether a node is a product that one multiplier block computes, so that the block's registers can hold it."""
+    if node.op not in {Op.SCALE, Op.MULTIPLY} or graph.is_gate(node):
+        return False
+    return all(bits <= _BLOCK_BITS for bits, _ in _factors(graph, node))  # some take one signed and the other not
+
+
+def _factors(graph: Graph, node: Node) -> list[tuple[int, bool]]:
+    """Return the bits of the factors of a product, a sign bit included, and whether they are signed."""
+    factors = [(graph.nodes[i].width, graph.nodes[i].signed) for i in node.operands]
+    if node.op is Op.SCALE:
+        factors.append((abs(node.parameter).bit_length() + (node.parameter < 0), node.parameter < 0))
+    return factors
+
+
+def _takes_several(graph: Graph, node: Node) -> bool:
+    """Whether a product takes more than one multiplier block."""
+    factors = _factors(graph, node)
+    signed = any(sign for _, sign in factors)  # a block takes both operands signed or neither
+    return any(bits + (signed and not sign) > _BLOCK_BITS for bits, sign in factors)

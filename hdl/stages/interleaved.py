@@ -18,12 +18,14 @@ As an example, the recursion of `sosmith.hdl.stages.pipelined`, for 3 channels, 
     | x1, 3x2  |---------------------+        | v2, 3x5  |-----+       | v1, 3x5  |----+  |
     +----------+                              +----------+             +----------+       |
       ^ address                                 ^      ^                 ^      ^ data    |
-      i_channel                    address in 1 |      | data: v1        |      +---------+
+      i_channel                    address in 1 |      | data: v1        |      +-[v_passed4]
                                    [channel1] --+                        +-- [channel2], address in 2
 
-Both memories of v are written in stage 3, addressed by [channel3]. As that of v2 is addressed in stage 1, a channel may
-come again 3 - 1 + 1 = 3 samples later, `Schedule.distance`; `sosmith.hdl.cores.parallel` holds back a sample that comes
-too soon.
+The memory of v2 is written in stage 3, that of v1 with the output, behind stage 3: a choice lies before it, between the
+next state and 0 to clear it. Both are addressed by [channel3] and [channel4]. As each is written two stages after it is
+addressed, a channel may come again 2 + 1 = 3 samples later, `Schedule.distance`; `sosmith.hdl.cores.parallel` holds
+back a sample that comes too soon. A product that one multiplier block computes gets a stage of its own, where the loop
+has clocks for it: the registers on both sides can be those of the block.
 The channels 0, 1, 2, 0, 1 with the codes 1, 1, -2, 1, 1 give::
 
     clock            0    1    2    3    4    5    6    7    8
@@ -41,8 +43,8 @@ like a sample of its channel, but that each memory is written with what it has r
     +----------+        +--> failed --> or -->[fault2]..    ^
                                                the next state
 
-The latency is 4 clocks. The same recursion takes 3 pipeline stages for 2 channels, and 6 for 17, whose block RAM has a
-register before it and one behind.
+The latency is 4 clocks. The same recursion takes 3 pipeline stages for 2 channels, whose memories are read without a
+clock, and 5 for 17, whose block RAM has a register before it and one behind.
 """
 
 from __future__ import annotations
@@ -133,7 +135,7 @@ class InterleavedStage(wiring.Component):
         self.protect = protect
         self.constants = constants
         self.channels = channels
-        self.schedule = schedule(stage.graph, channels, rewrites=protect != "none")
+        self.schedule = schedule(stage.graph, channels, rewrites=protect != "none", adders=adders)
         graph, bits = stage.graph, channel_bits(channels)
         members = {f"i{k}": In(shape_of(graph.nodes[i])) for k, i in enumerate(graph.inputs)}
         members |= {f"o{k}": Out(shape_of(graph.nodes[i])) for k, i in enumerate(graph.outputs)}
@@ -194,7 +196,7 @@ class InterleavedStage(wiring.Component):
                 init=[0] * self.channels,
                 attrs=_BLOCK_RAM if plan.reading > 1 else {},
             )
-            read = read_port(memory, f"{names[index]}_memory")
+            read = read_port(memory, f"{names[index]}_memory", at_once=not plan.reading)
             write = write_port(memory, f"{names[index]}_memory")
             word = read.data
             if plan.reading > 1:
@@ -207,9 +209,10 @@ class InterleavedStage(wiring.Component):
                 state = Signal(shape_of(node), name=f"{names[index]}_next")
                 m.d.comb += state.eq(Mux(scrub[written], at(index, written), following))
                 following, writes = state.as_unsigned(), valid[written] | scrub[written]
+            if plan.reading:
+                m.d.comb += read.en.eq(self.advance)
             m.d.comb += [
                 read.addr.eq(channel[plan.pipeline_stages[index] - plan.reading]),
-                read.en.eq(self.advance),
                 wires[index].eq(reads[index].data),
                 write.addr.eq(Mux(self.clear, self.clear_channel, channel[written])),
                 write.data.eq(Mux(self.clear, 0, check.written(following))),

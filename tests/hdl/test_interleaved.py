@@ -14,6 +14,7 @@ from tests.hdl.core_bench import Pace, run_core
 from sosmith.gen.architectures.registry import ARCHITECTURES
 from sosmith.hdl.check_bits import CheckBits, Read
 from sosmith.hdl.plan.interleaving import schedule
+from sosmith.hdl.plan.pipeline import is_block_product
 from sosmith.hdl.stages import interleaved
 from sosmith.hdl.stages.interleaved import InterleavedStage
 from sosmith.model.dataflow.graph import Graph, GraphBuilder, Op
@@ -32,14 +33,15 @@ def test_every_value_is_there_before_it_is_used(realization: str, channels: int)
     for graph in graphs(realization):
         plan = schedule(graph, channels)
         assert plan.distance <= channels
-        assert plan.reading == (1 if channels <= 16 else 2)
+        assert plan.reading == (0 if channels == 2 else 1 if channels <= 16 else 2)
         for index, node in enumerate(graph.nodes):
             assert 0 <= plan.pipeline_stages[index] < plan.depth
             if node.op is Op.DELAY:
                 addressed = plan.pipeline_stages[index] - plan.reading  # where the memory is addressed
                 assert addressed >= 0
-                assert plan.writes[index] >= addressed + plan.reading - 1  # block RAM: never written while it is read
-                assert plan.pipeline_stages[node.operands[0]] + plan.reading - 1 <= plan.writes[index] < plan.depth
+                assert plan.writes[index] >= addressed + max(plan.reading - 1, 0)  # block RAM: not while it is read
+                source = plan.pipeline_stages[node.operands[0]]
+                assert source + max(plan.reading - 1, 0) <= plan.writes[index] <= plan.depth
                 continue
             assert all(plan.pipeline_stages[i] <= plan.pipeline_stages[index] for i in node.operands)
         assert all(plan.pipeline_stages[i] < plan.depth for i in graph.outputs)
@@ -52,9 +54,37 @@ def test_more_channels_make_a_deeper_pipeline() -> None:
     assert depths[0] < depths[-1]
 
 
-@pytest.mark.parametrize("channels", [3, 17])
+def damped() -> tuple[Graph, int, int, int, int]:
+    """Return a recursion through a product, and the nodes of the sum before it, the product, and two sums behind."""
+    g = GraphBuilder()
+    x, y1 = g.input("x", 0, -2, 1), g.delay("y1", 0, -8, 7)
+    before = g.subtract(x, y1)
+    product = g.scale(before, 3, 2)
+    behind = g.add(x, g.floor(product, 0))
+    last = g.add(behind, x)
+    g.connect(y1, g.bound(last, -8, 7))
+    return g.build([y1]), int(before), int(product), int(behind), int(last)
+
+
+def test_a_product_of_a_block_has_registers_on_both_sides_where_the_loop_has_the_clocks() -> None:
+    graph, before, product, behind, _ = damped()
+    assert is_block_product(graph, graph.nodes[product])
+    for channels, clocks in ((3, (0, 1)), (8, (1, 1))):
+        places = schedule(graph, channels).pipeline_stages
+        assert (places[product] - places[before], places[behind] - places[product]) == clocks
+
+
+def test_a_product_of_adders_leaves_time_for_several_sums() -> None:
+    """No register can shorten it."""
+    graph, _, product, behind, last = damped()
+    for adders, clocks in (((), 1), ((product,), 0)):
+        places = schedule(graph, 8, adders=adders).pipeline_stages
+        assert places[last] - places[behind] == clocks
+
+
+@pytest.mark.parametrize("channels", [2, 3, 17])
 def test_every_channel_has_a_state_of_its_own(channels: int) -> None:
-    """In memories of LUTs and of blocks, which are read a clock later."""
+    """In memories that are read at once, and in those of LUTs and of blocks, which are read a clock later."""
     chance = random.Random(1)
     samples = [(chance.randrange(channels), [chance.randint(-2, 1)]) for _ in range(5 * channels)]
     before = [0] * channels
@@ -103,11 +133,10 @@ def test_what_is_found_wrong_goes_with_what_has_read_it(monkeypatch: pytest.Monk
     assert [clock for clock, (_, fault) in enumerate(seen) if fault] == [2 * depth, 3 * depth]
 
 
-def test_the_sign_of_a_coefficient_counts_among_its_bits() -> None:
-    """With 19 bits it takes more than a block; the longer clock of its loop leaves time for additions elsewhere."""
+@pytest.mark.parametrize(("coefficient", "fits"), [((1 << 18) - 1, True), (-(1 << 16), True), (-(1 << 17), False)])
+def test_the_sign_of_a_coefficient_counts_among_its_bits(coefficient: int, fits: bool) -> None:
+    """With 19 bits it takes more than a block."""
     g = GraphBuilder()
-    x, y1 = g.input("x", 0, -2, 1), g.delay("y1", 0, -8, 7)
-    ahead = g.scale(g.add(g.scale(x, (1 << 17) + 1, 17), x), (1 << 17) + 1, 17)
-    y = g.bound(g.floor(g.add(ahead, g.scale(y1, -(1 << 17), 18)), 0), -8, 7)
-    g.connect(y1, y)
-    assert schedule(g.build([y]), 2).depth == 2
+    product = g.scale(g.input("x", 0, -2, 1), coefficient, 18)
+    graph = g.build([product])
+    assert is_block_product(graph, graph.nodes[product]) is fits

@@ -25,6 +25,12 @@ always @(posedge clk) begin
   deep_read <= deep[from % 512]; deep_late <= deep_read;
 end
 assign registered_product = held_product;
+reg [17:0] some_x = 0, some_y = 0; reg [35:0] some_product = 0;
+always @(posedge clk) begin
+  if (!enable[0]) begin some_x <= x; some_y <= y; end
+  if (enable[1]) some_product <= $signed(some_x) * $signed(some_y);
+end
+assign enabled_product = some_product;
 assign registered_word = deep_late;
 (* ram_style = "block" *) reg [35:0] deep [0:511];
 initial for (i = 0; i < 512; i = i + 1) deep[i] = i * 40503 + (i >> 3);
@@ -62,7 +68,7 @@ def design() -> str:
         outputs[f"{name}_out"] = 18
     body += "".join(f"assign {name} = {name[:-4]}_read;\n" for name in outputs if name.endswith("_out"))
     body += REGISTERED
-    outputs |= {"registered_product": 36, "registered_word": 36}
+    outputs |= {"registered_product": 36, "enabled_product": 36, "registered_word": 36}
     ports = ", ".join(f"output [{width - 1}:0] {name}" for name, width in outputs.items())
     return f"module cells ({PORTS}, {ports});\ninteger i;\n{body}endmodule\n"
 
@@ -141,10 +147,11 @@ def netlist(tmp_path_factory: pytest.TempPathFactory) -> Netlist:
 @pytest.mark.slow
 def test_models_do_what_was_synthesized(netlist: Netlist, tmp_path: Path) -> None:
     text = netlist.path.read_text(encoding="utf-8")
-    assert netlist.cells["MULT18X18D"] == len(PRODUCTS) + 1
+    assert netlist.cells["MULT18X18D"] == len(PRODUCTS) + 2
     registers = re.findall(r"(REG_\w+_CLK\(\"CLK0\"\)|REGMODE_\w\(\"OUTREG\"\))", text)
     assert sorted(name.partition("(")[0] for name in registers) == [
-        *("REGMODE_A", "REGMODE_B", "REG_INPUTA_CLK", "REG_INPUTB_CLK", "REG_OUTPUT_CLK")
+        *("REGMODE_A", "REGMODE_B"),
+        *(f"REG_{place}_CLK" for place in ("INPUTA", "INPUTB", "OUTPUT") for _ in range(2)),
     ]
     assert {int(width) for width in re.findall(r"DATA_WIDTH_\w\(32'd(\d+)\)", text)} == set(WIDTHS)
     assert set(re.findall(r"WRITEMODE_A\(\"(\w+)\"\)", text)) == {"NORMAL", "WRITETHROUGH", "READBEFOREWRITE"}
@@ -155,6 +162,7 @@ def test_models_do_what_was_synthesized(netlist: Netlist, tmp_path: Path) -> Non
 
 WRONG = {
     "SIGNEDA & a[17]": ("a[17]", {"product_unsigned"}),
+    "if (CE1) held_product": ("held_product", {"enabled_product"}),
     "place = (address[3] ? 9 : 0) + 4": ("place = (address[3] ? 8 : 0) + 4", {"wide4_out"}),
     "{{9{address[1]}}, {9{address[0]}}}": ("{{9{address[0]}}, {9{address[1]}}}", {"bytes_out"}),
     'CEA & WRITEMODE_A == "WRITETHROUGH"': ("1'b0", {"fresh_out"}),
@@ -177,8 +185,8 @@ def test_wrong_models_are_found(netlist: Netlist, tmp_path: Path) -> None:
 REFUSED = {
     'MULT18X18D #(.REG_OUTPUT_CLK("CLK1")) cell_ ();': "MULT18X18D must have no other register and no bypass, unlike",
     'MULT18X18D #(.REG_PIPELINE_CLK("CLK0")) cell_ ();': "MULT18X18D must have no other register and no bypass,",
-    "MULT18X18D cell_ (.CLK0(clk), .CE0(1'b0));": "MULT18X18D must have registers that are always enabled and never",
-    "MULT18X18D cell_ (.CLK0(clk), .CE0(1'b1), .RST0(1'b1));": "MULT18X18D must have registers that are always enabled",
+    'MULT18X18D #(.REG_OUTPUT_CLK("CLK0")) cell_ ();': "MULT18X18D must have no other register and no bypass, unlike",
+    "MULT18X18D cell_ (.CLK0(clk), .CE0(1'b1), .RST0(1'b1));": "MULT18X18D must have registers that are never reset",
     "MULT18X18D cell_ (.SOURCEA(1'b1), .SOURCEB(1'b0));": "MULT18X18D must take A and B, not shifted operands as in",
     'TRELLIS_FF #(.SRMODE("ASYNC")) cell_ ();': "TRELLIS_FF must have a rising edge and a synchronous reset, unlike",
     'DP16KD #(.REGMODE_A("OUTREG")) cell_ ();': "DP16KD must have rising edges, no register at an output alone and no",

@@ -62,7 +62,7 @@ def _stages_are_judged_once(monkeypatch: pytest.MonkeyPatch) -> None:
         own = [] if folder is None else sorted(folder.glob(f"{core.name}*"))
         stated = options["stated"]
         words = None if stated is None else replace(stated, folder=Path())  # a stage without measurements
-        key = (*((path.name, path.read_bytes()) for path in own), options["content"], words)
+        key = (*((path.name, path.is_symlink(), path.read_bytes()) for path in own), options["content"], words)
         if key not in _JUDGED:
             _JUDGED[key] = judge(core, progress, folder=folder, **options)
         return _JUDGED[key]
