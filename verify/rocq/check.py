@@ -23,18 +23,8 @@ from sosmith.verify.rocq.start import start_of
 DATA = "Claims"
 """Name of the file with a certificate's own theorems."""
 
-_MAKEFILE = f"""\
-# Checks the claims with Rocq (coqc of version 8.16 or later) and prints the axioms that each rests on.
-FILES = {" ".join(f"{name}.v" for name in (*THEORIES, DATA))}
-
-all:
-\tfor file in $(FILES); do coqc -Q . {LIBRARY} $$file || exit 1; done
-
-clean:
-\trm -f *.vo *.vok *.vos *.glob .*.aux
-
-.PHONY: all clean
-"""
+_FOLDING = ("Angles", "Waves", "Forms", "Folding")
+"""Theories that only claims of a decimator rest on."""
 
 GIVEN = ("the certificate's graph, exact filter and exact calibration: that these are the specified ones is not of it",)
 """What the theorems are about, and do not question."""
@@ -108,7 +98,9 @@ def check_in_rocq(
                 (folder / file).write_text(text, encoding="utf-8")
         except OSError as error:
             raise ToolError(f"{folder}: the theories must be written there, which failed: {error.strerror}") from None
-        accepted = run_kernel(folder, made.claims, DATA, seconds, lambda done, total: progress("Rocq", done, total))
+        accepted = run_kernel(
+            folder, made.claims, DATA, seconds, lambda done, total: progress("Rocq", done, total), made.theories
+        )
     words = {claim.name: claim.words for claim in made.claims}
     return RocqVerdict(accepted.version, words, accepted.axioms, GIVEN, made.unchecked)
 
@@ -135,11 +127,14 @@ class Theorems:
         In their order.
     unchecked : tuple of str
         What of the certificate none of them is about.
+    theories : tuple of str
+        What they rest on, in the order in which it is compiled.
     """
 
     definitions: str
     claims: list[Claim]
     unchecked: tuple[str, ...]
+    theories: tuple[str, ...]
 
 
 def theorems(certificate: Certificate) -> Theorems:
@@ -168,7 +163,8 @@ def theorems(certificate: Certificate) -> Theorems:
     else:
         claims += bound_claims(certificate, behind, cascade, start, counter)
         claims += folding_claims(certificate)
-    return Theorems(core_definitions(graph), claims, tuple(unchecked))
+    theories = tuple(name for name in THEORIES if certificate.decimation is not None or name not in _FOLDING)
+    return Theorems(core_definitions(graph), claims, tuple(unchecked), theories)
 
 
 def _beside(certificate: Certificate) -> Iterator[str]:
@@ -179,5 +175,20 @@ def _beside(certificate: Certificate) -> Iterator[str]:
 
 def _texts(made: Theorems) -> dict[str, str]:
     parts = [f"(* {claim.words}. *)\n{claim.text}{mark(claim)}" for claim in made.claims]
-    text = "\n".join([head(), made.definitions, *parts, ending(made.claims)])
-    return theory_texts() | {f"{DATA}.v": text, "Makefile": _MAKEFILE}
+    text = "\n".join([head(made.theories), made.definitions, *parts, ending(made.claims)])
+    return theory_texts(made.theories) | {f"{DATA}.v": text, "Makefile": _makefile(made.theories)}
+
+
+def _makefile(theories: Sequence[str]) -> str:
+    return f"""\
+# Checks the claims with Rocq (coqc of version 8.16 or later) and prints the axioms that each rests on.
+FILES = {" ".join(f"{name}.v" for name in (*theories, DATA))}
+
+all:
+\tfor file in $(FILES); do coqc -Q . {LIBRARY} $$file || exit 1; done
+
+clean:
+\trm -f *.vo *.vok *.vos *.glob .*.aux
+
+.PHONY: all clean
+"""

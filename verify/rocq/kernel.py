@@ -73,10 +73,10 @@ class Accepted:
     axioms: tuple[str, ...]
 
 
-def theory_texts() -> dict[str, str]:
-    """Return the general theories by their file names."""
+def theory_texts(theories: Sequence[str] = THEORIES) -> dict[str, str]:
+    """Return general theories by their file names."""
     folder = files(__package__) / "theories"
-    return {f"{name}.v": (folder / f"{name}.v").read_text(encoding="utf-8") for name in THEORIES}
+    return {f"{name}.v": (folder / f"{name}.v").read_text(encoding="utf-8") for name in theories}
 
 
 def run_kernel(
