@@ -30,10 +30,8 @@ def document(results: dict[str, Any]) -> str:
     settings = results["settings"]
     parts = [
         "# The wear campaign",
-        "Made by `python -m examples.wear_campaign --document`; every figure is a result of its last run. "
-        "`bayes` and the choice of a filter from spectra have changed since then: figures of these two may differ "
-        "today. All sensor errors are listed in `examples/scenarios/` and `examples/wear_campaign/`, each with the "
-        "figure of the "
+        "Made by `python -m examples.wear_campaign --document`; every figure is a result of its last run. All sensor "
+        "errors are listed in `examples/scenarios/` and `examples/wear_campaign/`, each with the figure of the "
         "paper that it is derived from, or marked as assumed; none was fitted to a result. Accuracy is the paper's "
         "equation 7: 100 % "
         "minus "
