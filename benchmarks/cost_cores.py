@@ -62,6 +62,9 @@ class Core:
         Clock in MHz that it looks ahead for; 0 without look-ahead.
     multipliers : int
         Multiplier blocks that the specification names; 0 for "auto".
+    freedom : str
+        "none" or "mask" for the filter of the recipe inside a mask in place of the example's, as that of the family or
+        as any; empty for the example's.
     """
 
     example: str
@@ -73,6 +76,7 @@ class Core:
     lanes: int = 1
     clock: int = 0
     multipliers: int = 0
+    freedom: str = ""
 
     @property
     def key(self) -> str:
@@ -83,7 +87,8 @@ class Core:
         several = f" {self.lanes} a clock" if self.lanes > 1 else ""
         ahead = f" look-ahead {self.clock} MHz" if self.clock else ""
         blocks = f" multipliers {self.multipliers}" if self.multipliers else ""
-        return f"{self.example} {self.architecture} {self.channels}{guarded}{wide}{chosen}{several}{ahead}{blocks}"
+        special = f"{guarded}{wide}{chosen}{several}{ahead}{blocks}{self._free}"
+        return f"{self.example} {self.architecture} {self.channels}{special}"
 
     @property
     def label(self) -> str:
@@ -95,7 +100,11 @@ class Core:
         lanes = f", {self.lanes} samples a clock" if self.lanes > 1 else ""
         ahead = f", look-ahead for {self.clock} MHz" if self.clock else ""
         blocks = f", multipliers = {self.multipliers}" if self.multipliers else ""
-        return f"{self.example} {self.architecture}{several}{guarded}{wide}{chosen}{lanes}{ahead}{blocks}"
+        return f"{self.example} {self.architecture}{several}{guarded}{wide}{chosen}{lanes}{ahead}{blocks}{self._free}"
+
+    @property
+    def _free(self) -> str:
+        return {"": "", "none": ", by a mask", "mask": ", any inside a mask"}[self.freedom]
 
     @property
     def targets(self) -> list[str]:
@@ -106,7 +115,7 @@ class Core:
             return [key for key in ("up5k", "ecp5") if TARGETS[key].device.multipliers >= self.multipliers]
         if self.realization or self.lanes > 1 or self.clock:
             return ["ecp5"]
-        if self.bits or self.architecture == combinations.ONLINE.name:
+        if self.bits or self.freedom or self.architecture == combinations.ONLINE.name:
             return ["hx8k", "ecp5"]
         wanted = [key for key in _ORDINARY if key != _SMALLEST or self.architecture == combinations.SERIAL.name]
         if self.protect == "none":
@@ -155,7 +164,10 @@ FAST = (
 TWO_PRODUCTS = tuple(Core(example, "folded", multipliers=2) for example in EXAMPLES)
 """Folded cores with two products a clock."""
 
-OF_THEIR_OWN = frozenset({*PROTECTED, *ONLINE, *REALIZED, *FAST, *TWO_PRODUCTS})
+MASKED = tuple(Core("audio_lowpass", "parallel", freedom=freedom) for freedom in ("none", "mask"))
+"""The family's filter for a mask, and any inside it."""
+
+OF_THEIR_OWN = frozenset({*PROTECTED, *ONLINE, *REALIZED, *FAST, *TWO_PRODUCTS, *MASKED})
 """Cores that have tables of their own."""
 
 CORES = (
@@ -169,6 +181,7 @@ CORES = (
     *REALIZED,
     *FAST,
     *TWO_PRODUCTS,
+    *MASKED,
 )
 Job = tuple[Core, str]
 """A core and its target."""
@@ -193,6 +206,9 @@ def design(core: Core, objective: Objective) -> CoreDesign:
     spec = load(path)
     if bits:
         spec = from_text(spec.text.replace("bits = 16", f"bits = {bits}"), path)
+    if core.freedom:
+        mask = load(ROOT / "examples" / "recipes" / "inside_a_mask.toml").filter
+        spec = replace(spec, filter=replace(mask, freedom=core.freedom))
     hardware = replace(spec.hardware, architecture=architecture, samples_per_clock=core.lanes, pipeline="plain")
     if core.multipliers:
         hardware = replace(hardware, multipliers=core.multipliers)

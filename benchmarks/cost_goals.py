@@ -126,6 +126,7 @@ GOALS = (
     Goal(_TWO, "ecp5", "clocks per sample", 50, _clocks),
     Goal(_TWO, "ecp5", "all LUT4", 400, _area("all_luts")),
     Goal(_TWO, "ecp5", "fmax, MHz", 150, fmax),
+    Goal(Core("audio_lowpass", "parallel", freedom="mask"), "hx8k", "LC, no multipliers", 1200, _cells),
     Goal(AUDIO["serial"], "up5k", "MAC16", 0, _area("multipliers")),
     Goal(AUDIO["serial"], "up5k", "LC", 500, _cells),
     Goal(AUDIO["serial"], "hx8k", "LC", 500, _cells),

@@ -12,6 +12,7 @@ from benchmarks.cost_cores import (
     EXAMPLES,
     FAST,
     GROWTH,
+    MASKED,
     ONLINE,
     PROTECTED,
     REALIZED,
@@ -148,6 +149,34 @@ def two_products_table(record: Figures) -> str:
                     f"{rate(two, figures):,.0f}",
                 ]
                 lines.append(f"| {' | '.join(row)} |")
+    return "\n".join(lines)
+
+
+def masked_table(record: Figures) -> str:
+    """Return a Markdown table of the family's filter for a mask, and of any inside it."""
+    columns = (
+        "filter",
+        "target",
+        "realization",
+        "multipliers",
+        "LC, or all LUT4",
+        "FF",
+        "fmax, MHz (lowest to highest)",
+    )
+    lines = [f"| {' | '.join(columns)} |", "|---" * len(columns) + "|"]
+    for core in MASKED:
+        for key, figures in targets_in(record, core).items():
+            area = figures["area"]
+            row = [
+                "any inside the mask" if core.freedom == "mask" else "of the family",
+                title(TARGETS[key]),
+                figures["realization"],
+                str(area["multipliers"]),
+                f"{logic_of(key, figures):,}",
+                f"{area['flip_flops']:,}",
+                f"{fmax(figures):.1f} ({min(figures['fmax']):.1f} to {max(figures['fmax']):.1f})",
+            ]
+            lines.append(f"| {' | '.join(row)} |")
     return "\n".join(lines)
 
 
@@ -377,6 +406,13 @@ specification and with the same proven bound:
 
 On the ECP5 the registers at the multipliers and at the output of the program memory are inside the blocks
 ([hardware.md](hardware.md#registers-inside-blocks)).
+
+## Any filter inside a mask
+
+The ports, the allowed error and the parallel architecture of audio_lowpass with the mask of
+[a recipe](recipes/inside_a_mask.md), which order 5 meets: the Butterworth filter itself, and with `freedom = "mask"`:
+
+{masked_table(record)}
 
 ## Digit by digit
 
