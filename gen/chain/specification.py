@@ -46,7 +46,7 @@ _COMMON = ("name", "kind", *_OF_ONE)
 _KEYS: dict[str, tuple[str, ...]] = {
     "polynomial": ("coefficients", "data"),
     "gain": ("factor",),
-    "iir": ("family", "band", "method", "order", "cutoff", *_EDGES, "sos", "sos_file", "decimate"),
+    "iir": ("family", "band", "method", "order", "cutoff", *_EDGES, "freedom", "sos", "sos_file", "decimate"),
     "fir": ("family", "band", *_EDGES, "taps", "taps_file", "decimate"),
     "halfband": ("passband_edge", "passband_loss", "stopband_loss", "decimate"),
     "cic": ("order", "decimate"),

@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from fractions import Fraction
+from typing import TypeVar
 
 from flint import arb, ctx, fmpq
 
 from sosmith.verify.bounds.grid import fraction_of
+from sosmith.verify.bounds.l1_response import UndecidedError
+
+T = TypeVar("T")
+
+_FIRST_PRECISION = 512
+_MAX_PRECISION = 1 << 13  # bits
 
 
 def ball(value: Fraction | int) -> arb:
@@ -27,3 +35,22 @@ def upper_limit(value: arb) -> Fraction:
     """
     with ctx.workprec(64):
         return fraction_of(value.upper())
+
+
+def decided(compute: Callable[[], T]) -> T:
+    """Compute something with as many bits as decide it.
+
+    Raises
+    ------
+    UndecidedError
+        If 8192 bits do not.
+    """
+    bits = _FIRST_PRECISION
+    while True:
+        try:
+            with ctx.workprec(bits):
+                return compute()
+        except UndecidedError:
+            if bits >= _MAX_PRECISION:
+                raise
+            bits *= 2

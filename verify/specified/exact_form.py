@@ -13,15 +13,14 @@ from fractions import Fraction
 from itertools import zip_longest
 from typing import Any
 
-from flint import arb, ctx
+from flint import arb
 
 from sosmith.verify.bounds.grid import fraction_of
 from sosmith.verify.bounds.l1_response import UndecidedError
 from sosmith.verify.certificate_file import SectionEntry
+from sosmith.verify.specified.balls import decided
 from sosmith.verify.specified.ideal_filter import StatedFilter
 
-_FIRST_PRECISION = 512
-_MAX_PRECISION = 1 << 13  # bits
 _SPARE_BITS = 192
 _LARGEST = 52
 _ONE = (Fraction(1),)
@@ -45,7 +44,7 @@ def exact_sections(stated: StatedFilter) -> tuple[SectionEntry, ...]:
     ((Fraction(1, 1),), (Fraction(1, 1), Fraction(1, 2)))
     """
     table = stated.table
-    sections = _rounded_rows(table.rows) if table.rows else _derived(stated)
+    sections = _rounded_rows(table.rows) if table.rows else decided(lambda: _rounded(stated))
     if stated.correction:
         sections = [*sections, ((1 + stated.correction, -stated.correction), _ONE)]
     return tuple(SectionEntry(numerator=over, denominator=under) for over, under in sections)
@@ -58,18 +57,6 @@ def _rounded_rows(rows: Sequence[Sequence[Fraction]]) -> list[_Section]:
     bits = _SPARE_BITS + sum(_spread(_shortened(row[len(row) // 2 :])[1:]) for row in rows)
     nearest = [[Fraction(round(value * 2**bits), 2**bits) for value in row] for row in rows]
     return [(_shortened(row[: len(row) // 2]), _shortened(row[len(row) // 2 :])) for row in nearest]
-
-
-def _derived(stated: StatedFilter) -> list[_Section]:
-    bits = _FIRST_PRECISION
-    while True:
-        try:
-            with ctx.workprec(bits):
-                return _rounded(stated)
-        except UndecidedError:
-            if bits >= _MAX_PRECISION:
-                raise
-            bits *= 2
 
 
 def _rounded(stated: StatedFilter) -> list[_Section]:

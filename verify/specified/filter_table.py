@@ -38,7 +38,7 @@ class FilterTable:
     losses : mapping of str to Fraction
         "passband_loss" and "stopband_loss" in dB, above 0, as far as they are stated.
     freedom : str
-        "mask" if any filter with poles that keeps to edges and losses will do, else "none".
+        "mask" if any filter of the family's order that keeps to edges and losses will do, else "none".
     rows : tuple of tuples of Fraction
         Sections (b0, b1, b2, 1, a1, a2), or one of an FIR filter: its taps, and as many of 1, 0, 0, ...; or empty.
     """

@@ -77,6 +77,26 @@ class StatedFilter:
                 numerator=stated.numerator * arb_poly([ball(1 + self.correction), ball(-self.correction)])
             )
 
+    def order(self) -> int:
+        """Return the number of poles of the filter by edges and losses, at the present precision.
+
+        Raises
+        ------
+        UndecidedError
+            If the precision is too low.
+        SpecificationError
+            If no supported order meets them.
+
+        Examples
+        --------
+        >>> losses = {"passband_loss": 1, "stopband_loss": 20}
+        >>> edges = {"passband_edge": [10, 20], "stopband_edge": [5, 30]}
+        >>> stated_filter({"family": "butterworth", "kind": "bandpass", **edges, **losses}, Fraction(100)).order()
+        6
+        """
+        order, band = self._order_and_band()
+        return order if band.product is None else 2 * order
+
     def factors(self) -> Factors:
         """Return what a table without `rows` states, but for the correction, at the present precision.
 

@@ -19,11 +19,11 @@ from typing import Any
 from sosmith.verify.bounds.l1_response import UndecidedError
 from sosmith.verify.certificate_file import Certificate, PortEntry, SectionEntry
 from sosmith.verify.graph import RejectedError, require
+from sosmith.verify.specified.balls import decided
 from sosmith.verify.specified.exact_form import exact_sections
 from sosmith.verify.specified.filter_distance import distance
-from sosmith.verify.specified.filter_table import FilterTable
 from sosmith.verify.specified.fir_mask import keeps_to_losses
-from sosmith.verify.specified.ideal_filter import stated_filter
+from sosmith.verify.specified.ideal_filter import StatedFilter, stated_filter
 from sosmith.verify.specified.section_mask import sections_keep_to_losses
 from sosmith.verify.specified.sections_file import sections_in, taps_in
 from sosmith.verify.specified.words import words_of
@@ -155,7 +155,7 @@ def _filter_distance(
             "a filter that decimates by itself must be an FIR filter",
         )
         if wanted.table.by_losses:
-            _check_losses(certificate.ideal.sections, wanted.table)
+            _check_losses(certificate.ideal.sections, wanted)
             return None
         apart = distance(wanted, certificate.ideal.sections)
         exact = exact_sections(wanted)
@@ -170,14 +170,19 @@ def _filter_distance(
     return apart
 
 
-def _check_losses(proven: Sequence[SectionEntry], table: FilterTable) -> None:
+def _check_losses(proven: Sequence[SectionEntry], wanted: StatedFilter) -> None:
     """Check that a filter keeps to edges and losses; that its poles are stable has been proven."""
+    table = wanted.table
     if table.is_fir:
         require(
             len(proven) == 1 and len(proven[0].denominator) == 1 and keeps_to_losses(proven[0].numerator, table),
             "the filter must keep to the edges and losses of the specification with symmetric taps",
         )
     else:
+        most = decided(wanted.order)
+        for name, parts in (("poles", "denominator"), ("zeros", "numerator")):
+            found = sum(len(getattr(section, parts)) - 1 for section in proven)
+            require(found <= most, f"the filter must have at most {most} {name}, as the family's has, not {found}")
         require(
             sections_keep_to_losses(proven, table), "the filter must keep to the edges and losses of the specification"
         )

@@ -100,6 +100,18 @@ def test_words_of_the_whole_are_those_of_its_stages(words: dict[str, Any], tmp_p
     assert not proven(tmp_path).missing
 
 
+def test_a_filter_inside_a_mask_is_a_stage(tmp_path: Path) -> None:
+    edges = {"passband_edge": 200.0, "stopband_edge": 900.0, "passband_loss": 1.0, "stopband_loss": 20.0}
+    masked = {"name": "low", "kind": "iir", "family": "butterworth", "freedom": "mask", **edges}
+    chain = sosmith.design_chain({**TREE, "stage": [TREE["stage"][0], masked]})
+    chain.generate(tmp_path)
+    words = chain.specification.toml()
+    (tmp_path / "rx.toml").write_text(words, encoding="utf-8")
+    proof = proven(tmp_path)
+    assert not proof.missing
+    assert "low: it keeps to the edges and losses" in str(proof.scope["filter"])
+
+
 def test_sealing_again_changes_nothing(folder: Path) -> None:
     before = (folder / CERTIFICATE).read_bytes()
     sealed_again(folder)

@@ -16,7 +16,7 @@ from sosmith.gen.output.certificate import certificate
 from sosmith.gen.specification.specification import from_text
 from sosmith.verify.bounds.l1_response import UndecidedError
 from sosmith.verify.certificate_file import Certificate, SectionEntry
-from sosmith.verify.specified import exact_form
+from sosmith.verify.specified import balls, exact_form
 from sosmith.verify.specified.exact_form import exact_sections
 from sosmith.verify.specified.ideal_filter import stated_filter
 from sosmith.verify.specified.stated_specification import check_specification
@@ -146,7 +146,7 @@ def test_more_digits_than_there_are_to_be_are_other_digits(monkeypatch: pytest.M
 
 
 def test_a_number_between_two_is_not_decided(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(exact_form, "_FIRST_PRECISION", 64)
-    monkeypatch.setattr(exact_form, "_MAX_PRECISION", 64)
+    monkeypatch.setattr(balls, "_FIRST_PRECISION", 64)
+    monkeypatch.setattr(balls, "_MAX_PRECISION", 64)
     with pytest.raises(UndecidedError, match=r"^the exact filter could not be rounded$"):
         exact_sections(stated_filter({"family": "bessel", "kind": "lowpass", "order": 3, "cutoff": 1}, Fraction(10)))
