@@ -77,7 +77,9 @@ def test_an_output_that_is_only_handed_on_keeps_its_width(tmp_path: Path) -> Non
     """A filter that starts from zero counts samples behind it, while its output goes by."""
     path = tmp_path / "plain.toml"
     output = 'output = { bits = 11, signed = true, range = [-1.5, 1.5], unit = "", max_error = 0.05 }'
-    path.write_text(re.sub("output = .*", output, PLAIN) + 'hardware.reload = true\nhardware.architecture = "parallel"\n', "utf-8")
+    path.write_text(
+        re.sub("output = .*", output, PLAIN) + 'hardware.reload = true\nhardware.architecture = "parallel"\n', "utf-8"
+    )
     datapath = design_core(load(path)).datapath
     *_, before, last = with_room(datapath).stages
     assert [last.graph.nodes[i].op for i in last.graph.inputs] == [Op.INPUT]
