@@ -112,6 +112,8 @@ def _verified(certificate: Certificate, progress: Progress) -> Verdict:
     _check_seams(certificate)
     fore, starts, sections, last = ([stage for stage in stages if stage.role == role] for role in _ROLES)
     progress("calibration", 0, 0)
+    if rounded:
+        budget["decimation"] = rounded
     if fore:
         budget["input scaling" if certificate.ideal.polynomial is None else "calibration"] = polynomial_error(
             certificate, fore
@@ -135,8 +137,6 @@ def _verified(certificate: Certificate, progress: Progress) -> Verdict:
             check_online(certificate, alone)
         for part in budget:
             budget[part] *= cascade.peak_gain
-        if rounded:
-            budget["decimation"] = rounded * cascade.peak_gain
         budget["filter coefficients"], budget["filter rounding"] = cascade.coefficients, cascade.rounding
         ranges, margin = cascade.ranges, cascade.margin
         if settling is not None:

@@ -97,17 +97,22 @@ def with_room(datapath: Datapath) -> Datapath:
         graph = _roomy(stage.graph, ends, bits)
         ends = [(graph.nodes[i].low, graph.nodes[i].high) for i in graph.outputs]
         stages.append(_with_graph(stage, graph))
-    stages[-1] = _with_graph(stages[-1], _ending(stages[-1].graph, datapath.output))
-    return replace(datapath, stages=tuple(stages))
+    return replace(datapath, stages=_ending(stages, datapath.output))
 
 
-def _ending(graph: Graph, port: Port) -> Graph:
-    """Return the last stage with the range of its output cut to the port's, to which every set has to keep."""
+def _ending(stages: Sequence[Stage], port: Port) -> tuple[Stage, ...]:
+    """Return the stages with the range of the output cut to the port's, to which every set has to keep.
+
+    Where the last stage only hands on what it gets, as one that counts does, that is cut as well.
+    """
+    *before, last = stages
+    graph = last.graph
     output = graph.outputs[0]
     nodes = list(graph.nodes)
     node = nodes[output]
     nodes[output] = node._replace(low=max(node.low, port.lowest), high=min(node.high, port.highest))
-    return replace(graph, nodes=tuple(nodes))
+    handed_on = before and node.op is Op.INPUT
+    return (*(_ending(before, port) if handed_on else before), _with_graph(last, replace(graph, nodes=tuple(nodes))))
 
 
 def with_ranges(datapath: Datapath, ranges: Sequence[Mapping[str, tuple[int, int]]]) -> Datapath:

@@ -10,7 +10,9 @@ import pytest
 from pydantic import ValidationError
 from tests.gen.word_lengths.decimated import locomotive, locomotive_text, read, tree_of
 
+from sosmith.gen.core import design_core
 from sosmith.gen.output.generate import generate
+from sosmith.gen.specification.specification import load
 from sosmith.interface.certificate import Certificate
 from sosmith.verify.certificate_file import on_grid
 from sosmith.verify.decimation import at_lower_rate, behind_decimator, folding_gain
@@ -40,6 +42,31 @@ def test_the_locomotive_is_proven_again() -> None:
     assert agreement.distance < 2**-100
     held = locomotive_text(hold=True)
     assert check_specification(certificate, held, verdict.margin) == agreement
+
+
+SCALED = """
+name = "scaled"
+sample_rate = 1000.0
+input.x = { bits = 8, range = [0.0, 1.0] }
+output = { bits = 12, signed = true, range = [-1.5, 1.5], unit = "", max_error = 0.09375 }
+hardware.architecture = "parallel"
+[filter]
+family = "chebyshev1"
+kind = "lowpass"
+order = 1
+cutoff = 53.8
+passband_loss = 0.5
+decimate = 2
+"""
+
+
+def test_bits_may_be_dropped_behind_a_decimator_and_before_an_input_stage(tmp_path: Path) -> None:
+    """The parts of the budget have the order in which a sample meets what makes them."""
+    path = tmp_path / "scaled.toml"
+    path.write_text(SCALED, encoding="utf-8")
+    made = design_core(load(path))
+    assert [*made.quantized.budget][:2] == ["decimation", "input scaling"]
+    assert [*verify(read(tree_of(made))).budget] == [*made.quantized.budget]
 
 
 @pytest.mark.sweep(1)

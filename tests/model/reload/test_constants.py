@@ -1,11 +1,17 @@
 """The words of a bank, and ranges that hold whatever a loadable constant may make."""
 
+import re
+from pathlib import Path
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from tests.gen.designs import example_design
 from tests.model.reload.unpacking import unpacked
+from tests.verify.small_specifications import PLAIN
 
+from sosmith.gen.core import design_core
+from sosmith.gen.specification.specification import load
 from sosmith.model.dataflow.graph import Op
 from sosmith.model.reload.constants import Constant, constants, packed, values_of, with_room
 
@@ -65,3 +71,18 @@ def test_an_output_that_nothing_limits_keeps_its_width() -> None:
     graph = with_room(datapath).stages[-1].graph
     assert graph.nodes[graph.outputs[0]].op is not Op.CLAMP
     assert graph.nodes[graph.outputs[0]].width <= datapath.output.bits
+
+
+def test_an_output_that_is_only_handed_on_keeps_its_width(tmp_path: Path) -> None:
+    """A filter that starts from zero counts samples behind it, while its output goes by."""
+    path = tmp_path / "plain.toml"
+    output = 'output = { bits = 11, signed = true, range = [-1.5, 1.5], unit = "", max_error = 0.05 }'
+    path.write_text(
+        re.sub("output = .*", output, PLAIN) + 'hardware.reload = true\nhardware.architecture = "parallel"\n', "utf-8"
+    )
+    datapath = design_core(load(path)).datapath
+    *_, before, last = with_room(datapath).stages
+    assert [last.graph.nodes[i].op for i in last.graph.inputs] == [Op.INPUT]
+    assert last.graph.outputs[0] == last.graph.inputs[0]
+    for node in (before.graph.nodes[before.graph.outputs[0]], last.graph.nodes[last.graph.outputs[0]]):
+        assert datapath.output.lowest <= node.low <= node.high <= datapath.output.highest
