@@ -230,7 +230,8 @@ def test_each_file_is_read_once(copy: Callable[..., Path], monkeypatch: pytest.M
     """What has the digest is what is proven, though the file be another one a moment later."""
     path, read = forge(copy(PARALLEL)), []
 
-    def once(given: Path) -> bytes:
+    def once(given: Path, *, links: bool) -> bytes:
+        assert not links
         read.append(given.name)
         content = given.read_bytes()
         given.write_bytes(b"changed")
