@@ -46,7 +46,7 @@ def test_what_does_not_fit_is_refused(made: CoreDesign) -> None:
 
     quick = replace(made, spec=replace(made.spec, sample_rate=Fraction(5000)))
     refused(
-        "the sample rate must be at most 3,575 Hz with these converters at a clock of 12,000,000 Hz, not 5,000 Hz",
+        "the sample rate must be at most 3,559 Hz with these converters at a clock of 12,000,000 Hz, not 5,000 Hz",
         quick,
     )
     alone = design_core(made.spec, core="filter")
