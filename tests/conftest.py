@@ -16,12 +16,6 @@ from tests.suite.sweeps import covering
 pytest_plugins = ["pytester", "tests.suite.kept_designs"]
 
 
-@pytest.hookimpl(optionalhook=True)
-def pytest_xdist_auto_num_workers() -> int:
-    """Return one worker more than there are processors: some tests wait for devices, pipes and ends of processes."""
-    return len(os.sched_getaffinity(0)) + 1
-
-
 @pytest.hookimpl(tryfirst=True)  # before `-m` takes its choice
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark the cases of a sweep that do not run always as slow; let tests marked so come first."""

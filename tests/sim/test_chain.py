@@ -93,6 +93,7 @@ def test_a_fault_of_an_early_stage_reaches_every_result(tmp_path: Path, monkeypa
     assert wrong <= report.summary["mismatches"] <= wrong + 2  # a result on its way may already say so
 
 
+@pytest.mark.slow
 def test_a_shallow_queue_of_flags_is_slow_and_not_wrong(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Pipelines hold more results than two entries are for, so that the gate holds samples back again and again."""
     tree = PLAIN | {"stage": [{"name": f"s{k}", "kind": "fir", "taps": [0.25, 0.5, 0.25]} for k in range(4)]}
