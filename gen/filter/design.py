@@ -12,7 +12,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 import numpy.typing as npt
@@ -399,7 +399,7 @@ def _centred(spec: FilterSpec, fs: Fraction, order: int) -> FilterSpec:
         share = (low + high) // 2
         narrower = _narrowed(spec, Fraction(share, _MARGINS))
         try:
-            fits = evaluate(lambda narrower=narrower: _order_and_edges(narrower, fs)[0]) <= order  # type: ignore[misc]
+            fits = evaluate(partial(_order_and_edges, narrower, fs))[0] <= order
         except SpecificationError:
             fits = False
         low, high = (share, high) if fits else (low, share)

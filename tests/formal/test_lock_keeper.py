@@ -1,6 +1,7 @@
 """On a board, a core that was locked once is not loaded again, however often a session of the link resets it."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 from amaranth.hdl import Assert, Assume, ClockSignal, Module, Signal
@@ -18,9 +19,9 @@ class StaysLocked(Proof):
     the write is answered.
     """
 
-    def __init__(self, module: object = lock_keeper, *, with_sessions: bool = False) -> None:
+    def __init__(self, module: Any = lock_keeper, *, with_sessions: bool = False) -> None:
         super().__init__(ReloadPort(1, bits=1, lock=True))
-        self.keeper = module.LockKeeper(ADDRESS_BITS)  # type: ignore[attr-defined]
+        self.keeper = module.LockKeeper(ADDRESS_BITS)
         self._inputs = [each for each in self._inputs if each is not self.design.s_axil_awaddr]
         self.target, self.board_reset = self.free(ADDRESS_BITS, "target"), self.free(1, "board_reset")
         self.with_sessions = with_sessions
