@@ -22,7 +22,7 @@ from pathlib import Path
 
 from sosmith.model.errors import SpecificationError
 
-LIMIT = 256 * 2**20
+LIMIT = 512 * 2**20
 """Bytes that all entries together may take; beyond, those that were not used for the longest time are removed."""
 
 _DIGESTS = "digests.json"

@@ -1,7 +1,8 @@
 """Builds the executable of a Verilated core with cocotb and the compiled loop, or takes it from the cache.
 
 Verilator's own library, which takes far longer to compile than a core, is kept by its text and the compiler; what
-writes waveforms is kept beside it. A model is kept by the core's text and all that goes into it besides.
+writes waveforms is kept beside it, and its headers precompiled, which otherwise are half of the time that a core takes.
+A model is kept by the core's text and all that goes into it besides.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ _ARGUMENTS = ("-Wno-fatal", "-O3", "--x-initial", "unique", "--timescale", "1ns/
 
 _LIBRARY = ("verilated", "verilated_dpi", "verilated_threads", "verilated_vpi")
 _FLAGS = ("-O2", "-pthread", "-DVERILATOR=1", "-DVM_COVERAGE=0", "-DVM_SC=0", "-DVM_TIMING=0")
+_HEADERS = ("verilated.h", "verilated_dpi.h", "verilated_vpi.h", "svdpi.h")
 _ONE_FILE = 500_000  # bytes of C++ above which files are compiled by themselves, on all processors
 _STREAM = Path(__file__).parent / "stream"
 _MAIN, _LOOP = _STREAM / "verilated_core.cpp", _STREAM / "loop.h"
@@ -158,7 +160,8 @@ class Builder:
             command += [*_ARGUMENTS, *(["--vpi"] if control else []), "control.vlt", str(source)]
             self._compilers.run(command, objects)
             sources = _together([*sorted(objects.glob("Vtop*.cpp")), main], objects)
-            compiled = self._compile(sources, [*flags, f"-I{objects}", f"-I{header.parent}"], objects)
+            included = self._precompiled(objects, waves=False)
+            compiled = self._compile(sources, [*flags, f"-I{objects}", f"-I{header.parent}", *included], objects)
             with self._libraries() as library:
                 parts = [*compiled, *library]
                 self._compilers.run(["g++", "-pthread", "-o", str(entry / "program"), *map(str, parts)], objects)
@@ -183,7 +186,8 @@ class Builder:
         classes = (objects / "Vtop_classes.mk").read_text(encoding="utf-8")
         others = sorted({*re.findall(r"^\s+(verilated\w*) \\", classes, re.MULTILINE)} - {*_LIBRARY})
         sources = _together([*sorted(objects.glob("Vtop*.cpp")), _MAIN], objects)
-        compiled = self._compile(sources, [*flags, f"-I{objects}"], objects)
+        included = self._precompiled(objects, waves=model.waves)
+        compiled = self._compile(sources, [*flags, f"-I{objects}", *included], objects)
         libraries = cocotb_tools.config.libs_dir
         with self._libraries(others) as library:
             parts = [*compiled, *library]
@@ -203,6 +207,24 @@ class Builder:
                     objects += [entry / f"{name}.o" for name in names]
             yield objects
 
+    def _precompiled(self, objects: Path, *, waves: bool) -> list[str]:
+        """Flags that include Verilator's headers first, precompiled; they are put into the folder for objects."""
+        flags = _flags(waves=waves)
+
+        def make(entry: Path) -> None:
+            (entry / "headers.h").write_text("".join(f"#include <{name}>\n" for name in _HEADERS), encoding="utf-8")
+            self._compilers.run(
+                ["g++", *flags, *self._include_flags(), "-x", "c++-header", "-o", "headers.h.gch", "headers.h"], entry
+            )
+
+        with self._cache.entry("headers", key_of(self._tools, _HEADERS, flags), make) as entry:
+            for name in ("headers.h", "headers.h.gch"):
+                shutil.copy2(entry / name, objects)  # a compiler may look at its time, too
+        return ["-Winvalid-pch", "-include", str(objects / "headers.h")]
+
+    def _include_flags(self) -> list[str]:
+        return [f"-I{self._include}", f"-I{self._include / 'vltstd'}"]
+
     def _make_library(self, names: Sequence[str], entry: Path) -> None:
         self._compile([self._include / f"{name}.cpp" for name in names], _FLAGS, entry)
 
@@ -211,11 +233,10 @@ class Builder:
 
     def _compile(self, sources: Sequence[Path], flags: Sequence[str], folder: Path) -> list[Path]:
         """Compile each file into `folder`, on all processors; return the object files."""
-        headers = [f"-I{self._include}", f"-I{self._include / 'vltstd'}"]
 
         def compiled(source: Path) -> Path:
             target = folder / f"{source.stem}.o"
-            self._compilers.run(["g++", *flags, *headers, "-c", "-o", str(target), str(source)], folder)
+            self._compilers.run(["g++", *flags, *self._include_flags(), "-c", "-o", str(target), str(source)], folder)
             return target
 
         with ThreadPoolExecutor(os.cpu_count()) as pool, self._compilers.ended_at_once():

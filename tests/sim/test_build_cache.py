@@ -139,7 +139,7 @@ def test_what_was_not_used_for_long_is_removed_beyond_the_limit(tmp_path: Path) 
     assert sorted(path.name for path in tmp_path.iterdir()) == ["locks", "model-aa", "model-bb", "model-dd"]
     text_of(cache, "ee", writing("e" * 5000))  # larger than the limit by itself
     assert sorted(path.name for path in tmp_path.iterdir()) == ["locks", "model-ee"]
-    assert LIMIT == 256 * 2**20
+    assert LIMIT == 512 * 2**20
 
 
 def test_emptying_it(tmp_path: Path) -> None:
@@ -173,8 +173,11 @@ def test_a_core_built_elsewhere_is_not_built_again(tmp_path: Path, monkeypatch: 
         (tmp_path / name).mkdir()
         ports = ("aclk", "aresetn", *(f"{side}_{end}" for side in ("s_axis", "m_axis") for end in ENDS))
         model = Model(source=write(tmp_path / name, each), top="stand_in", ports=ports, signals=(), waves=False)
-        builder = Builder(tool.version, tool.environment, tmp_path / name)
-        builder.build(model, tmp_path / name / "model")
+        with (tmp_path / name / "log.txt").open("w+", encoding="utf-8") as log:
+            builder = Builder(tool.version, tool.environment, tmp_path / name, log)
+            builder.build(model, tmp_path / name / "model")
+            log.seek(0)
+            assert "invalid-pch" not in log.read()  # headers that are compiled once would not be used
         assert builder.has_library()
     one, two, other = ((tmp_path / name / "model").read_bytes() for name in ("one", "two", "other"))
     assert one == two != other
