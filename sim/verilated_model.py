@@ -208,7 +208,7 @@ class Builder:
             yield objects
 
     def _precompiled(self, objects: Path, *, waves: bool) -> list[str]:
-        """Flags that include Verilator's headers first, precompiled; they are put into the folder for objects."""
+        """Return flags that include Verilator's headers first, precompiled in the folder for objects."""
         flags = _flags(waves=waves)
 
         def make(entry: Path) -> None:

@@ -29,6 +29,7 @@ def unpacked(name: str, folder: Path) -> Path:
     return folder
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("way", ["c", "icarus", pytest.param("verilator", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", TREES)
 def test_the_bench_passes(name: str, way: str, tmp_path: Path) -> None:

@@ -93,6 +93,7 @@ def test_the_locomotive_on_its_worst_case(simulator: str, tmp_path: Path) -> Non
         assert write_report(evidence, tmp_path / scenario)["passed"]
 
 
+@pytest.mark.slow
 def test_wear_held_and_judged(tmp_path: Path) -> None:
     """The locomotive's readings rise over the limits of wear; each result leaves once for each of its samples."""
     text = locomotive_text(architecture="folded", hold=True) + WEAR

@@ -130,6 +130,7 @@ def test_results_are_those_of_the_integer_model(made: sosmith.Design, netlist: N
     assert status == made.core.datapath.compute_status(fed).reshape(-1).tolist()
 
 
+@pytest.mark.slow
 def test_without_converters_every_result_is_flagged(made: sosmith.Design, netlist: Netlist) -> None:
     with running(netlist, None) as board:
         found, status = fetched(board, 30)

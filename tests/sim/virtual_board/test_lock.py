@@ -4,6 +4,7 @@ from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
+import pytest
 from tests.commands.invocation import Invocation
 from tests.interface.small import FILTER
 
@@ -16,6 +17,7 @@ HARDWARE = {"realization": "df1_ef1", "architecture": "folded", "reload": True, 
 RELOAD = Invocation("reload")
 
 
+@pytest.mark.slow
 def test_a_locked_board_keeps_its_set_from_session_to_session(tmp_path: Path) -> None:
     running = FILTER | {"hardware": HARDWARE}
     second, third = (running | {"filter": FILTER["filter"] | {"cutoff": cutoff}} for cutoff in (90.0, 80.0))

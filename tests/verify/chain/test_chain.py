@@ -85,6 +85,7 @@ def test_all_of_a_chain_is_proven(folder: Path) -> None:
     assert proof.bound <= proof.allowed
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     "words",
     [

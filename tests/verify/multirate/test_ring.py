@@ -51,6 +51,7 @@ def check(core: Made, text: str = "") -> None:
     check_rings(text or core.text, core.certificate, core.item)
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize("hold", [False, True])
 @pytest.mark.parametrize("start", ["zero", "steady"])
 @pytest.mark.parametrize("channels", [1, 3])
