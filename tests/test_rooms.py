@@ -3,6 +3,7 @@
 import ast
 import re
 from collections.abc import Iterable
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -54,6 +55,12 @@ def test_rooms_side_by_side_know_nothing_of_each_other(room: str, other: str) ->
 def test_sub_rooms_import_in_no_circle(room: str) -> None:
     parts = [part for floor in floors(room) for part in floor]
     assert sorted(parts) == sorted(arrows(room))
+
+
+def test_no_files_import_each_other() -> None:
+    files = {"sosmith." + ".".join(path.with_suffix("").parts): path for path in modules() if path.stem != "__init__"}
+    order = TopologicalSorter({name: imported(path) & files.keys() for name, path in files.items()})
+    assert len([*order.static_order()]) == len(files)  # a CycleError names those of a circle
 
 
 def test_the_verifier_shares_nothing_with_what_it_checks() -> None:

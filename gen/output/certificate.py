@@ -27,8 +27,8 @@ from sosmith.gen.proof.peak_gain import Drive, difference, extent
 from sosmith.gen.proof.response import IMPULSE, Response
 from sosmith.gen.version import __version__
 from sosmith.gen.word_lengths.quantized import DECIMATION, START, Quantized
-from sosmith.model.dataflow.datapath import Stage
 from sosmith.model.dataflow.graph import Node
+from sosmith.model.dataflow.structure import Stage
 from sosmith.model.errors import SpecificationError
 from sosmith.model.port import Port
 from sosmith.model.sections.horner import HornerStep

@@ -25,10 +25,11 @@ from sosmith.gen.reload.register_writes import bank_size
 from sosmith.gen.word_lengths.cost import Cost
 from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.hdl.plan.streams import Field, dest_width, fields
-from sosmith.model.dataflow.datapath import Datapath, Stage
+from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.graph import Graph, Op
 from sosmith.model.dataflow.program import Program
 from sosmith.model.dataflow.status import STATUS_BITS, Flag
+from sosmith.model.dataflow.structure import Stage
 from sosmith.model.full_scale import is_sound
 from sosmith.model.port import Port
 from sosmith.model.reload.registers import INTERFACE

@@ -27,8 +27,8 @@ from itertools import product
 from sosmith.gen.proof.linear_model import LinearModel, cone, linear_model, state_matrix
 from sosmith.gen.proof.peak_gain import Drive, extent
 from sosmith.gen.proof.response import IMPULSE
-from sosmith.model.dataflow.datapath import Stage
 from sosmith.model.dataflow.graph import Graph, Op
+from sosmith.model.dataflow.structure import Stage
 
 Matrix = Sequence[Sequence[Fraction]]
 

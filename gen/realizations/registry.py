@@ -21,7 +21,7 @@ from sosmith.gen.realizations.transposed import transposed_form
 from sosmith.gen.specification import choices
 from sosmith.gen.specification import realizations as terms
 from sosmith.gen.specification.realizations import RealizationTerms
-from sosmith.model.dataflow.datapath import Stage
+from sosmith.model.dataflow.structure import Stage
 from sosmith.model.sections.fir import Form
 
 Row = Sequence[float]

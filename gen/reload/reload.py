@@ -24,10 +24,11 @@ from sosmith.gen.reload.transient import transient
 from sosmith.gen.specification.specification import Specification
 from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.gen.word_lengths.settling import samples_to_settle
-from sosmith.model.dataflow.datapath import Datapath, Stage
+from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.folding import program
 from sosmith.model.dataflow.graph import Node, Op
 from sosmith.model.dataflow.program import Program
+from sosmith.model.dataflow.structure import Stage
 from sosmith.model.errors import ShortfallError, SpecificationError
 from sosmith.model.polynomial import Polynomial
 from sosmith.model.reload.constants import constants, packed, values_of, with_ranges, with_room

@@ -21,7 +21,8 @@ from sosmith.gen.realizations.registry import Section
 from sosmith.gen.word_lengths.input_stage import InputStage
 from sosmith.gen.word_lengths.output_stage import output_stage
 from sosmith.model.arrays import Codes, Values
-from sosmith.model.dataflow.datapath import Datapath, Stage
+from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.dataflow.structure import Stage
 from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
 from sosmith.model.reference.golden import exact_before_filter, exact_chain

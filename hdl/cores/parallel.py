@@ -61,7 +61,8 @@ from sosmith.hdl.stages.interleaved import InterleavedStage
 from sosmith.hdl.stages.pipelined import PipelinedStage
 from sosmith.hdl.stages.starting import StartingStage
 from sosmith.hdl.status import NEVER, status_of_result, with_fault
-from sosmith.model.dataflow.datapath import Datapath, Stage
+from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.dataflow.structure import Stage
 from sosmith.model.reload.constants import constants
 from sosmith.model.sections.start import PassingStage, StartStage
 

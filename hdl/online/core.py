@@ -25,7 +25,8 @@ from sosmith.hdl.shell.pipeline import Sample, delayed, through
 from sosmith.hdl.shell.shell import Shell
 from sosmith.hdl.stages.pipelined import PipelinedStage
 from sosmith.hdl.status import status_of_result
-from sosmith.model.dataflow.datapath import Datapath, Stage
+from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.dataflow.structure import Stage
 from sosmith.model.sections.online import sections_of
 
 

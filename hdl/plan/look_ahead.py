@@ -20,8 +20,8 @@ from functools import lru_cache
 from sosmith.hdl.plan.constant_products import with_sums
 from sosmith.hdl.plan.pipeline import ADDITION, NO_LOGIC, loop_delays, operation_time
 from sosmith.hdl.plan.reassociation import reassociated
-from sosmith.model.dataflow.datapath import Stage
 from sosmith.model.dataflow.graph import Graph, GraphBuilder, Op, Wire
+from sosmith.model.dataflow.structure import Stage
 
 
 @dataclass(frozen=True)

@@ -25,8 +25,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from sosmith.hdl.plan.reassociation import reassociated
-from sosmith.model.dataflow.datapath import Datapath, Stage
+from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.graph import Graph, GraphBuilder, Op, Wire
+from sosmith.model.dataflow.structure import Stage
 
 
 @dataclass(frozen=True)

@@ -63,8 +63,8 @@ from sosmith.hdl.pipelined_logic import PipelinedLogic, banks_in_use, limits, na
 from sosmith.hdl.plan.interleaving import schedule
 from sosmith.hdl.plan.pipeline import inner_sums
 from sosmith.hdl.plan.streams import channel_bits
-from sosmith.model.dataflow.datapath import Stage
 from sosmith.model.dataflow.graph import Op
+from sosmith.model.dataflow.structure import Stage
 
 _BLOCK_RAM = {"ram_style": "block", "no_rw_check": 1}
 """Attributes of memories in block RAM. A sample's states are read at least a clock before they are written, so that

@@ -63,8 +63,8 @@ from amaranth.lib.wiring import In, Out
 from sosmith.hdl.constant_banks import NO_CONSTANTS, Pair
 from sosmith.hdl.pipelined_logic import PipelinedLogic, banks_in_use, limits, name_ports, shape_of
 from sosmith.hdl.plan.pipeline import inner_sums, pipeline_stages
-from sosmith.model.dataflow.datapath import Stage
 from sosmith.model.dataflow.graph import Graph, Node, Op
+from sosmith.model.dataflow.structure import Stage
 
 
 class PipelinedStage(wiring.Component):

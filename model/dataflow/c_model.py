@@ -7,20 +7,16 @@ arithmetic, as they are in all compilers in use.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from sosmith.model.dataflow.c_types import TYPES, Span, bits_of, literal
 from sosmith.model.dataflow.graph import Op
 from sosmith.model.dataflow.statements import ModelText, statements_of
 from sosmith.model.dataflow.status import Flag
+from sosmith.model.dataflow.structure import Structure
+from sosmith.model.port import Port
 from sosmith.model.templates import in_comment, render
 
-if TYPE_CHECKING:
-    from sosmith.model.dataflow.datapath import Datapath
-    from sosmith.model.port import Port
 
-
-def c_header(datapath: Datapath) -> str:
+def c_header(datapath: Structure) -> str:
     """Return the text of ``<name>.h``."""
     whole, datapath = datapath, datapath.behind_decimator
     return render(
@@ -48,7 +44,7 @@ def _description(port: Port) -> str:
     )
 
 
-def c_source(datapath: Datapath) -> str:
+def c_source(datapath: Structure) -> str:
     """Return the text of ``<name>.c``.
 
     Behind a decimator, the functions of the datapath work at the lower rate, and one more takes samples at the higher.
@@ -99,7 +95,7 @@ def c_source(datapath: Datapath) -> str:
     )
 
 
-def _calibration(datapath: Datapath) -> dict[str, object]:
+def _calibration(datapath: Structure) -> dict[str, object]:
     """Return what the text of a step of a datapath without memory takes, which stands before a decimator."""
     text = _text(datapath)
     return {
@@ -112,23 +108,23 @@ def _calibration(datapath: Datapath) -> dict[str, object]:
     }
 
 
-def _takes_channel(datapath: Datapath) -> bool:
+def _takes_channel(datapath: Structure) -> bool:
     """Whether a sample's status depends on its channel."""
     return len(datapath.wear) > 1
 
 
-def _parameters(datapath: Datapath) -> str:
+def _parameters(datapath: Structure) -> str:
     """Return the parameters of a step between state and status."""
     codes = _parameters_of(datapath)
     return f"size_t channel, {codes}" if _takes_channel(datapath) else codes
 
 
-def _parameters_of(datapath: Datapath) -> str:
+def _parameters_of(datapath: Structure) -> str:
     """Return the parameters that are the codes of the inputs."""
     return ", ".join(f"int64_t {port.name}_code" for port in datapath.inputs)
 
 
-def _text(datapath: Datapath) -> ModelText:
+def _text(datapath: Structure) -> ModelText:
     """Return the statements of all stages."""
     graphs = [stage.graph for stage in datapath.stages]
     return statements_of(
@@ -145,17 +141,17 @@ def _states(text: ModelText) -> list[tuple[str, str]]:
     return [(TYPES[width], name) for width, name in sorted(bits, key=lambda each: -each[0])] or [("int32_t", "none")]
 
 
-def state_bytes(datapath: Datapath) -> int:
+def state_bytes(datapath: Structure) -> int:
     """Size of one channel's state in the compiled model, in bytes."""
     widths = [width // 8 for width in _text(datapath).states] or [4]
     return -(-sum(widths) // max(widths)) * max(widths)
 
 
-def _result(datapath: Datapath, text: ModelText) -> str:
+def _result(datapath: Structure, text: ModelText) -> str:
     return text.names[datapath.stages[-1].graph.outputs[0]]
 
 
-def _exported(datapath: Datapath) -> list[int]:
+def _exported(datapath: Structure) -> list[int]:
     """Nodes of the last stage that others need: its outputs, and what the output stage clamps."""
     graph = datapath.stages[-1].graph
     exported = set(graph.outputs)
@@ -164,7 +160,7 @@ def _exported(datapath: Datapath) -> list[int]:
     return sorted(exported)
 
 
-def _wires(datapath: Datapath, text: ModelText) -> list[tuple[str, str]]:
+def _wires(datapath: Structure, text: ModelText) -> list[tuple[str, str]]:
     """Type and name of each input and of what stages hand on."""
     wires = [(_type_of_codes(port), f"{port.name}_code") for port in datapath.inputs]
     return wires + [member for stage in text.stages for member in stage.members]
@@ -174,7 +170,7 @@ def _type_of_codes(port: Port) -> str:
     return TYPES[bits_of(Span(port.lowest, port.highest))]
 
 
-def _status(datapath: Datapath, text: ModelText) -> str:
+def _status(datapath: Structure, text: ModelText) -> str:
     """Expression of the flags."""
     last = datapath.stages[-1].graph
     node = last.nodes[last.outputs[0]]

@@ -9,16 +9,14 @@ import subprocess
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from sosmith.model.dataflow.c_model import c_header, c_source, state_bytes
+from sosmith.model.dataflow.structure import Structure
 from sosmith.model.errors import ToolError
-
-if TYPE_CHECKING:
-    from sosmith.model.dataflow.datapath import Datapath
 
 
 class Block(Protocol):
@@ -48,13 +46,13 @@ _FEW = 500_000
 """Samples that are computed sooner than the compiler has optimized the loop: it takes twice as long as without."""
 
 
-def block_for(datapath: Datapath, samples: int) -> Block:
+def block_for(datapath: Structure, samples: int) -> Block:
     """Compile the C model of `datapath` for a run of so many samples of all channels together, as `compile_block`."""
     return compile_block(datapath, optimized=samples > _FEW)
 
 
 @functools.lru_cache(maxsize=64)
-def compile_block(datapath: Datapath, *, optimized: bool = True) -> Block:
+def compile_block(datapath: Structure, *, optimized: bool = True) -> Block:
     """Compile the C model of `datapath`; the returned function takes codes of shape (samples, channels, inputs).
 
     Raises
@@ -91,7 +89,7 @@ class Pushed:
 
     Parameters
     ----------
-    datapath : Datapath
+    datapath : Structure
         What is computed.
 
     Raises
@@ -100,7 +98,7 @@ class Pushed:
         If no C compiler is found or it fails.
     """
 
-    def __init__(self, datapath: Datapath) -> None:
+    def __init__(self, datapath: Structure) -> None:
         self._inputs = len(datapath.inputs)
         source = c_source(datapath) + _SIZE.format(name=datapath.name)
         library = _load(datapath.name, c_header(datapath), source, "-O2")

@@ -9,8 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from sosmith.model.dataflow.datapath import Datapath, Stage
+from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.graph import Graph, Node, Op, range_of
+from sosmith.model.dataflow.structure import Stage
 from sosmith.model.port import Port
 from sosmith.model.sections.horner import HornerStep
 

@@ -28,8 +28,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from sosmith.model.dataflow.datapath import Stage
 from sosmith.model.dataflow.graph import Graph, GraphBuilder, Node, Op, Range
+from sosmith.model.dataflow.structure import Stage
 
 
 @dataclass(frozen=True, kw_only=True)

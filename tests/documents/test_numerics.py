@@ -9,7 +9,7 @@ from benchmarks import numerics
 
 from sosmith.gen.realizations.registry import REALIZATIONS, Realization
 from sosmith.gen.specification.realizations import RealizationTerms
-from sosmith.model.dataflow.datapath import Stage
+from sosmith.model.dataflow.structure import Stage
 from sosmith.model.errors import ShortfallError
 
 

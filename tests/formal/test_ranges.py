@@ -14,8 +14,8 @@ from sosmith.gen.realizations.section_format import WIDE
 from sosmith.hdl.pipelined_logic import unique_names
 from sosmith.hdl.plan.pipeline import pipeline_stages
 from sosmith.hdl.stages.pipelined import PipelinedStage
-from sosmith.model.dataflow.datapath import Stage
 from sosmith.model.dataflow.graph import Op, Range
+from sosmith.model.dataflow.structure import Stage
 from sosmith.model.sections.direct_form import DirectForm1, Product
 
 

@@ -9,8 +9,9 @@ import numpy as np
 from sosmith.gen.proof.cascade_proof import prove_cascade
 from sosmith.gen.proof.linear_model import linear_model
 from sosmith.gen.realizations.section_format import unknown_range
-from sosmith.model.dataflow.datapath import Datapath, Stage
+from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.graph import GraphBuilder, Range
+from sosmith.model.dataflow.structure import Stage
 from sosmith.model.port import Port
 from sosmith.model.sections.horner import HornerStep
 

@@ -6,7 +6,7 @@ from typing import Any
 from amaranth.sim import Simulator
 
 from sosmith.hdl.stages.pipelined import PipelinedStage
-from sosmith.model.dataflow.datapath import Stage
+from sosmith.model.dataflow.structure import Stage
 
 
 def run(stage: Stage, samples: list[list[int]], seed: int) -> list[list[int]]:

@@ -7,8 +7,9 @@ from fractions import Fraction
 import numpy as np
 from scipy import signal
 
-from sosmith.model.dataflow.datapath import Datapath, Stage
+from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.graph import Range
+from sosmith.model.dataflow.structure import Stage
 from sosmith.model.port import Port
 from sosmith.model.sections.direct_form import DirectForm1, Product
 from sosmith.model.sections.output import OutputStage

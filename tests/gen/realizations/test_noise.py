@@ -18,8 +18,8 @@ from sosmith.gen.filter.design import decay_length
 from sosmith.gen.proof.linear_model import LinearModel, Source, linear_model
 from sosmith.gen.realizations.registry import REALIZATIONS
 from sosmith.gen.realizations.section_format import SectionFormat
-from sosmith.model.dataflow.datapath import Stage
 from sosmith.model.dataflow.graph import Range
+from sosmith.model.dataflow.structure import Stage
 from sosmith.model.port import Port
 from sosmith.model.sections.transposed_form import TransposedForm
 

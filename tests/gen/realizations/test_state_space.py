@@ -37,8 +37,9 @@ from sosmith.gen.realizations.noise import (
 from sosmith.gen.realizations.registry import REALIZATIONS
 from sosmith.gen.realizations.section_format import SectionFormat
 from sosmith.gen.realizations.state_space import StateDesign, minimum_noise, normal
-from sosmith.model.dataflow.datapath import Datapath, Stage
+from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.graph import Graph, GraphBuilder, Range
+from sosmith.model.dataflow.structure import Stage
 from sosmith.model.errors import ShortfallError
 from sosmith.model.port import Port
 from sosmith.model.sections.state_space import Coefficient, StateSpace

@@ -20,8 +20,8 @@ from sosmith.gen.realizations.direct_form import direct_form
 from sosmith.gen.realizations.registry import REALIZATIONS
 from sosmith.gen.realizations.section_format import WIDE, SectionFormat
 from sosmith.gen.realizations.transposed import transposed_form
-from sosmith.model.dataflow.datapath import Stage
 from sosmith.model.dataflow.graph import Range
+from sosmith.model.dataflow.structure import Stage
 from sosmith.model.errors import ShortfallError
 from sosmith.model.port import Port
 from sosmith.model.sections.direct_form import DirectForm1

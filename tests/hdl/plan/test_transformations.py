@@ -9,8 +9,8 @@ from sosmith.hdl.plan.constant_products import with_sums
 from sosmith.hdl.plan.look_ahead import period, plans
 from sosmith.hdl.plan.reassociation import reassociated
 from sosmith.hdl.plan.unfolding import unfolded
-from sosmith.model.dataflow.datapath import Stage
 from sosmith.model.dataflow.graph import Graph, GraphBuilder, Op
+from sosmith.model.dataflow.structure import Stage
 from sosmith.model.sections.horner import HornerStep
 
 SAMPLES = 48
