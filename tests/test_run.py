@@ -16,7 +16,7 @@ from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).parents[1]
 SUPPORTED = ("3.11", "3.12", "3.13", "3.14")
-COMMANDS = ("cat", "cksum", "dirname", "echo", "sort", "xargs")
+COMMANDS = ("cat", "cksum", "dirname", "echo", "sed", "sort", "xargs")
 """All that the script calls before it makes `.venv`."""
 
 
@@ -76,6 +76,21 @@ def test_any_other_version_is_refused_with_the_reason_and_a_way_out(version: str
 def test_a_supported_version_beside_another_one_is_found(version: str, tmp_path: Path) -> None:
     result = installed(tmp_path, "3.15", version)
     assert (result.returncode, result.stderr.splitlines()) == taken(version, f"{tmp_path}/bin/python{version}")
+
+
+def test_the_environment_of_another_checkout_is_left_alone(tmp_path: Path) -> None:
+    other, ours = tmp_path / "other", tmp_path / "ours"
+    (other / ".venv").mkdir(parents=True)
+    (other / "run").touch()
+    (other / ".venv" / ".ready").write_text(f"1 2\n{other}\nPython 3.11.0 test")
+    ours.mkdir()
+    (ours / ".venv").symlink_to(other / ".venv")
+    result = installed(ours, "3.11")
+    assert result.returncode == 3
+    assert result.stderr == (
+        f"run: .venv must be this checkout's own, not a link to that of {other}; remove the link: 'rm .venv'\n"
+    )
+    assert (other / ".venv" / ".ready").exists()
 
 
 def test_the_versions_are_the_same_everywhere() -> None:
