@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from tests.host.lines import BadLine, ScriptedLine, device_of, plain_device
 from tests.interface.small import filter_design, instrument_design
@@ -166,7 +166,6 @@ def test_counters_go_on_where_bytes_wrap_around() -> None:
 
 
 @given(st.lists(st.binary(max_size=300), max_size=20))
-@settings(deadline=None)
 def test_arbitrary_bytes_from_the_board_end_in_a_typed_error(script: list[bytes]) -> None:
     line = ScriptedLine(*script)
     with pytest.raises(sosmith.LinkError):
@@ -183,14 +182,12 @@ FRAMES = st.builds(
 
 
 @given(st.lists(FRAMES, max_size=40))
-@settings(deadline=None)
 def test_frames_that_make_no_sense_end_in_a_typed_error(script: list[bytes]) -> None:
     with pytest.raises(sosmith.LinkError):
         Board.on(ScriptedLine(Message(0x81, 0, bytes([1, 4, 0])).frame, *script))
 
 
 @given(st.lists(st.one_of(FRAMES, st.binary(max_size=99)), max_size=40))
-@settings(deadline=None)
 def test_between_good_responses_nonsense_changes_nothing(noise: list[bytes]) -> None:
     made = filter_design()
     codes = random_codes(made, 200)

@@ -146,7 +146,7 @@ def sections(draw: st.DrawFn) -> Section:
 
 @pytest.mark.slow
 @given(st.lists(sections(), min_size=1, max_size=3))
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60)
 def test_brute_force_and_the_second_method_agree(cascade: list[Section]) -> None:
     samples = np.zeros(3000)
     samples[0] = 1
@@ -164,7 +164,7 @@ def test_brute_force_and_the_second_method_agree(cascade: list[Section]) -> None
 
 
 @given(st.floats(-2, 2), st.floats(-1, 1))
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=200)
 def test_radii_lie_just_above_the_poles(a1: float, a2: float) -> None:
     radii = pole_radii(dyadic(1, a1, a2))
     assert sorted(map(float, radii)) == pytest.approx(sorted(np.abs(np.roots([1, a1, a2]))), abs=2e-8)

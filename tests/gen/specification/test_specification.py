@@ -361,8 +361,6 @@ def assert_loads_or_is_refused(path: Path) -> None:
 
 hypothesis_settings = settings(
     max_examples=300,
-    derandomize=True,
-    deadline=None,
     database=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )

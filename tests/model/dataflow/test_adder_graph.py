@@ -4,7 +4,7 @@ from functools import cache
 from itertools import pairwise
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sosmith.model.dataflow.adder_graph import (
@@ -38,7 +38,6 @@ def levels(adders: tuple[Adder, ...]) -> dict[int, int]:
     return dict(zip((1, *(adder.multiple for adder in adders)), found, strict=True))
 
 
-@settings(deadline=None)
 @given(st.lists(CONSTANTS, min_size=1, max_size=2), st.integers(-1000, 1000))
 def test_every_constant_is_a_shifted_sum(constants: list[int], operand: int) -> None:
     adders = adder_graph(tuple(constants))
@@ -50,7 +49,6 @@ def test_every_constant_is_a_shifted_sum(constants: list[int], operand: int) -> 
         assert made[odd] <= (len(signed_digits(odd)) - 1).bit_length() + 1
 
 
-@settings(deadline=None)
 @given(st.integers(-(1 << 40), 1 << 40))
 def test_signed_digits_are_canonical(value: int) -> None:
     digits = signed_digits(value)

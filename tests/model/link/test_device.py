@@ -45,7 +45,7 @@ def test_the_identity_is_read_block_by_block() -> None:
 
 
 @given(st.lists(st.integers(1, 30), min_size=1, max_size=8), st.integers(0, 1), st.randoms(use_true_random=False))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_samples_in_messages_of_any_length_give_the_results_of_the_model(sizes, first, random) -> None:  # type: ignore[no-untyped-def]
     core = instrument_design().core
     board = IntegerCore(core.datapath, 2)
@@ -150,7 +150,7 @@ def test_faults_are_counted_and_counts_wrap_around() -> None:
         )
     )
 )
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_arbitrary_bytes_never_wedge_the_board(parts: list[bytes]) -> None:
     board = device(filter_design())
     board.feed(b"".join(parts))

@@ -23,7 +23,7 @@ def run(horner: HornerPolynomial, sample: list[int]) -> int:
     return result
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(rows, st.integers(0, 1023), st.integers(-128, 127), st.integers(0, 9))
 def test_error_is_at_most_half_an_lsb_per_rounding(
     coefficients: tuple[tuple[int, ...], ...], u: int, t: int, frac: int
