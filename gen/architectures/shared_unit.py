@@ -13,7 +13,8 @@ from sosmith.gen.word_lengths.objective import Objective, ShortProgram, unsuitab
 from sosmith.hdl.plan import folded_clocks
 from sosmith.hdl.plan.instructions import instruction_bits
 from sosmith.model.dataflow.datapath import Datapath
-from sosmith.model.dataflow.folding import FoldingError, program
+from sosmith.model.dataflow.folding.fold import program
+from sosmith.model.dataflow.folding.values import FoldingError
 from sosmith.model.dataflow.program import Program
 from sosmith.model.errors import ShortfallError
 from sosmith.model.reload.registers import BITS

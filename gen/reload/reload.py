@@ -25,7 +25,7 @@ from sosmith.gen.specification.specification import Specification
 from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.gen.word_lengths.settling import samples_to_settle
 from sosmith.model.dataflow.datapath import Datapath
-from sosmith.model.dataflow.folding import program
+from sosmith.model.dataflow.folding.fold import program
 from sosmith.model.dataflow.graph import Node, Op
 from sosmith.model.dataflow.program import Program
 from sosmith.model.dataflow.structure import Stage

@@ -10,7 +10,8 @@ from typing import Protocol
 
 from sosmith.gen.word_lengths.cost import LUTS_OF_A_BLOCK, MULTIPLIER_BITS, area_by_digits, area_of, cost_of, scalings
 from sosmith.model.dataflow.datapath import Datapath
-from sosmith.model.dataflow.folding import FoldingError, columns_of, program
+from sosmith.model.dataflow.folding.fold import columns_of, program
+from sosmith.model.dataflow.folding.values import FoldingError
 from sosmith.model.dataflow.graph import Graph, Op
 from sosmith.model.dataflow.program import serial_clocks
 from sosmith.model.dataflow.scheduling import Column

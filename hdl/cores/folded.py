@@ -61,9 +61,9 @@ work, one address a clock, at least one before each sample. What it corrects is 
       |                                               +-------> [fault] ----> m_axis_tuser, until a reset
       +-- counter, address of the instruction
 
-As an example, the program in `sosmith.model.dataflow.folding`, which computes ``y = floor(3 / 4 y1 + 4 x)`` with digits
-of 4 bits, for x = 7 and y1 = 28 = 12 + 16 * 1. The sample is found at edge 0; at the edges 5 to 9, pipeline stage 5
-holds the instructions 0 to 4::
+As an example, the program in `sosmith.model.dataflow.folding.fold`, which computes ``y = floor(3 / 4 y1 + 4 x)`` with
+digits of 4 bits, for x = 7 and y1 = 28 = 12 + 16 * 1. The sample is found at edge 0; at the edges 5 to 9, pipeline
+stage 5 holds the instructions 0 to 4::
 
     edge                    5       6       7       8       9
     instruction          take    drop  multiply  store  finish

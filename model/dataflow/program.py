@@ -13,7 +13,7 @@ with ``digit_bits = 2``, -7 is the digits 1, -2 (lowest first), since -7 = 1 + (
 
 An instruction of a program with two products a clock also has a second address and a second constant.
 
-`sosmith.model.dataflow.folding` makes programs; `sosmith.hdl.cores.folded` runs them.
+`sosmith.model.dataflow.folding.fold` makes programs; `sosmith.hdl.cores.folded` runs them.
 """
 
 from __future__ import annotations

@@ -39,7 +39,7 @@ def test_each_claim_is_reported(path: str) -> None:
 @pytest.mark.slow
 def test_what_is_written_is_checked_elsewhere(path: str, tmp_path: Path) -> None:
     folder = tmp_path / "theories"
-    assert f"written: 16 files for Rocq in {folder}" in command.good(path, "--export", str(folder)).stdout
+    assert f"written: 18 files for Rocq in {folder}" in command.good(path, "--export", str(folder)).stdout
     assert json.loads(command.good(path, "--json").stdout)["rocq"] is None
     made = subprocess.run(["make", "-C", str(folder)], capture_output=True, text=True, check=True)
     assert made.stdout.count("Axioms:") == 1

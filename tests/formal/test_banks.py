@@ -14,7 +14,7 @@ from tests.formal.small import limiter
 
 from sosmith.hdl import reload
 from sosmith.hdl.cores import folded
-from sosmith.model.dataflow.folding import program
+from sosmith.model.dataflow.folding.fold import program
 
 
 class WritesFreeBanks(Proof):

@@ -17,7 +17,7 @@ from sosmith.hdl import reload
 from sosmith.hdl.cores import folded
 from sosmith.hdl.cores import parallel as core
 from sosmith.hdl.plan import parallel_clocks
-from sosmith.model.dataflow.folding import program
+from sosmith.model.dataflow.folding.fold import program
 
 
 class AnySwap(reload.ReloadPort):

@@ -15,7 +15,7 @@ from sosmith.hdl.cores import folded
 from sosmith.hdl.cores import parallel as core
 from sosmith.hdl.plan import folded_clocks, parallel_clocks
 from sosmith.model.dataflow.datapath import Datapath
-from sosmith.model.dataflow.folding import program
+from sosmith.model.dataflow.folding.fold import program
 
 
 def buffer_rules(module: ModuleType = axi_stream) -> StreamRules:

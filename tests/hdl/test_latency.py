@@ -12,7 +12,7 @@ from sosmith.hdl.cores.folded import FoldedCore
 from sosmith.hdl.cores.parallel import Core
 from sosmith.hdl.plan import folded_clocks, parallel_clocks
 from sosmith.model.dataflow.datapath import Datapath
-from sosmith.model.dataflow.folding import program
+from sosmith.model.dataflow.folding.fold import program
 
 
 def worn() -> Datapath:

@@ -11,7 +11,7 @@ from tests.hdl.axi_stream.stream_bench import run
 from sosmith.hdl.cores.folded import FoldedCore
 from sosmith.hdl.cores.parallel import Core
 from sosmith.model.dataflow.datapath import Datapath
-from sosmith.model.dataflow.folding import program
+from sosmith.model.dataflow.folding.fold import program
 from sosmith.model.dataflow.status import Flag
 
 

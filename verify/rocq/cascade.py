@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from flint import fmpz_poly
 
 from sosmith.verify.certificate_file import Operation
-from sosmith.verify.graph import RejectedError, inputs_of
+from sosmith.verify.graph import inputs_of
 from sosmith.verify.rocq.flat import FlatGraph, used_inputs
 from sosmith.verify.rocq.linear import LinearStage, Source
 from sosmith.verify.rocq.polynomials import common_denominator, integers, number, numbers, rows
@@ -95,10 +95,7 @@ Definition forms := Eval vm_compute in fill core sources written [] (firstn {sel
     def rows(self, section: int, node: int, bits: int) -> Rows:
         """Follow `rows_of`: the response of a node of a section, its first sample being ``2**bits``.
 
-        Raises
-        ------
-        RejectedError
-            If a node on the way is not one that its section computes.
+        Of a node that no section computes there is none, and what a section takes of one stays as it is.
         """
         at = self.sections[section]
         exponent, tail = split(at.under)
@@ -108,10 +105,10 @@ Definition forms := Eval vm_compute in fill core sources written [] (firstn {sel
         steps = []
         for index in range(section, 0, -1):
             for place in self.sections[index].wires:
-                if not row.get(place):
-                    continue
                 wire = self.sources[place][1]
                 before = self._computes(self.graph.fed_by(wire), index)
+                if not row.get(place) or before is None:
+                    continue
                 exponent, tail = split(self.sections[before].under)
                 moved = divide(exponent, tail, [int(value) for value in row.pop(place).coeffs()])
                 steps.append(f"({place}%nat, {moved.samples}%N)")
@@ -126,15 +123,12 @@ Definition forms := Eval vm_compute in fill core sources written [] (firstn {sel
         first = [split(one.under)[0] for one in self.sections[: section + 1]]
         return max(first) - first[-1]
 
-    def _computes(self, node: int, section: int) -> int:
-        """Return the section before another one that computes a node; the one just before it if none does."""
-        return next((at for at in range(section) if node in self.sections[at].forms), section - 1)
+    def _computes(self, node: int, section: int) -> int | None:
+        """Return the section before another one that computes a node."""
+        return next((at for at in range(section) if node in self.sections[at].forms), None)
 
     def _form(self, section: int, node: int) -> Row:
-        forms = self.sections[section].forms
-        if node not in forms:
-            raise RejectedError(f"section {section} must compute its output, not pass node {node} on")
-        return forms[node]
+        return self.sections[section].forms.get(node, {})
 
     def _size(self, node: int) -> int:
         entry = self.graph.node(node)

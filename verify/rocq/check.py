@@ -9,14 +9,16 @@ from tempfile import TemporaryDirectory
 
 from sosmith.model.errors import ToolError
 from sosmith.verify.certificate_file import Certificate
-from sosmith.verify.decimation import handed_on
+from sosmith.verify.decimation import calibration_alone, handed_on
+from sosmith.verify.graph import RejectedError
 from sosmith.verify.rocq.bound import bound_claims, why_no_bound
 from sosmith.verify.rocq.cascade import cascade_of
 from sosmith.verify.rocq.claims import Claim, gain_claims
-from sosmith.verify.rocq.flat import flattened
+from sosmith.verify.rocq.entry import graph_ahead
+from sosmith.verify.rocq.flat import FlatGraph, flattened
 from sosmith.verify.rocq.folding import folding_claims
 from sosmith.verify.rocq.kernel import LIBRARY, THEORIES, ending, mark, run_kernel, theory_texts
-from sosmith.verify.rocq.ranges import core_definitions, range_claims, tight_claim
+from sosmith.verify.rocq.ranges import core_definitions, graph_claim, range_claims, tight_claim
 from sosmith.verify.rocq.settling import counter_of
 from sosmith.verify.rocq.start import start_of
 
@@ -25,6 +27,9 @@ DATA = "Claims"
 
 _FOLDING = ("Angles", "Waves", "Forms", "Folding")
 """Theories that only claims of a decimator rest on."""
+
+_LAST = "error_is_bounded"
+"""The theorem that all others are for."""
 
 GIVEN = ("the certificate's graph, exact filter and exact calibration: that these are the specified ones is not of it",)
 """What the theorems are about, and do not question."""
@@ -60,12 +65,19 @@ class RocqVerdict:
 def rocq_texts(certificate: Certificate) -> dict[str, str]:
     """Return theories, theorems and a Makefile by their file names.
 
+    Of a wrong certificate there may be theorems missing; then the last line asks for them, which Rocq refuses.
+
     Raises
     ------
     RejectedError
-        If the certificate's claims cannot be written as theorems.
+        If there is nothing that a theorem could be about, or all that is missing is behind the error bound.
     """
-    return _texts(theorems(certificate))
+    made = theorems(certificate)
+    if made.ended is None:
+        return _texts(made)
+    if any(claim.name == _LAST for claim in made.claims):
+        raise RejectedError(made.ended)
+    return _texts(made, (_LAST,))
 
 
 def check_in_rocq(
@@ -98,9 +110,14 @@ def check_in_rocq(
                 (folder / file).write_text(text, encoding="utf-8")
         except OSError as error:
             raise ToolError(f"{folder}: the theories must be written there, which failed: {error.strerror}") from None
-        accepted = run_kernel(
-            folder, made.claims, DATA, seconds, lambda done, total: progress("Rocq", done, total), made.theories
-        )
+        try:
+            accepted = run_kernel(
+                folder, made.claims, DATA, seconds, lambda done, total: progress("Rocq", done, total), made.theories
+            )
+        except RejectedError as error:
+            raise RejectedError(f"{error}; {made.ended}" if made.ended is not None else str(error)) from None
+    if made.ended is not None:
+        raise RejectedError(made.ended)
     words = {claim.name: claim.words for claim in made.claims}
     return RocqVerdict(accepted.version, words, accepted.axioms, GIVEN, made.unchecked)
 
@@ -129,53 +146,82 @@ class Theorems:
         What of the certificate none of them is about.
     theories : tuple of str
         What they rest on, in the order in which it is compiled.
+    ended : str or None
+        Why there are no more theorems, where one that the others need is wrong. That one is the kernel's to refuse; if
+        it accepts all that there are, this is why the certificate is rejected.
     """
 
     definitions: str
     claims: list[Claim]
     unchecked: tuple[str, ...]
     theories: tuple[str, ...]
+    ended: str | None
 
 
 def theorems(certificate: Certificate) -> Theorems:
-    """Write all theorems of a certificate.
+    """Write all theorems of a certificate, or of a wrong one those that can be written.
 
     Raises
     ------
     RejectedError
-        If its claims cannot be written as theorems.
+        If there is nothing that a theorem could be about.
     """
     behind = handed_on(certificate)
     graph = flattened(behind)
-    claims = list(gain_claims(certificate))
-    unchecked = list(_beside(certificate))
+    claims: list[Claim] = []
+    ended = None
+    try:
+        for claim in _claims(certificate, behind, graph):
+            claims.append(claim)
+    except RejectedError as error:
+        ended = str(error)
+    theories = tuple(name for name in THEORIES if certificate.decimation is not None or name not in _FOLDING)
+    return Theorems(core_definitions(graph), claims, tuple(_unchecked(certificate)), theories, ended)
+
+
+def _claims(certificate: Certificate, behind: Certificate, graph: FlatGraph) -> Iterator[Claim]:
+    """Write theorem by theorem, each of which may need those before it to be true."""
+    graphs = [graph]
+    yield graph_claim(graph, "core", "ports")
+    alone = calibration_alone(certificate)
+    if alone is not None and why_no_bound(certificate) is None:
+        ahead, claim = graph_ahead(alone)
+        graphs.append(ahead)
+        yield claim
+    for one in graphs:
+        one.check()
+    yield from gain_claims(certificate)
     cascade = cascade_of(graph) if certificate.claims.sections else None
     start, counter = start_of(graph), counter_of(certificate, graph)
-    claims.append(tight_claim())
+    yield tight_claim()
+    if start is not None:
+        yield start.claim()
     if counter is not None:
-        claims.append(counter.claim())
-    claims += range_claims(graph, cascade, start, counter)
-    why = why_no_bound(certificate)
-    if why is not None or cascade is None:
-        unchecked.insert(0, f"error bound: {why}")
-        if certificate.decimation is not None:
-            unchecked.append("what folds into the pass band at the decimator")
-    else:
-        claims += bound_claims(certificate, behind, cascade, start, counter)
-        claims += folding_claims(certificate)
-    theories = tuple(name for name in THEORIES if certificate.decimation is not None or name not in _FOLDING)
-    return Theorems(core_definitions(graph), claims, tuple(unchecked), theories)
+        yield counter.claim()
+    yield from range_claims(graph, cascade, start, counter)
+    if why_no_bound(certificate) is not None:
+        return
+    if cascade is None:
+        raise RejectedError("an exact filter must have a section that computes it, not none")
+    yield from bound_claims(certificate, behind, cascade, start, counter)
+    yield from folding_claims(certificate)
 
 
-def _beside(certificate: Certificate) -> Iterator[str]:
+def _unchecked(certificate: Certificate) -> Iterator[str]:
     """Name the claims that no theorem is about."""
+    why = why_no_bound(certificate)
+    if why is not None:
+        yield f"error bound: {why}"
     if certificate.claims.online is not None:
         yield "the units of sections in on-line arithmetic"
+    if why is not None and certificate.decimation is not None:
+        yield "what folds into the pass band at the decimator"
 
 
-def _texts(made: Theorems) -> dict[str, str]:
+def _texts(made: Theorems, missing: Sequence[str] = ()) -> dict[str, str]:
     parts = [f"(* {claim.words}. *)\n{claim.text}{mark(claim)}" for claim in made.claims]
-    text = "\n".join([head(made.theories), made.definitions, *parts, ending(made.claims)])
+    names = [*(claim.name for claim in made.claims), *missing]
+    text = "\n".join([head(made.theories), made.definitions, *parts, ending(names)])
     return theory_texts(made.theories) | {f"{DATA}.v": text, "Makefile": _makefile(made.theories)}
 
 

@@ -9,10 +9,10 @@ from fractions import Fraction
 from flint import fmpz_poly
 
 from sosmith.verify.certificate_file import Certificate, Operation, StageEntry
-from sosmith.verify.graph import require
+from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.rocq.linear import LinearStage
 from sosmith.verify.rocq.polynomials import common_denominator, integers, number, numbers, rows
-from sosmith.verify.rocq.responses import impulse, split
+from sosmith.verify.rocq.responses import Response, begun, impulse, split
 
 _BITS = (88, 104, 136, 232)
 """Precision of the first sample of a response, tried in this order."""
@@ -38,12 +38,13 @@ class Claim:
 
 
 def gain_claims(certificate: Certificate) -> Iterator[Claim]:
-    """Write the theorems for the gains of all sections, in their order.
+    """Write the theorems for the gains of all sections, in their order, up to one whose recursion does not die away.
 
     Raises
     ------
     RejectedError
-        If gains are not given of exactly the sections, or a section is not linear or not stable.
+        If gains are not given of exactly the sections, or a section is not linear; or, behind its theorem, which Rocq
+        refuses, if the response of a recursion does not die away.
     """
     sections = [stage for stage in certificate.stages if stage.role == "section"]
     claims = certificate.claims.sections
@@ -56,10 +57,10 @@ def gain_claims(certificate: Certificate) -> Iterator[Claim]:
     for index, (section, claim) in enumerate(zip(sections, claims, strict=True)):
         model = LinearStage(section)
         where = f"section {index}"
-        first = [[Fraction(1)]]
-        yield _Gain(model, first, claim.recursion_gain).claim(
-            f"recursion_gain_{index}", f"{where}: gain of its recursion", close=True
-        )
+        recursion = _Gain(model, [[Fraction(1)]], claim.recursion_gain)
+        yield recursion.claim(f"recursion_gain_{index}", f"{where}: gain of its recursion", close=True)
+        if recursion.endless is not None:
+            raise recursion.endless
         made = {
             place: _Gain(model, _from_inputs(section, model, output), claim.peak_gain)
             for place, output in enumerate(section.outputs)
@@ -90,6 +91,13 @@ def _in_values(section: StageEntry, model: LinearStage, node: int, source: int) 
     return [value * unit for value in model.numerator(node, ("node", source, 0))]
 
 
+def _response(bits: int, tail: Sequence[int], one: int) -> tuple[Response, RejectedError | None]:
+    try:
+        return impulse(bits, tail, one), None
+    except RejectedError as error:
+        return begun(bits, tail, one), error
+
+
 class _Gain:
     """A gain, and the shortest response that proves it, or that with the highest precision.
 
@@ -97,6 +105,8 @@ class _Gain:
     ----------
     proven : Fraction
         What the response proves.
+    endless : RejectedError or None
+        Why there is no such response, but only the first samples of one.
     """
 
     def __init__(self, model: LinearStage, over: Sequence[Sequence[Fraction]], claimed: Fraction) -> None:
@@ -105,12 +115,13 @@ class _Gain:
         self._claimed = claimed
         exponent, tail = split(self._under)
         for bits in _BITS:
-            made = impulse(exponent, tail, 1 << bits)
+            made, self.endless = _response(exponent, tail, 1 << bits)
             response = fmpz_poly(made.values)
             total = sum(sum(abs(int(value)) for value in (fmpz_poly(one) * response).coeffs()) for one in self._over)
-            self.proven = Fraction(total, (1 << bits + exponent) - made.rest)
+            left = (1 << bits + exponent) - made.rest
+            self.proven = Fraction(total, left) if left > 0 else Fraction(-1)
             self._witness = f"Witness {made.samples} {exponent} {numbers(tail)} 1 1 (2 ^ {bits})"
-            if 0 <= self.proven <= claimed:
+            if 0 <= self.proven <= claimed or self.endless is not None:
                 break
 
     def claim(self, name: str, words: str, *, close: bool) -> Claim:

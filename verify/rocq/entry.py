@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from sosmith.verify.certificate_file import Certificate, PortEntry
@@ -12,7 +12,7 @@ from sosmith.verify.rocq.calibration import Calibration, calibration_of, formula
 from sosmith.verify.rocq.claims import Claim
 from sosmith.verify.rocq.flat import FlatGraph, flattened
 from sosmith.verify.rocq.polynomials import number
-from sosmith.verify.rocq.ranges import all_in_range, graph_definitions
+from sosmith.verify.rocq.ranges import all_in_range, graph_claim, graph_definitions
 
 
 @dataclass(frozen=True)
@@ -154,16 +154,26 @@ def _listed(ports: Sequence[PortEntry]) -> str:
     return "; ".join(f"({number(port.lowest)}, {number(port.highest)})" for port in ports)
 
 
-def _before(certificate: Certificate, alone: Certificate | None) -> Claim:
-    """Write what the decimator takes: the input, or the output of the calibration's graph, in its range."""
-    given = f"""\
+def _given(certificate: Certificate) -> str:
+    return f"""\
 (* Ranges of the inputs, and what the decimator takes of their codes x. *)
 Definition given : list (Z * Z) := [{_listed(certificate.inputs)}].
 """
+
+
+def graph_ahead(alone: Certificate) -> tuple[FlatGraph, Claim]:
+    """Return the graph of the calibration before the decimator, and the theorem that it is one."""
+    graph = flattened(alone)
+    claim = graph_claim(graph, "ahead", "given", " before the decimator")
+    return graph, replace(claim, text=f"{_given(alone)}{graph_definitions(graph, 'ahead')}{claim.text}")
+
+
+def _before(certificate: Certificate, alone: Certificate | None) -> Claim:
+    """Write what the decimator takes: the input, or the output of the calibration's graph, in its range."""
     if alone is None:
         (port,) = certificate.inputs
         text = f"""\
-{given}\
+{_given(certificate)}\
 Definition taken_codes (x : nat -> nat -> Z) (n : nat) : Z := x n 0%nat.
 Theorem taken_within : forall x, inputs_within given x ->
   forall n, {number(port.lowest)} <= taken_codes x n <= {number(port.highest)}.
@@ -173,8 +183,6 @@ Proof. intros x X n. exact (X n 0%nat (le_n 1)). Qed.
     graph, port = flattened(alone), alone.output
     place = graph.offsets[-2] + alone.stages[-1].outputs[0]
     text = f"""\
-{given}\
-{graph_definitions(graph, "ahead")}\
 Definition taken_codes (x : nat -> nat -> Z) (n : nat) : Z := code ahead x {place} n.
 Lemma ahead_is_tight : ranges_are_tight ahead given = true.
 Proof. vm_cast_no_check (eq_refl true). Qed.

@@ -65,6 +65,23 @@ class FlatGraph:
                 rows.append(f"Node ({made}) {number(node.frac)} {number(node.low)} {number(node.high)}")
         return "[" + ";\n   ".join(rows) + "]"
 
+    def layout(self) -> str:
+        """Write the number of nodes and the outputs of each stage, as the certificate has them."""
+        stages = (f"({len(stage.nodes)}, [{'; '.join(map(str, stage.outputs))}])" for stage in self.stages)
+        return f"[{'; '.join(stages)}]%nat"
+
+    def check(self) -> None:
+        """Check what the theorems of a well-formed graph say, where no other theorem can be written without it.
+
+        Raises
+        ------
+        RejectedError
+            If an operand or an output is no node of its stage, or a node drops no bit where it must.
+        """
+        for stage in self.stages:
+            _check_places(stage)
+            _check_drops(stage)
+
 
 def flattened(certificate: Certificate) -> FlatGraph:
     """Put all stages in a row.
@@ -72,13 +89,13 @@ def flattened(certificate: Certificate) -> FlatGraph:
     Raises
     ------
     RejectedError
-        If a stage has not as many inputs as the one before it has outputs, or the first one as there are; or an operand
-        is no node of its stage.
+        If a node has not as many operands as its operation takes, or a stage not as many inputs as the one before it
+        has outputs, or the first one as there are. That operands and outputs are nodes of their stages is not asked.
     """
     offsets: list[int] = [0]
     feeds: list[list[int]] = [[]]
     for index, stage in enumerate(certificate.stages):
-        _check_places(stage)
+        _check_counts(stage)
         if index:
             before = certificate.stages[index - 1]
             taken = [_origin(before, output, offsets[-2], feeds[-1]) for output in before.outputs]
@@ -103,12 +120,17 @@ def used_inputs(stage: StageEntry) -> list[int]:
     return [at for at in inputs_of(stage) if at in used]
 
 
-def _check_places(stage: StageEntry) -> None:
-    """Check that operands and outputs are nodes of the stage, as many as each operation takes."""
+def _check_counts(stage: StageEntry) -> None:
+    """Check that nodes have as many operands as their operations take."""
     for index, node in enumerate(stage.nodes):
         count = {Operation.INPUT: 0, Operation.CONSTANT: 0, **dict.fromkeys(_TWO, 2)}.get(node.op, 1)
         found = len(node.operands)
         require(found == count, f"{label(stage, index)} must have {count} operands, not {found}")
+
+
+def _check_places(stage: StageEntry) -> None:
+    """Check that operands and outputs are nodes of the stage."""
+    for index, node in enumerate(stage.nodes):
         last = len(stage.nodes) if node.op is Operation.DELAY else index
         places = node.operands
         require(max(places, default=-1) < last, f"{label(stage, index)} must have operands before it, not {places}")
@@ -116,6 +138,16 @@ def _check_places(stage: StageEntry) -> None:
     require(max(outputs) < len(stage.nodes), f"outputs of {stage.name} must be nodes of it, not {outputs}")
 
 
+def _check_drops(stage: StageEntry) -> None:
+    """Check that what rounds drops bits."""
+    for index, node in enumerate(stage.nodes):
+        if node.op in _DROPPING:
+            kept = node.parameter if node.op is Operation.FRACTION else node.frac
+            dropped = stage.nodes[node.operands[0]].frac - kept
+            require(dropped > 0, f"{label(stage, index)} must drop at least one bit, not {dropped}")
+
+
+_DROPPING = (Operation.FLOOR, Operation.FRACTION, Operation.TRUNCATE)
 _TWO = (Operation.ADD, Operation.SUBTRACT, Operation.MULTIPLY)
 
 

@@ -191,9 +191,9 @@ def mark(claim: Claim) -> str:
     return f'Goal True. pose proof {claim.name}; idtac "{ACCEPTED} {claim.name}". Abort.\n'
 
 
-def ending(claims: Sequence[Claim]) -> str:
-    """Write what prints the axioms that all theorems rest on."""
-    together = ", ".join(claim.name for claim in claims)
+def ending(names: Sequence[str]) -> str:
+    """Write what prints the axioms that the theorems of these names rest on."""
+    together = ", ".join(names)
     head = "(* The axioms that all of this rests on. *)"
     return f"{head}\nDefinition all_claims := ({together}).\nPrint Assumptions all_claims.\n"
 

@@ -83,8 +83,6 @@ class LinearStage:
         if node.op in _QUANTIZERS:
             kept = node.parameter if node.op is Operation.FRACTION else node.frac
             dropped = nodes[node.operands[0]].frac - kept
-            if dropped < 0:
-                raise RejectedError(f"node {index} of {self.stage.name} must drop 0 bits or more, not {dropped}")
             error = self._rounding(node, dropped)
             if node.op is Operation.FRACTION:
                 return error

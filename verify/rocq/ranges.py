@@ -92,9 +92,21 @@ def graph_definitions(graph: FlatGraph, name: str) -> str:
     return f"""\
 Definition {name} : graph :=
   [{graph.term()[1:]}.
-Lemma {name}_is_ordered : ordered {name} = true.
-Proof. vm_cast_no_check (eq_refl true). Qed.
 """
+
+
+def graph_claim(graph: FlatGraph, name: str, ports: str, where: str = "") -> Claim:
+    """Write that the nodes are a graph, in the certificate's stages: what all that follows rests on."""
+    text = f"""\
+(* The stages, one behind another: of each the number of its nodes, and its outputs, counted from its first node. *)
+Definition {name}_stages : layout := {graph.layout()}.
+Theorem {name}_is_well_formed : well_formed {name} {ports} {name}_stages = true.
+Proof. vm_cast_no_check (eq_refl true). Qed.
+Lemma {name}_is_ordered : ordered {name} = true.
+Proof. exact (well_formed_ordered _ _ _ {name}_is_well_formed). Qed.
+"""
+    words = f"all {graph.size} nodes{where} can be computed in their order, and each stage takes what is handed to it"
+    return Claim(f"{name}_is_well_formed", words, text)
 
 
 def tight_claim() -> Claim:
@@ -118,7 +130,7 @@ def range_claims(
         words = f"ranges of the {start.sample + 1} nodes up to the start"
         yield Claim("ranges_before_start", words, _through("ranges_before_start", start.sample + 1))
     text = (
-        _definitions(cascade, start)
+        _definitions(cascade)
         + (_through("ranges_before", known) if start is None else _start(start, known))
         + _window(cascade, start)
     )
@@ -175,36 +187,23 @@ Qed.
 """
 
 
-def _definitions(cascade: Cascade, start: StartNodes | None) -> str:
-    first = cascade.sections[0].wires
-    wire = cascade.sources[first[0]][1]
-    begin = (
-        ""
-        if start is None
-        else f"""\
-Definition begin : start := {start.term}.
-Lemma start_fits_core : start_fits core begin = true.
-Proof. vm_cast_no_check (eq_refl true). Qed.
-Definition start_is : starts core begin = true := start_fits_starts _ _ start_fits_core.
-"""
-    )
-    window = "None" if start is None else f"windows_of core begin {wire}"
+def _definitions(cascade: Cascade) -> str:
     return f"""\
 {cascade.definitions()}\
 Lemma sections_are_closed : closed {cascade.last} core = true.
 Proof. vm_cast_no_check (eq_refl true). Qed.
 Lemma forms_fit : every (fits_node core sources forms) 0 (firstn {cascade.last} core) = true.
 Proof. vm_cast_no_check (eq_refl true). Qed.
-{begin}Definition window : windows := {window}.
 """
 
 
 def _window(cascade: Cascade, start: StartNodes | None) -> str:
     statement = "Lemma window_is : forall x, inputs_within ports x -> window_holds core x window.\n"
     if start is None:
-        return f"{statement}Proof. intros x X. exact I. Qed.\n"
+        return f"Definition window : windows := None.\n{statement}Proof. intros x X. exact I. Qed.\n"
     wire = cascade.sources[cascade.sections[0].wires[0]][1]
     return f"""\
+Definition window : windows := windows_of core begin {wire}.
 {statement}\
 Proof.
   intros x X. apply (start_windows core x begin {wire} core_is_ordered start_is).

@@ -13,6 +13,9 @@ from sosmith.verify.graph import RejectedError
 _SAMPLES = 1 << 20
 """Most samples of a response."""
 
+_BEGUN = 64
+"""Samples of a response that does not die away."""
+
 _GROWTH = 256
 """Bits by which a response may become larger than what it responds to."""
 
@@ -75,6 +78,15 @@ def divide(bits: int, tail: Sequence[int], over: Sequence[int]) -> Response:
     return _respond(bits, tail, [], over)
 
 
+def begun(bits: int, tail: Sequence[int], one: int) -> Response:
+    """Respond as `impulse` does, for some samples only: of a response that does not die away."""
+    made = [one]
+    for _ in range(_BEGUN):
+        made.append(-sum(a * y for a, y in zip(tail, reversed(made), strict=False)) >> bits)
+    begin = _ended(bits, tail, made, 1)
+    return Response(begin.samples, made, begin.rest)
+
+
 def _respond(bits: int, tail: Sequence[int], past: Sequence[int], over: Sequence[int]) -> Response:
     order, size = len(tail), sum(map(abs, tail))
     made = list(past)
@@ -94,7 +106,12 @@ def _respond(bits: int, tail: Sequence[int], past: Sequence[int], over: Sequence
         for a, y in zip(tail, reversed(made), strict=False):
             value -= a * y
         made.append(value >> bits)
+    return _ended(bits, tail, made, skip)
+
+
+def _ended(bits: int, tail: Sequence[int], made: list[int], skip: int) -> Response:
+    """Return a response with what it leaves of the equation behind its last sample."""
+    order, count = len(tail), len(made) - skip
     recent = made[::-1][:order]
     left = [sum(a * y for a, y in zip(tail[k:], recent, strict=False)) for k in range(order)]
-    count = len(made) - skip
     return Response(count, made[skip:], (count << bits) + sum(map(abs, left)))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sosmith.verify.certificate_file import Certificate, Operation
+from sosmith.verify.certificate_file import Certificate
 from sosmith.verify.graph import require
 from sosmith.verify.rocq.claims import Claim
 from sosmith.verify.rocq.flat import FlatGraph
@@ -44,10 +44,12 @@ Proof. intros x n. exact (proj1 (flagged_from core x flags {self.samples} core_i
 def counter_of(certificate: Certificate, graph: FlatGraph) -> Counter | None:
     """Find the nodes of the counter; None if settling is not claimed.
 
+    They are found from the flag on, by their operands. Whether they are a counter is for Rocq to say.
+
     Raises
     ------
     RejectedError
-        If it is claimed, and the nodes are not those that the theories know.
+        If it is claimed, and there is no flag.
     """
     samples = certificate.claims.settling
     if samples is None:
@@ -56,16 +58,16 @@ def counter_of(certificate: Certificate, graph: FlatGraph) -> Counter | None:
     require(len(stage.outputs) == 2, f"{stage.name} must have a code and a flag as outputs, not {len(stage.outputs)}")
     nodes = stage.nodes
 
-    def operands(at: int, op: Operation) -> tuple[int, ...]:
-        require(nodes[at].op is op, f"a counter must have a {op.value} at its node {at}, not a {nodes[at].op.value}")
-        return nodes[at].operands
+    def operand(at: int, place: int = 0) -> int:
+        found = nodes[at].operands
+        return found[place] if place < len(found) else at
 
     flag = stage.outputs[1]
-    (shifted,) = operands(flag, Operation.FLOOR)
-    (left,) = operands(shifted, Operation.SHIFT)
-    counted, count = operands(left, Operation.SUBTRACT)
-    (following,) = operands(counted, Operation.DELAY)
-    (total,) = operands(following, Operation.BOUND)
+    shifted = operand(flag)
+    left = operand(shifted)
+    counted, count = operand(left), operand(left, 1)
+    following = operand(counted)
+    total = operand(following)
     chosen = (counted, count, left, shifted, flag, total, following)
     term = f"Counter {' '.join(str(offset + at) for at in chosen)}"
     return Counter(samples, offset + flag, offset + following, term)

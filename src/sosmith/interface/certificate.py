@@ -317,10 +317,12 @@ class Certificate:
     def export_rocq(self, folder: str | PathLike[str]) -> list[Path]:
         """Write what Rocq checks into a folder, with a Makefile for a machine that has Rocq alone; return the paths.
 
+        Of a wrong certificate, theorems that only a true one lets be written are missing, and Rocq refuses the file.
+
         Raises
         ------
         ShortfallError
-            If the certificate's claims cannot be written as theorems.
+            If there is nothing of the certificate that a theorem could be about.
         SpecificationError
             If a file cannot be written.
         ToolError

@@ -17,7 +17,7 @@ from tests.hdl.folded_bench import Line, Model, Probed, Result, Sample
 from sosmith.hdl.plan import folded_clocks
 from sosmith.hdl.plan.instructions import encoded
 from sosmith.model.dataflow.datapath import Datapath
-from sosmith.model.dataflow.folding import program
+from sosmith.model.dataflow.folding.fold import program
 from sosmith.model.dataflow.graph import GraphBuilder
 from sosmith.model.dataflow.program import Program
 from sosmith.model.dataflow.status import Flag

@@ -7,7 +7,7 @@ from tests.gen.designs import example_design
 
 from sosmith.hdl.instruction import instruction_layout
 from sosmith.hdl.plan.instructions import encoded, instruction_bits
-from sosmith.model.dataflow.folding import program
+from sosmith.model.dataflow.folding.fold import program
 from sosmith.model.dataflow.program import Instruction, Opcode
 
 

@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 from tests.formal.small import limiter
 from tests.gen.designs import ALL, example_design
 
-from sosmith.model.dataflow import folding
 from sosmith.model.dataflow.datapath import Datapath
-from sosmith.model.dataflow.folding import FoldingError, columns_of, program
+from sosmith.model.dataflow.folding import fold
+from sosmith.model.dataflow.folding.fold import columns_of, program
+from sosmith.model.dataflow.folding.values import FoldingError
 from sosmith.model.dataflow.graph import GraphBuilder
 from sosmith.model.dataflow.program import (
     EARLY_WRITES,
@@ -278,6 +279,6 @@ def test_the_accumulator_holds_a_word_however_small_the_sums() -> None:
 
 
 def test_the_worked_example_is_true() -> None:
-    results = doctest.testmod(folding)
+    results = doctest.testmod(fold)
     assert results.attempted > 0
     assert results.failed == 0

@@ -120,7 +120,7 @@ def checked(made: Certificate, folder: Path, claims: Sequence[Claim] | None = No
     written = theorems(made)
     chosen = written.claims if claims is None else claims
     parts = [f"{claim.text}{mark(claim)}" for claim in chosen]
-    text = "".join([head(), written.definitions, *parts, ending(chosen)])
+    text = "".join([head(), written.definitions, *parts, ending([claim.name for claim in chosen])])
     (folder / f"{DATA}.v").write_text(text, encoding="utf-8")
     return set(run_kernel(folder, chosen, DATA, theories=()).axioms)
 

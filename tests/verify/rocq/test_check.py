@@ -34,7 +34,7 @@ from sosmith.verify.certificate_file import Certificate, certificate_text
 from sosmith.verify.graph import RejectedError, inputs_of
 from sosmith.verify.rocq.check import GIVEN, check_in_rocq, head, rocq_texts, theorems
 from sosmith.verify.rocq.flat import flattened, used_inputs
-from sosmith.verify.rocq.kernel import ACCEPTED, STANDARD
+from sosmith.verify.rocq.kernel import ACCEPTED, STANDARD, Accepted
 
 
 @needs_coqc
@@ -112,11 +112,6 @@ def wider_sum(tree: Any) -> None:
     next(node for node in tree["stages"][-1]["nodes"] if node["op"] == "add")["high"] += 1
 
 
-def other_start(tree: Any) -> None:
-    """Hold something else than the first sample."""
-    next(node for node in tree["stages"][0]["nodes"] if node.get("name") == "first")["operands"] = [4]
-
-
 def other_scale(tree: Any) -> None:
     """Let the codes of the input mean something else."""
     tree["inputs"][0]["lsb"] = str(Fraction(tree["inputs"][0]["lsb"]) * 2)
@@ -182,20 +177,16 @@ def test_what_is_wrong_behind_an_input_of_few_bits_is_refused(
         checked(Certificate.model_validate(tree), tmp_path)
 
 
-def test_a_start_that_holds_something_else_has_no_theorem() -> None:
-    tree = json.loads(certificate_text(small(steady=True)))
-    other_start(tree)
-    with pytest.raises(RejectedError, match=r"^a start must have a bound at its node 4, not a multiply$"):
-        theorems(Certificate.model_validate(tree))
-
-
-def test_a_first_section_that_uses_the_first_sample_has_no_theorem() -> None:
+@needs_coqc
+def test_a_first_section_that_uses_the_first_sample_is_refused(tmp_path: Path) -> None:
     tree = json.loads(certificate_text(small(order=1, steady=True)))
     nodes = tree["stages"][1]["nodes"]
     change, held = (at for at, node in enumerate(nodes) if node["op"] == "input")
     next(node for node in nodes if node["op"] == "delay" and node["operands"] == [change])["operands"] = [held]
-    with pytest.raises(RejectedError, match=r"^the first section must use one input behind a start, not 2$"):
-        theorems(Certificate.model_validate(tree))
+    made = Certificate.model_validate(tree)
+    assert theorems(made).ended == "the first section must use one input behind a start, not 2"
+    with pytest.raises(RejectedError, match=r"^Rocq must accept ranges_are_tight_ \("):
+        checked(made, tmp_path)
 
 
 @needs_coqc
@@ -232,11 +223,24 @@ def test_what_no_theorem_is_about_is_named() -> None:
     )
 
 
-def test_a_counter_that_is_not_there_has_no_theorem() -> None:
+def test_a_theorem_that_cannot_be_written_is_asked_for_and_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
     made = small()
     flagged = made.model_copy(update={"claims": made.claims.model_copy(update={"settling": 9})})
-    with pytest.raises(RejectedError, match=r"^output_stage must have a code and a flag as outputs, not 1$"):
-        theorems(flagged)
+    why = "output_stage must have a code and a flag as outputs, not 1"
+    assert (theorems(flagged).ended, theorems(made).ended) == (why, None)
+    assert "peak_gain_1_0, error_is_bounded)." in rocq_texts(flagged)["Claims.v"]
+    monkeypatch.setattr("sosmith.verify.rocq.check.run_kernel", lambda *_: Accepted("8.16", ()))
+    with pytest.raises(RejectedError, match=f"^{why}$"):
+        check_in_rocq(flagged)
+
+    def refuse(*_: object) -> Accepted:
+        raise RejectedError("Rocq must accept something")
+
+    monkeypatch.setattr("sosmith.verify.rocq.check.run_kernel", refuse)
+    with pytest.raises(RejectedError, match=f"^Rocq must accept something; {why}$"):
+        check_in_rocq(flagged)
+    with pytest.raises(RejectedError, match=r"^Rocq must accept something$"):
+        check_in_rocq(made)
 
 
 @needs_coqc

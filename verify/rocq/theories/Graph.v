@@ -1,4 +1,5 @@
-(* Each code of a graph obeys the equation of its node's operation, and what holds at all earlier ones holds for ever. *)
+(* What makes a list of nodes a graph. Then each code obeys the equation of its node's operation, and what holds at all
+   earlier ones holds for ever. *)
 Require Import Bool ZArith List Lia. Import ListNotations.
 From Sosmith Require Import Definitions.
 Open Scope Z_scope.
@@ -41,6 +42,39 @@ Proof.
   destruct k as [|k]; [rewrite Nat.add_0_r; exact H1|].
   replace (i + S k)%nat with (S i + k)%nat by lia. apply IH; [exact H2|lia].
 Qed.
+
+(* A certificate lists stages, one behind another; for each the number of its nodes, and its outputs, counted from its first
+   node. `laid_out` says that the graph has just these stages: the first one takes all inputs of the core, each later one by
+   its wires what the one before it hands on, and no other node takes anything of another stage. *)
+Definition layout := list (nat * list nat).
+Definition takes (o : operation) : list nat := match o with Delay a => [a] | _ => operands o end.
+Definition of_stage (first last : nat) (v : node) : bool :=
+  match op v with Wire _ => true | o => forallb (fun a => Nat.leb first a && Nat.ltb a last) (takes o) end.
+Definition inputs_in (l : list node) : list nat := flat_map (fun v => match op v with Input p => [p] | _ => [] end) l.
+Definition wires_in (l : list node) : list nat := flat_map (fun v => match op v with Wire a => [a] | _ => [] end) l.
+Fixpoint same_places (a b : list nat) : bool :=
+  match a, b with [], [] => true | i :: a', j :: b' => Nat.eqb i j && same_places a' b' | _, _ => false end.
+(* The outputs; for one that only passes through the stage, which nothing there takes, where it comes from. *)
+Definition handed_on (first : nat) (l : list node) (outputs : list nat) : list nat :=
+  map (fun o => let i := (first + o)%nat in
+    match op (nth o l blank) with
+    | Wire a => if existsb (fun v => existsb (Nat.eqb i) (takes (op v))) l then i else a
+    | _ => i
+    end) outputs.
+Fixpoint laid_out (inputs wires : list nat) (first : nat) (stages : layout) (rest : list node) : bool :=
+  match stages with
+  | [] => match rest with [] => true | _ => false end
+  | (size, outputs) :: others =>
+      let l := firstn size rest in
+      Nat.eqb (length l) size && same_places (inputs_in l) inputs && same_places (wires_in l) wires
+      && forallb (of_stage first (first + size)) l && forallb (fun o => Nat.ltb o size) outputs
+      && laid_out [] (handed_on first l outputs) (first + size) others (skipn size rest)
+  end.
+(* So every node can be computed, in the order of the list, and what the stages hand on is what the certificate says. *)
+Definition well_formed (g : graph) (ports : list (Z * Z)) (stages : layout) : bool :=
+  ordered g && every (fun _ v => low v <=? high v) 0 g && laid_out (seq 0 (length ports)) [] 0 stages g.
+Lemma well_formed_ordered g ports stages : well_formed g ports stages = true -> ordered g = true.
+Proof. unfold well_formed. intros H. apply andb_prop in H. destruct H as [H _]. apply andb_prop in H. apply H. Qed.
 
 (* Computing the rest appends to what is there. *)
 Lemma step_length g : forall rest now last inputs,
