@@ -53,7 +53,7 @@ def top_ports(design: ChainDesign) -> list[tuple[str, str, int]]:
         *_stream("s_axis", face.inputs, "input"),
         *_stream("m_axis", face.outputs, "output"),
         *(
-            (way, f"{_port_of(stage)}_{signal}", width)
+            (way, f"{registers_port(stage)}_{signal}", width)
             for stage in design.stages
             for way, signal, width in _registers(stage)
         ),
@@ -78,7 +78,7 @@ def top_text(design: ChainDesign) -> str:
         behind = "m_axis" if k == len(names) - 1 else name
         pins = {"aclk": "aclk", "aresetn": "aresetn"}
         pins |= _pins("s_axis", before, face.inputs) | _pins("m_axis", behind, face.outputs)
-        pins |= {f"s_axil_{signal}": f"{_port_of(stage)}_{signal}" for _, signal, _ in _registers(stage)}
+        pins |= {f"s_axil_{signal}": f"{registers_port(stage)}_{signal}" for _, signal, _ in _registers(stage)}
         if unit is not None and k == 0:
             pins["m_axis_tready"] = "gated_tready"
         if unit is not None and k == 1:
@@ -114,7 +114,8 @@ def _instance(module: str, name: str, pins: Mapping[str, str]) -> list[str]:
     return [f"  {module} {name} (", *(f"{row}," for row in rows[:-1]), rows[-1], "  );"]
 
 
-def _port_of(stage: StageDesign) -> str:
+def registers_port(stage: StageDesign) -> str:
+    """Prefix of the ports of a stage's registers."""
     return f"s_axil_{stage.spec.name}"
 
 

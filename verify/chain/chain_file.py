@@ -23,6 +23,13 @@ from sosmith.verify.certificate_file import (
     read_entries,
 )
 
+_MARK = b'"format": "sosmith chain certificate '
+
+
+def is_chain_certificate(content: bytes) -> bool:
+    """Say whether the content of a certificate file is that of a chain, by its begin."""
+    return _MARK in content[:100]
+
 
 class ChainStageEntry(Entry):
     """A stage: its certificate, its own error, and how much of that reaches the end at most."""

@@ -18,7 +18,7 @@ from sosmith.gen.chain.facts import chain_tables
 from sosmith.gen.chain.generate import chain_certificate, chain_manifest, generate_chain
 from sosmith.gen.chain.golden import chain_gain, golden_chain
 from sosmith.gen.facts.table import Table, View
-from sosmith.gen.fpga.boards import find_board
+from sosmith.gen.fpga.boards import BUILDABLE, PROJECTS, RATE, find_board
 from sosmith.interface.arrays import real_numbers
 from sosmith.interface.chain.specification import ChainSpecification
 from sosmith.interface.design import Codes, Design, Floats
@@ -28,6 +28,7 @@ from sosmith.model.arrays import side_by_side
 from sosmith.model.errors import SpecificationError, falling_short
 
 if TYPE_CHECKING:
+    from sosmith.interface.build import Build
     from sosmith.interface.certificate import Progress
     from sosmith.interface.chain.certificate import ChainCertificate
     from sosmith.interface.chain.reload import ChainReload
@@ -188,6 +189,56 @@ class Chain(View):
 
         named = None if vlnv is None else Vlnv.read(vlnv)
         return package_chain(self.core, Path(fspath(folder)), lambda step: progress(step, 0, 0), vlnv=named)
+
+    def build(
+        self,
+        board: str,
+        *,
+        folder: str | PathLike[str] | None = None,
+        rate: int = RATE,
+        progress: Progress = lambda step, done, total: None,
+    ) -> Build:
+        """Make a bitstream for a board, with the chain behind the serial link, which gets a result for each sample.
+
+        Parameters and errors are those of `Design.build`; a chain must not decimate several channels, and have at most
+        one stage with `reload`.
+        """
+        from sosmith.gen.chain.board import chain_item
+        from sosmith.gen.output.board_build import build_board
+        from sosmith.interface.build import Build
+
+        target = find_board(board, BUILDABLE)
+        place = Path("build") / self.name / target.name if folder is None else Path(fspath(folder))
+        built = build_board(chain_item(self.core), target, rate=rate, progress=lambda step: progress(step, 0, 0))
+        return Build.written(built, place)
+
+    def project(
+        self,
+        board: str,
+        *,
+        folder: str | PathLike[str] | None = None,
+        rate: int = RATE,
+        progress: Progress = lambda step, done, total: None,
+    ) -> dict[str, Any]:
+        """Write a project for the vendor's tools of a board; parameters and errors are those of `Design.project`."""
+        from sosmith.gen.chain.board import chain_item
+        from sosmith.gen.output.board_project import board_project
+
+        target = find_board(board, PROJECTS)
+        place = Path("build") / self.name / target.name if folder is None else Path(fspath(folder))
+        project = board_project(chain_item(self.core), target, rate=rate, progress=lambda step: progress(step, 0, 0))
+        project.write(place)
+        return project.summary
+
+    def cost_on(self, board: str, progress: Progress = lambda step, done, total: None) -> dict[str, Any]:
+        """Return what the chain takes of a board's FPGA, with the serial link: as `Design.cost_on`."""
+        from sosmith.gen.chain.board import chain_item
+        from sosmith.gen.output.board_build import board_cost
+        from sosmith.sim.build_cache import cache_folder
+
+        target, cache = find_board(board, BUILDABLE), cache_folder()
+        place = None if cache is None else cache.parent / "boards"
+        return board_cost(chain_item(self.core), target, place, lambda step: progress(step, 0, 0))
 
     def reload(
         self,
