@@ -8,7 +8,7 @@ from typing import Literal
 from pydantic import ValidationError
 
 from sosmith.gen.core import CoreDesign
-from sosmith.gen.output.board_item import BoardItem, item_of
+from sosmith.gen.fpga.board_item import BoardItem, item_of
 from sosmith.gen.version import __version__
 from sosmith.model.dataflow.status import Flag
 from sosmith.model.errors import SpecificationError
