@@ -6,7 +6,7 @@ import math
 
 from sosmith.gen.chain.design import ChainDesign, StageDesign
 from sosmith.gen.chain.top import chain_interface, registers_port, top_text
-from sosmith.gen.fpga.board_item import BoardItem
+from sosmith.gen.output.identity import BoardItem
 from sosmith.gen.output.verilog import core_verilog
 from sosmith.gen.reload.register_writes import bank_size
 from sosmith.hdl.boards.chain_core import ChainCore

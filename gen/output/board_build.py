@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from sosmith.gen.fpga.bitstream import Bitstream, build, fingerprint
-from sosmith.gen.fpga.board_item import item_of
 from sosmith.gen.fpga.boards import RATE, Board
 from sosmith.gen.fpga.platform_plan import SEED
 from sosmith.gen.output.board_top import Design, board_verilog, schedule_of, top_name, wiring_of
+from sosmith.gen.output.identity import item_of
 from sosmith.gen.version import __version__
 from sosmith.model.text_files import to_json, write_contents
 

@@ -7,10 +7,9 @@ from typing import Literal
 
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.fpga.audio_clock import audio_pll
-from sosmith.gen.fpga.board_item import BoardItem, item_of
 from sosmith.gen.fpga.boards import RATE, Board
 from sosmith.gen.fpga.wiring import PLAIN, Wiring
-from sosmith.gen.output.identity import identity
+from sosmith.gen.output.identity import BoardItem, identity, item_of
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.hdl.boards.board_top import BoardTop
 from sosmith.hdl.bus.command_engine import MAX_CHANNELS, MAX_READINGS, MAX_SAMPLE_BYTES

@@ -20,10 +20,10 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
-from sosmith.gen.fpga.board_item import item_of
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.fpga.synthesis import synthesize
 from sosmith.gen.output.board_top import Design, board_verilog, schedule_of, top_name
+from sosmith.gen.output.identity import item_of
 from sosmith.model.arrays import Codes
 from sosmith.model.converters.schedule import Schedule
 from sosmith.model.errors import SpecificationError, ToolError

@@ -11,9 +11,9 @@ import numpy as np
 
 from sosmith.gen.chain.board import chain_item
 from sosmith.gen.core import CoreDesign
-from sosmith.gen.fpga.board_item import BoardItem
 from sosmith.gen.fpga.boards import find_board
 from sosmith.gen.output.board_top import wiring_of
+from sosmith.gen.output.identity import BoardItem
 from sosmith.instrument.scenarios.traces import default_scenario, traces_for
 from sosmith.interface.certificate import Progress
 from sosmith.interface.chain.design import Chain
