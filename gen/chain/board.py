@@ -21,10 +21,14 @@ def chain_item(design: ChainDesign) -> BoardItem:
     Raises
     ------
     SpecificationError
-        If it decimates several channels, or more than one stage has registers.
+        If it interpolates, it decimates several channels, or more than one stage has registers.
     """
     spec, loaded = design.spec.base, _loaded(design)
     channels, factor = spec.channels, design.factor
+    if design.rise > 1:
+        raise SpecificationError(
+            f"{spec.path}: interpolate must be left out on a board, whose link returns one result for each sample"
+        )
     if factor > 1 and channels > 1:
         raise SpecificationError(
             f"{spec.path}: not yet available: channels must be 1 with stages that decimate on a board, not {channels}"
@@ -66,7 +70,7 @@ def chain_item(design: ChainDesign) -> BoardItem:
 
 def modules(design: ChainDesign) -> str:
     """SystemVerilog of the chain: its cores and its top, as `generate_chain` writes them."""
-    return "\n".join([*(core_verilog(stage.design) for stage in design.stages), top_text(design)])
+    return "\n".join([*(core_verilog(core) for stage in design.stages for core in stage.cores), top_text(design)])
 
 
 def _loaded(design: ChainDesign) -> StageDesign | None:
