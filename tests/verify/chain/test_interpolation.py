@@ -60,9 +60,9 @@ def test_all_of_a_chain_that_interpolates_is_proven(folder: Path) -> None:
 )
 def test_filters_of_all_kinds_are_proven(stages: list[dict[str, Any]], tmp_path: Path) -> None:
     tree = copy.deepcopy(TREE | {"stage": stages})
-    for stage in tree["stage"]:
-        stage |= {"passband_loss": 0.1, "stopband_loss": 40.0} if "passband_edge" in stage else {}
-    tree["stage"] = [{key: value for key, value in stage.items() if value is not None} for stage in tree["stage"]]
+    losses = {"passband_loss": 0.1, "stopband_loss": 40.0}
+    full = [stage | (losses if "passband_edge" in stage else {}) for stage in tree["stage"]]
+    tree["stage"] = [{key: value for key, value in stage.items() if value is not None} for stage in full]
     chain = sosmith.design_chain(tree)
     chain.generate(tmp_path)
     (tmp_path / "rx.toml").write_text(chain.specification.toml(), encoding="utf-8")
