@@ -5,6 +5,7 @@ A signal of up to 64 bits is a column of words; a wider one has several words fo
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -35,10 +36,15 @@ class Beats:
         """Count the transfers."""
         return len(self.tdata)
 
-    def results(self, samples: int, copies: int) -> int:
-        """Count what comes out: of each channel, for its first transfer and each group of `samples`, its copies."""
+    def results(self, samples: int, copies: int, rates: Sequence[Sequence[int]] = ()) -> int:
+        """Count what comes out: of each channel, for its first transfer and each group of `samples`, its copies.
+
+        With `rates`, those of a chain's stages, by how much each interpolates and decimates, in order.
+        """
         counts = np.bincount(self.tdest) if len(self) else np.zeros(0, dtype=np.int64)
-        return int((-(-counts // samples)).sum()) * copies
+        for rise, factor in rates:
+            counts = -(-counts * rise // factor)
+        return int((-(-counts // (1 if rates else samples))).sum()) * copies
 
     def first(self, count: int) -> Beats:
         """Return a view of the first `count` transfers, or of all if there are fewer."""

@@ -13,7 +13,7 @@ from sosmith.gen.output.core_facts import InterfaceFacts
 from sosmith.model.arrays import Codes
 from sosmith.model.errors import ShortfallError
 from sosmith.sim.bench import Bench, Progress
-from sosmith.sim.stream_packing import completing, each_once, pack, random_order, unpack
+from sosmith.sim.stream_packing import completing, each_once, following, pack, random_order, unpack
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,7 +101,9 @@ def cosimulate(
     samples, channels, _ = codes.shape
     order = random_order(samples, channels, seed)
     run = bench.run(pack(codes, order, interface.inputs), progress)
-    if interface.samples_per_result > 1:
+    if interface.rates:
+        order = following(order, interface.rates)
+    elif interface.samples_per_result > 1:
         order = completing(order, interface.samples_per_result)
     result, status = unpack(each_once(run.received, interface.copies_per_result), order, interface.outputs)
     return CosimulationResult(

@@ -93,7 +93,7 @@ class SimulatorBench:
             _run(
                 plain,
                 tool,
-                sent.results(self.interface.samples_per_result, self.interface.copies_per_result),
+                sent.results(self.interface.samples_per_result, self.interface.copies_per_result, self.interface.rates),
                 progress,
             )
         outcome = json.loads((folder / "result.json").read_text(encoding="utf-8"))
@@ -143,6 +143,7 @@ class SimulatorBench:
             "reset_cycles": self.interface.reset_cycles,
             "samples_per_result": self.interface.samples_per_result,
             "copies_per_result": self.interface.copies_per_result,
+            "rates": self.interface.rates,
             "tdata_bits": self.interface.outputs.width,
             "tuser_bits": self.interface.outputs.user_width,
         }

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 
@@ -38,6 +40,16 @@ def completing(order: Order, samples: int) -> Order:
     """Return the channels of the results, of which a channel's first sample brings one, and each further group."""
     completed: Order = order[_turns(order) % samples == 0]
     return completed
+
+
+def following(order: Order, rates: Sequence[tuple[int, int]]) -> Order:
+    """Return the channels of the results of a chain, whose stages interpolate and decimate by `rates`, in order."""
+    turns = _turns(order)
+    through, before = turns + 1, turns
+    for rise, factor in rates:
+        through, before = (-(-each * rise // factor) for each in (through, before))
+    followed: Order = np.repeat(order, through - before)
+    return followed
 
 
 def pack(codes: Codes, order: Order, stream: StreamFacts) -> Beats:

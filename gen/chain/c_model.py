@@ -14,10 +14,12 @@ def _steps(stage: StageDesign) -> bool:
 def chain_header(design: ChainDesign) -> str:
     """Text of ``<name>.h``."""
     name = design.name
-    includes = "".join(f'#include "{stage.design.datapath.name}.h"\n' for stage in design.stages)
+    cores = [core for stage in design.stages for core in stage.cores]
+    includes = "".join(f'#include "{core.datapath.name}.h"\n' for core in cores)
     states = "".join(
-        f"    {stage.design.datapath.name}_{'state' if _steps(stage) else 'decimator'} stage_{stage.spec.name};\n"
+        f"    {core.datapath.name}_{'state' if _steps(stage) else 'decimator'} {state};\n"
         for stage in design.stages
+        for core, state in zip(stage.cores, _states(stage), strict=True)
     )
     return f"""/* {name}: bit-true model of the generated hardware, made by sosmith. */
 #ifndef {name.upper()}_H
@@ -35,8 +37,7 @@ typedef struct {{
 /* Put one channel into the state after reset. */
 void {name}_reset({name}_state *state);
 
-/* Take one sample. Return 1 if it brings a result, which the first does and then every {design.factor}-th, and 0
- * otherwise; status may be NULL. */
+{_said(design)}
 int {name}_push({name}_state *state, {_taken(design)}, int64_t *result, uint8_t *status);
 
 #ifdef __cplusplus
@@ -47,9 +48,89 @@ int {name}_push({name}_state *state, {_taken(design)}, int64_t *result, uint8_t 
 """
 
 
+def _states(stage: StageDesign) -> list[str]:
+    """Names of the states of a stage's cores."""
+    name = f"stage_{stage.spec.name}"
+    return [name] if len(stage.cores) == 1 else [f"{name}_p{k}" for k in range(len(stage.cores))]
+
+
+def _said(design: ChainDesign) -> str:
+    """Say what a call gives."""
+    if design.rise == 1:
+        first = f"Return 1 if it brings a result, which the first does and then every {design.factor}-th, and 0"
+        return f"/* Take one sample. {first}\n * otherwise; status may be NULL. */"
+    return f"""/* Most results that a sample brings. */
+#define {design.name.upper()}_RESULTS {most_results(design)[-1]}
+
+/* Take one sample. Return how many results it brings; result and status have room for these, or status is NULL. */"""
+
+
+def most_results(design: ChainDesign) -> list[int]:
+    """Return how many results of each stage a sample brings at most."""
+    most, counts = 1, []
+    for rise, factor in design.rates:
+        most = -(-most * rise // factor)
+        counts.append(most)
+    return counts
+
+
+def _rising(design: ChainDesign) -> list[str]:
+    """Return the body of the function of a chain that interpolates: the results of a stage lie in an array."""
+    most, (first, *later) = most_results(design), design.stages
+    given = ", ".join(f"{port.name}_code" for port in design.spec.base.inputs)
+    names = [stage.spec.name for stage in design.stages]
+    lines = [f"int64_t {', '.join(f'at_{name}[{count}]' for name, count in zip(names, most, strict=True))};"]
+    lines += [f"int {', '.join(f'count_{name} = 0' for name in names)}, total = 0, i, k;"]
+    lines += [f"uint8_t first[{most[0]}], last[{most[-1]}], flags;"]
+    lines += _appended(first, given, "first")
+    lines += [f"for (i = 0; i < count_{names[0]}; i++) {{"]
+    if not later:
+        lines += _indented(["last[i] = first[i];", "flags = 0;", *_handed_out(names[0], "i")])
+        return [*lines, "}", "return total;"]
+    inner = [f"state->kept |= first[i] & {(1 << design.carried_flags) - 1};"]
+    for stage, before in zip(later, names, strict=False):
+        told = "last" if stage is later[-1] else ""
+        inner += [f"count_{stage.spec.name} = 0;"]
+        if before == names[0]:
+            inner += _appended(stage, f"at_{before}[i]", told)
+        else:
+            loop = _indented(_appended(stage, f"at_{before}[k]", told))
+            inner += [f"for (k = 0; k < count_{before}; k++) {{", *loop, "}"]
+    inner += [f"if (count_{names[-1]} == 0)", "    continue;", "flags = state->kept;", "state->kept = 0;"]
+    if design.settling:
+        young = _indented(["state->results++;", f"flags |= {1 << Flag.SETTLING};"])
+        inner += [f"if (state->results < {design.settling_entries}) {{", *young, "}"]
+    inner += [f"for (k = 0; k < count_{names[-1]}; k++) {{", *_indented(_handed_out(names[-1], "k")), "}"]
+    return [*lines, *_indented(inner), "}", "return total;"]
+
+
+def _appended(stage: StageDesign, code: str, told: str) -> list[str]:
+    """Let the cores of a stage take a value, whose results are appended to its array."""
+    name, lines = stage.spec.name, list[str]()
+    place, count = f"at_{name}[count_{name}]", f"count_{name}"
+    status = f"&{told}[{count}]" if told else "NULL"
+    for core, state in zip(stage.cores, _states(stage), strict=True):
+        if _steps(stage):
+            lines += [f"{place} = {core.datapath.name}_step(&state->{state}, {code}, {status});", f"{count}++;"]
+        else:
+            lines += [f"{count} += {core.datapath.name}_push(&state->{state}, {code}, &{place}, {status});"]
+    return lines
+
+
+def _handed_out(name: str, index: str) -> list[str]:
+    """Hand out a result with its flags."""
+    flags = ["if (status)", f"    status[total] = last[{index}] | flags;"]
+    return [f"result[total] = at_{name}[{index}];", *flags, "total++;"]
+
+
+def _indented(lines: list[str]) -> list[str]:
+    return [f"    {line}" for line in lines]
+
+
 def chain_source(design: ChainDesign) -> str:
     """Text of ``<name>.c``."""
-    name = design.name
+    if design.rise > 1:
+        return _source(design, "".join(f"{line}\n" for line in _indented(_rising(design))))
     lines = [] if len(design.stages) == 1 else ["    uint8_t flags;\n"]
     given = ", ".join(f"{port.name}_code" for port in design.spec.base.inputs)
     for stage in design.stages:
@@ -63,6 +144,11 @@ def chain_source(design: ChainDesign) -> str:
             lines.append(f"    state->kept |= flags & {(1 << design.carried_flags) - 1};\n")
         given = "*result"
     lines += _gathered(design)
+    return _source(design, f"{''.join(lines)}    return 1;\n")
+
+
+def _source(design: ChainDesign, body: str) -> str:
+    name = design.name
     return f"""/* {name}: bit-true model of the generated hardware, made by sosmith. */
 #include "{name}.h"
 
@@ -75,8 +161,7 @@ void {name}_reset({name}_state *state)
 
 int {name}_push({name}_state *state, {_taken(design)}, int64_t *result, uint8_t *status)
 {{
-{"".join(lines)}    return 1;
-}}
+{body}}}
 """
 
 

@@ -11,21 +11,24 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
+from math import prod
 
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.gen.chain.response import Part, cic, factor_of, folding_gain, gain_into_passband, peak_gain
+from sosmith.gen.chain.rates import Pattern, Rate, gathered, pattern_of
+from sosmith.gen.chain.response import Part, Segment, cic, folding_gain, gain_into_passband, peak_gain, segments_of
 from sosmith.gen.chain.specification import ANY_INPUT, ANY_OUTPUT, ChainSpec, StageSpec
 from sosmith.gen.core import CoreDesign, design_core, polynomial_of, response_of
+from sosmith.gen.filter.design import Filter
+from sosmith.gen.filter.exact_form import Exact
 from sosmith.gen.filter.largest_gain import Peak
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.specification.specification import Specification
 from sosmith.gen.word_lengths.selection import Progress
 from sosmith.model.arrays import Codes
-from sosmith.model.dataflow.downsampler import gathered
 from sosmith.model.dataflow.status import Flag
-from sosmith.model.errors import ShortfallError
+from sosmith.model.errors import ShortfallError, SpecificationError
 from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
 from sosmith.verify.certificate_file import on_grid
@@ -51,8 +54,8 @@ class StageDesign:
     ----------
     spec : StageSpec
         What was asked for.
-    design : CoreDesign
-        Its core, proven by itself.
+    cores : tuple of CoreDesign
+        Its core, proven by itself; of a stage that interpolates, one for each of the results of a sample.
     parts : tuple of Part
         Its exact response; empty for a polynomial, which has none.
     gain : Fraction
@@ -62,10 +65,20 @@ class StageDesign:
     """
 
     spec: StageSpec
-    design: CoreDesign
+    cores: tuple[CoreDesign, ...]
     parts: tuple[Part, ...]
     gain: Fraction
     reach: Fraction
+
+    @property
+    def design(self) -> CoreDesign:
+        """Its core, or that of its first results: all have the same streams."""
+        return self.cores[0]
+
+    @property
+    def rate(self) -> Rate:
+        """By how much it interpolates and decimates."""
+        return Rate(len(self.cores), self.design.datapath.samples_per_result)
 
     @property
     def output(self) -> Port:
@@ -75,12 +88,43 @@ class StageDesign:
     @property
     def bound(self) -> Fraction:
         """Bound on its own error, in the unit of its output."""
-        return self.design.quantized.bound * self.output.lsb
+        return max(core.quantized.bound for core in self.cores) * self.output.lsb
 
     @property
     def share(self) -> Fraction:
         """What it adds to the chain's bound, in the unit of the output."""
         return self.bound * self.gain
+
+    def compute_with_status(self, codes: Codes) -> tuple[Codes, npt.NDArray[np.uint8]]:
+        """Compute codes and flags of the results, shape (results, channels), of codes (samples, channels, inputs)."""
+        results = [core.datapath.compute_with_status(codes) for core in self.cores]
+        if len(results) == 1:
+            return results[0]
+        shape = (len(codes) * len(results), codes.shape[1])
+        values, status = (np.stack(each, axis=1).reshape(shape) for each in zip(*results, strict=True))
+        return values, status
+
+
+@dataclass(frozen=True, kw_only=True)
+class Folding:
+    """What a segment of a chain makes of a sine at other frequencies.
+
+    Attributes
+    ----------
+    segment : Segment
+    anywhere : Peak
+        Largest gain of anything that comes out at another frequency than it went in; frequencies are in units of the
+        highest rate.
+    edge : Fraction or None
+        Upper edge of the pass band in these units; None if no stage states one, or it is above half a rate.
+    passing : Peak or None
+        Largest gain of what went in, or comes out, in the pass band; None without one.
+    """
+
+    segment: Segment
+    anywhere: Peak
+    edge: Fraction | None
+    passing: Peak | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,29 +150,37 @@ class ChainDesign:
         return tuple(part for stage in self.stages for part in stage.parts)
 
     @property
-    def factor(self) -> int:
-        """Samples of a channel for each result."""
-        return factor_of(self.parts)
+    def rates(self) -> tuple[Rate, ...]:
+        """By how much each stage interpolates and decimates."""
+        return tuple(stage.rate for stage in self.stages)
 
     @property
-    def edge(self) -> Fraction | None:
-        """Upper edge of the pass band in units of the sample rate; None if no stage states one, or it would fold."""
-        edge = self.spec.edge
-        if edge is None or 2 * edge * self.factor > self.spec.base.sample_rate:
-            return None
-        return edge / self.spec.base.sample_rate
+    def pattern(self) -> Pattern:
+        """Which samples of the first stage's output bring results."""
+        return pattern_of(self.rates[1:])
+
+    @property
+    def factor(self) -> int:
+        """By how much the chain decimates: samples of a channel for each result, if no stage interpolates."""
+        return prod(rate.factor for rate in self.rates)
+
+    @property
+    def rise(self) -> int:
+        """By how much it interpolates: results for each sample, if no stage decimates."""
+        return prod(rate.rise for rate in self.rates)
 
     @cached_property
-    def folding(self) -> Peak | None:
-        """Largest gain of a frequency that folds; None if none does."""
-        return folding_gain(self.parts) if self.factor > 1 else None
+    def foldings(self) -> tuple[Folding, ...]:
+        """What each segment makes of a sine at other frequencies; empty if no stage changes the rate."""
+        segments = segments_of(self.parts)
+        return tuple(self._folding(each) for each in segments if each.rise > 1 or each.factor > 1)
 
-    @cached_property
-    def passing(self) -> Peak | None:
-        """Largest gain of one that folds into the pass band; None without a pass band."""
-        if self.edge is None or self.factor == 1:
-            return None
-        return gain_into_passband(self.parts, self.edge)
+    def _folding(self, segment: Segment) -> Folding:
+        edge = None if self.spec.edge is None else self.spec.edge / self.spec.base.sample_rate / segment.highest
+        if edge is not None and 2 * edge * max(segment.rise, segment.factor) > 1:
+            edge = None
+        passing = None if edge is None else gain_into_passband(segment, edge)
+        return Folding(segment=segment, anywhere=folding_gain(segment), edge=edge, passing=passing)
 
     @property
     def carried_flags(self) -> int:
@@ -139,12 +191,25 @@ class ChainDesign:
 
     @property
     def settling(self) -> int:
-        """Results of a channel that are flagged as settling: until all stages have settled, one after the other."""
-        samples, step = 0, 1
+        """Results of a channel that are flagged as settling: until all stages have settled, one after the other.
+
+        All results that come with the same sample of the first stage's output are flagged, or none.
+        """
+        return self._settled if len(self.stages) == 1 else self.pattern.entries(self._settled)[1]
+
+    @property
+    def settling_entries(self) -> int:
+        """Of the samples of the first stage's output that bring results, those whose results are flagged."""
+        return self.pattern.entries(self._settled)[0]
+
+    @property
+    def _settled(self) -> int:
+        """Number of the first result for which all stages have settled."""
+        settled = 0
         for stage in self.stages:
-            samples += stage.design.quantized.settling * step
-            step *= stage.design.datapath.samples_per_result
-        return -(-samples // step)
+            settled += max(core.quantized.settling for core in stage.cores)
+            settled = -(-settled * stage.rate.rise // stage.rate.factor)
+        return settled
 
     def compute(self, codes: Codes) -> Codes:
         """Compute the output codes of input codes, bit for bit as the hardware does.
@@ -167,14 +232,13 @@ class ChainDesign:
         *early, last = self.stages
         gathering = np.zeros((len(codes), codes.shape[1]), dtype=np.uint8)
         for stage in early:
-            codes, status = stage.design.datapath.compute_with_status(codes)
+            codes, status = stage.compute_with_status(codes)
             codes = codes[:, :, None]
             if stage is early[0]:
                 gathering = status & np.uint8((1 << self.carried_flags) - 1)
-        results, status = last.design.datapath.compute_with_status(codes)
+        results, status = last.compute_with_status(codes)
         if early:
-            factor = self.factor // early[0].design.datapath.samples_per_result
-            columns = [gathered(gathering[:, k], factor) for k in range(gathering.shape[1])]
+            columns = [gathered(gathering[:, k], self.rates[1:]) for k in range(gathering.shape[1])]
             status = status | np.stack(columns, axis=1)
             status[: self.settling] |= np.uint8(1 << Flag.SETTLING)
         return results, status
@@ -229,9 +293,30 @@ class _Budget:
         response, _ = response_of(spec, "filter", self.progress)
         assert response.ideal is not None
         sections, pre_stage = response.ideal.exact, response.pre_stage
+        if stage.rise > 1:
+            return (Part((self._between(stage, sections),), 1, stage.rise),)
         if pre_stage is None:
             return (Part(sections, response.factor),)
         return cic(pre_stage.decimator.factor, pre_stage.decimator.stages), Part(sections)
+
+    def _between(self, stage: StageSpec, sections: tuple[Exact, ...]) -> Exact:
+        """Return the filter that fills in between samples: as given, or with the gain of the stage restored.
+
+        Raises
+        ------
+        SpecificationError
+            If a phase of it has no tap.
+        """
+        ((taps, under),) = sections
+        if not stage.given_taps:
+            taps = tuple(tap * stage.rise for tap in taps)
+        for phase in range(stage.rise):
+            if not any(taps[phase :: stage.rise]):
+                raise SpecificationError(
+                    f"{self.spec.base.path}: stage {stage.name}: taps {phase}, {phase + stage.rise}, .. must not all "
+                    f"be 0, as one result in {stage.rise} would be"
+                )
+        return taps, under
 
     def _first_shares(self, parts: Sequence[tuple[Part, ...]]) -> _Shares:
         gains = gains_to_the_end(parts)
@@ -261,12 +346,19 @@ class _Budget:
             own = parts[k]
             carried = error * peak_gain(own) if own else Fraction(0)
             output = self.last if is_last else self._port(stage, shares.steps[k], reach + carried + allowed)
-            design = self._core(stage.ordinary(self.spec, inputs, output, allowed), stage)
-            stages.append(StageDesign(spec=stage, design=design, parts=own, gain=gains[k], reach=reach))
+            specs = [stage.ordinary(self.spec, inputs, output, allowed)]
+            if stage.rise > 1:
+                taps = stage.given_taps or own[0].sections[0][0]
+                specs = [
+                    stage.phase(self.spec, phase, taps[phase :: stage.rise], inputs, output, allowed)
+                    for phase in range(stage.rise)
+                ]
+            cores = tuple(self._core(spec, stage) for spec in specs)
+            stages.append(StageDesign(spec=stage, cores=cores, parts=own, gain=gains[k], reach=reach))
             inputs, error = (replace(output, name=ANY_INPUT.name),), carried + stages[-1].bound
             left -= stages[-1].share
         chain = ChainDesign(spec=self.spec, stages=tuple(stages))
-        now = [_parts_of(stage.design) for stage in stages]
+        now = [_parts_of(stage) for stage in stages]
         return chain if now == list(parts) else self._chain(shares, now)
 
     def _port(self, stage: StageSpec, step: Fraction, reach: Fraction) -> Port:
@@ -326,15 +418,28 @@ def reach_behind(spec: ChainSpec, parts: Sequence[tuple[Part, ...]]) -> Fraction
     return largest * on_grid(peak_gain(whole)) if whole else largest
 
 
-def _parts_of(design: CoreDesign) -> tuple[Part, ...]:
-    """Return the exact response of a design."""
-    quantized, datapath = design.quantized, design.datapath
+def _parts_of(stage: StageDesign) -> tuple[Part, ...]:
+    """Return the exact response of what was designed."""
+    quantized, datapath = stage.design.quantized, stage.design.datapath
     if quantized.filter is None:
         return ()
+    if len(stage.cores) > 1:
+        return (Part((_turns([core.quantized.filter for core in stage.cores]),), 1, len(stage.cores)),)
     decimator = datapath.decimator
     if decimator is not None:
         return cic(decimator.factor, decimator.stages), Part(quantized.filter.exact)
     return (Part(quantized.filter.exact, datapath.samples_per_result),)
+
+
+def _turns(filters: Sequence[Filter | None]) -> Exact:
+    """Return the filter whose phases are these."""
+    phases = [filter_.exact[0][0] for filter_ in filters if filter_ is not None]
+    taps = [Fraction(0)] * (len(phases) * max(map(len, phases)))
+    for k, phase in enumerate(phases):
+        taps[k : k + len(phases) * len(phase) : len(phases)] = phase
+    while not taps[-1]:
+        taps.pop()
+    return tuple(taps), (Fraction(1),)
 
 
 def polynomial_reach(polynomial: Polynomial, inputs: Sequence[Port]) -> Fraction:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from fractions import Fraction
 
-from sosmith.gen.chain.design import ChainDesign
+from sosmith.gen.chain.design import ChainDesign, Folding
+from sosmith.gen.chain.response import Segment
+from sosmith.gen.core import CoreDesign
 from sosmith.gen.facts.design_tables import ErrorUnit
 from sosmith.gen.facts.table import Fact, Table
 from sosmith.gen.filter.largest_gain import Peak
@@ -17,29 +19,34 @@ def chain_tables(design: ChainDesign) -> list[Table]:
     tables = [_stages(design), _budget(design)]
     if design.settling:
         tables.append(_start(design))
-    if design.folding is not None:
-        tables.append(_folding(design, design.folding))
+    tables += [_folding(design, each) for each in design.foldings]
     return tables
 
 
 def _stages(design: ChainDesign) -> Table:
     rows = []
     for stage in design.stages:
-        architecture, datapath = stage.design.architecture, stage.design.datapath
-        factor, quantized = datapath.samples_per_result, stage.design.quantized
-        hardware = f"{architecture.name} {quantized.realization if quantized.sections else ''}".rstrip()
+        architectures = [core.architecture for core in stage.cores]
+        rise, factor = stage.rate
+        multipliers = sum(architecture.multiplier_blocks for architecture in architectures)
         rows.append(
             (
                 stage.spec.name,
                 f"{stage.spec.kind} at {_frequency(stage.spec.rate)}"
-                + (f", decimates by {factor}" if factor > 1 else ""),
-                f"{hardware}, {count(architecture.multiplier_blocks, 'multiplier')}",
-                plain_number(float(architecture.clocks_per_sample)),
+                + (f", decimates by {factor}" if factor > 1 else "")
+                + (f", interpolates by {rise}" if rise > 1 else ""),
+                f"{', '.join(dict.fromkeys(map(_hardware, stage.cores)))}, {count(multipliers, 'multiplier')}",
+                plain_number(float(max(rise, *(each.clocks_per_sample for each in architectures), 0))),
                 str(stage.output.bits),
             )
         )
     head = ("stage", "what it is", "hardware", "clocks a sample", "bits out")
     return Table(f"{design.name}: stages", rows, head, numbers=(3, 4))
+
+
+def _hardware(core: CoreDesign) -> str:
+    realization = core.quantized.realization if core.quantized.sections else ""
+    return f"{core.architecture.name} {realization}".rstrip()
 
 
 def _budget(design: ChainDesign) -> Table:
@@ -67,7 +74,7 @@ def _budget(design: ChainDesign) -> Table:
 
 
 def _start(design: ChainDesign) -> Table:
-    seconds = quantity(float(design.settling * design.factor / design.spec.base.sample_rate), "s")
+    seconds = quantity(float(design.settling / design.spec.last_rate), "s")
     return Table(
         "Start from zero",
         [
@@ -80,29 +87,37 @@ def _start(design: ChainDesign) -> Table:
     )
 
 
-def _folding(design: ChainDesign, folding: Peak) -> Table:
-    rate = design.spec.base.sample_rate
-    rows = [
-        Fact(
-            "Input samples for each result",
-            str(design.factor),
-            sentence=f"output rate {_frequency(rate / design.factor)}",
-        ),
-        Fact(
-            f"From above {_frequency(rate / (2 * design.factor))}",
-            _decibels(folding),
-            sentence=f"reached at {_frequency(folding.at * rate)}",
-        ),
-    ]
-    if design.passing is not None and design.spec.edge is not None:
+def _folding(design: ChainDesign, folding: Folding) -> Table:
+    segment, rate = folding.segment, design.spec.base.sample_rate
+    highest = rate * segment.highest
+    ends = rate * segment.rate, highest / segment.factor
+    from_to = f"gain from {_frequency(ends[0])} to {_frequency(ends[1])}"
+    way = "end-to-end gain" if len(design.foldings) == 1 else from_to
+    reached = f"reached at {_frequency(folding.anywhere.at * highest)}"
+    rows = []
+    if segment.rise > 1:
+        what = "Images" if segment.factor == 1 else "Images and aliases"
+        text = f"to {_frequency(highest)}; output rate {_frequency(ends[1])}" if segment.factor > 1 else ""
+        text = text or f"output rate {_frequency(ends[1])}"
+        rows.append(Fact("Results for each input sample", _ratio(segment), sentence=text))
+    else:
+        what = "Aliasing"
+        text = f"output rate {_frequency(ends[1])}"
+        rows.append(Fact("Input samples for each result", str(segment.factor), sentence=text))
+    edge = _frequency(min(ends) / 2)
+    above = f"From above {edge}" if segment.rise == 1 else f"Above {edge}"
+    rows.append(Fact(above, _decibels(folding.anywhere), sentence=reached))
+    if folding.passing is not None and design.spec.edge is not None:
+        at = f"reached at {_frequency(folding.passing.at * highest)}"
+        into = "Into" if segment.rise == 1 else "Of" if segment.factor == 1 else "Of or into"
         rows.append(
-            Fact(
-                f"Into the pass band, up to {_frequency(design.spec.edge)}",
-                _decibels(design.passing),
-                sentence=f"reached at {_frequency(design.passing.at * rate)}",
-            )
+            Fact(f"{into} the pass band, up to {_frequency(design.spec.edge)}", _decibels(folding.passing), sentence=at)
         )
-    return Table("Aliasing: largest end-to-end gain, proven", rows)
+    return Table(f"{what}: largest {way}, proven", rows)
+
+
+def _ratio(segment: Segment) -> str:
+    return str(segment.rise) if segment.factor == 1 else f"{segment.rise} / {segment.factor}"
 
 
 def _decibels(peak: Peak) -> str:

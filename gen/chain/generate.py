@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from sosmith.gen.chain.c_model import chain_header, chain_source
-from sosmith.gen.chain.design import ChainDesign
+from sosmith.gen.chain.design import ChainDesign, Folding
 from sosmith.gen.chain.top import chain_interface, top_text
 from sosmith.gen.filter.largest_gain import Peak
 from sosmith.gen.output.certificate import certificate, port_entry
@@ -25,6 +25,9 @@ from sosmith.verify.chain.chain_file import (
     LargestEntry,
     sealed_chain,
 )
+
+Claims = list[tuple[Certificate, ...]]
+"""The certificates of the cores of each stage."""
 
 Progress = Callable[[str], None]
 
@@ -46,9 +49,10 @@ def chain_texts(design: ChainDesign, progress: Progress = lambda step: None) -> 
     """Return the texts that `generate_chain` writes, by the names of the files."""
     name, texts, claims = design.name, dict[str, str](), _claims(design)
     for stage, proven in zip(design.stages, claims, strict=True):
-        progress(f"stage {stage.spec.name}")
-        texts |= generated(stage.design, claims=proven)
-        texts[f"{proven.name}.toml"] = stage.design.spec.text
+        for core, each in zip(stage.cores, proven, strict=True):
+            progress(f"stage {stage.spec.name}")
+            texts |= generated(core, claims=each)
+            texts[f"{each.name}.toml"] = core.spec.text
     own = {
         f"{name}.sv": top_text(design),
         f"{name}.json": to_json(_manifest(design, claims)),
@@ -64,9 +68,9 @@ def chain_manifest(design: ChainDesign) -> dict[str, Any]:
     return _manifest(design, _claims(design))
 
 
-def _manifest(design: ChainDesign, claims: Sequence[Certificate]) -> dict[str, Any]:
+def _manifest(design: ChainDesign, claims: Claims) -> dict[str, Any]:
     """Return the manifest of a chain whose stages have these claims."""
-    errors = [proven.claims.bound * proven.output.lsb for proven in claims]
+    errors = list(map(_error, claims))
     shares = [error * stage.gain for error, stage in zip(errors, design.stages, strict=True)]
     interface = chain_interface(design)
     return {
@@ -80,14 +84,16 @@ def _manifest(design: ChainDesign, claims: Sequence[Certificate]) -> dict[str, A
             {
                 "name": stage.spec.name,
                 "kind": stage.spec.kind,
-                "core": stage.design.datapath.name,
-                "architecture": stage.design.architecture.name,
-                "decimate": stage.design.datapath.samples_per_result,
+                "cores": [core.datapath.name for core in stage.cores],
+                "architectures": [core.architecture.name for core in stage.cores],
+                "interpolate": stage.rate.rise,
+                "decimate": stage.rate.factor,
                 "error_bound": float(error),
                 "gain_to_the_end": float(stage.gain),
             }
             for stage, error in zip(design.stages, errors, strict=True)
         ],
+        "interpolate": design.rise,
         "decimate": design.factor,
         "settling_results": design.settling,
         "error_bound": float(sum(shares, Fraction(0))),
@@ -99,20 +105,25 @@ def _manifest(design: ChainDesign, claims: Sequence[Certificate]) -> dict[str, A
 def chain_certificate(design: ChainDesign) -> ChainCertificate:
     """Certify a chain before its files are written."""
     claims = _claims(design)
-    texts = {f"{proven.name}.certificate.json": entries_text(proven) for proven in claims}
+    texts = {f"{each.name}.certificate.json": entries_text(each) for proven in claims for each in proven}
     return _certified(design, claims, texts, {})
 
 
-def _claims(design: ChainDesign) -> list[Certificate]:
-    """Certify the stages one by one."""
+def _claims(design: ChainDesign) -> Claims:
+    """Certify the cores of the stages one by one."""
     return [
-        certificate(core.quantized, core.spec.max_error, online=core.architecture.online)
-        for core in (stage.design for stage in design.stages)
+        tuple(certificate(core.quantized, core.spec.max_error, online=core.architecture.online) for core in stage.cores)
+        for stage in design.stages
     ]
 
 
+def _error(proven: Sequence[Certificate]) -> Fraction:
+    """Bound on the error of a stage, that of its worst core."""
+    return max(each.claims.bound for each in proven) * proven[0].output.lsb
+
+
 def _certified(
-    design: ChainDesign, claims: Sequence[Certificate], texts: Mapping[str, str], own: Mapping[str, str]
+    design: ChainDesign, claims: Claims, texts: Mapping[str, str], own: Mapping[str, str]
 ) -> ChainCertificate:
     """Certify a chain whose stages have these claims, and whose files have these texts."""
     base = design.spec.base
@@ -120,8 +131,10 @@ def _certified(
         ChainStageEntry(
             name=stage.spec.name,
             kind=stage.spec.kind,
-            certificate=_file(f"{proven.name}.certificate.json", texts[f"{proven.name}.certificate.json"]),
-            error=proven.claims.bound * proven.output.lsb,
+            certificates=tuple(
+                _file(f"{each.name}.certificate.json", texts[f"{each.name}.certificate.json"]) for each in proven
+            ),
+            error=_error(proven),
             gain=stage.gain,
         )
         for stage, proven in zip(design.stages, claims, strict=True)
@@ -138,22 +151,20 @@ def _certified(
             stages=entries,
             bound=sum((entry.error * entry.gain for entry in entries), Fraction(0)),
             settling=design.settling,
-            folding=_folding(design),
+            folding=tuple(map(_folding, design.foldings)),
             files=tuple(_file(name, text) for name, text in own.items()),
             certificate="0" * 64,
         )
     )
 
 
-def _folding(design: ChainDesign) -> FoldingEntry | None:
-    if design.folding is None:
-        return None
-    passing = design.passing
+def _folding(folding: Folding) -> FoldingEntry:
     return FoldingEntry(
-        factor=design.factor,
-        anywhere=_largest(design.folding),
-        edge=None if passing is None else design.edge,
-        passing=None if passing is None else _largest(passing),
+        rise=folding.segment.rise,
+        factor=folding.segment.factor,
+        anywhere=_largest(folding.anywhere),
+        edge=folding.edge,
+        passing=None if folding.passing is None else _largest(folding.passing),
     )
 
 

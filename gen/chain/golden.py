@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sosmith.gen.chain.design import ChainDesign, StageDesign
+from sosmith.gen.core import CoreDesign
 from sosmith.model.arithmetic.recursive_filters import dc_gain, sosfilt
 from sosmith.model.arrays import Codes, Values
 from sosmith.model.dataflow.decimator import impulse_response
@@ -38,7 +39,14 @@ def _filtered(stage: StageDesign, values: Values) -> Values:
 
     Before a start from the steady state, the first value was there for ever; before one from zero, there was 0.
     """
-    quantized, datapath = stage.design.quantized, stage.design.datapath
+    if len(stage.cores) > 1:
+        phases = [_of_core(core, values) for core in stage.cores]
+        return np.stack(phases, axis=1).reshape(-1)
+    return _of_core(stage.design, values)
+
+
+def _of_core(core: CoreDesign, values: Values) -> Values:
+    quantized, datapath = core.quantized, core.datapath
     if quantized.filter is None:
         return values
     decimator = datapath.decimator
@@ -49,27 +57,34 @@ def _filtered(stage: StageDesign, values: Values) -> Values:
         before = np.concatenate([np.full(len(taps) - 1, values[0]), values])
         values = np.asarray(np.convolve(before, taps, mode="valid")[:: decimator.factor], dtype=np.float64)
     sos = quantized.filter.sos
-    initial: float = values[0] if stage.design.spec.hardware.start == "steady" else 0.0
+    initial: float = values[0] if core.spec.hardware.start == "steady" else 0.0
     results = sosfilt(sos, values - initial, np.zeros((len(sos), sos.shape[1] // 2 - 1)))
     results = results + dc_gain(sos) * initial
     return results if decimator is not None else np.asarray(results[:: datapath.samples_per_result])
 
 
 def stage_gain(stage: StageDesign, frequency: Values) -> Values:
-    """Magnitude of a stage's gain for sines at the chain's input, in Hz: they reach it folded by the stages before."""
-    return np.asarray(np.abs(_complex(stage, frequency / float(stage.spec.rate))), dtype=np.float64)
+    """Magnitude of a stage's gain for sines in Hz: those at its input reach it folded by the stages before, if any.
+
+    Of a stage that interpolates, they are those at its output, images of what comes in included.
+    """
+    return np.asarray(np.abs(_complex(stage, frequency / float(stage.spec.filter_rate))), dtype=np.float64)
 
 
 def chain_gain(design: ChainDesign, frequency: Values) -> npt.NDArray[np.complex128]:
-    """Complex gain from sines at the input, in Hz, to what comes out of them, without any rounding."""
+    """Complex gain at sines of the highest rate, in Hz, without any rounding.
+
+    Without stages that interpolate, that is the rate of the input. With some, a sine of up to half that rate is
+    filtered as it is, and others are its images.
+    """
     total = np.ones(frequency.shape, dtype=np.complex128)
     for stage in design.stages:
-        total = total * _complex(stage, frequency / float(stage.spec.rate))
+        total = total * _complex(stage, frequency / float(stage.spec.filter_rate))
     return total
 
 
 def _complex(stage: StageDesign, turns: Values) -> npt.NDArray[np.complex128]:
-    total, step = np.ones(turns.shape, dtype=np.complex128), 1
+    total, step = np.ones(turns.shape, dtype=np.complex128) / stage.rate.rise, 1
     for part in stage.parts:
         u = np.exp(-2j * np.pi * turns * step)
         for numerator, denominator in part.sections:

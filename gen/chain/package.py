@@ -19,6 +19,7 @@ from sosmith.gen.output.packages.vlnv import Vlnv
 from sosmith.gen.output.vectors import Vectors, hex_words
 from sosmith.gen.version import __version__
 from sosmith.model.arrays import Codes
+from sosmith.model.errors import SpecificationError
 from sosmith.model.templates import render
 from sosmith.model.text_files import write_files
 
@@ -41,7 +42,7 @@ def package_chain(
     Raises
     ------
     SpecificationError
-        If the folder cannot be written.
+        If a stage interpolates, or the folder cannot be written.
     ToolError
         If Yosys fails, or the disk is full.
     """
@@ -56,6 +57,11 @@ def packed_chain(
     design: ChainDesign, progress: Callable[[str], None] = lambda step: None, *, vlnv: Vlnv | None = None
 ) -> dict[str, str]:
     """Return the texts that `package_chain` writes, by their paths in the package."""
+    if design.rise > 1:
+        raise SpecificationError(
+            f"{design.spec.base.path}: not yet available: interpolate must be left out in a package, whose benches "
+            "take at most one result for each sample"
+        )
     named = vlnv or Vlnv.default(design.name)
     texts = chain_texts(design, progress)
     progress("bench")

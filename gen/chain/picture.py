@@ -16,9 +16,26 @@ _POINTS = 2000
 
 
 def frequencies(design: ChainDesign) -> Values:
-    """Return frequencies at the input in Hz, from far below the lowest rate to half the highest."""
-    half = float(design.spec.base.sample_rate) / 2
-    return np.geomspace(half / (100 * design.factor), half, _POINTS)
+    """Return frequencies in Hz, from far below the lowest rate to half the highest."""
+    ends = [stage.spec.filter_rate for stage in design.stages]
+    lowest, highest = min(*ends, design.spec.base.sample_rate, design.spec.last_rate), max(ends)
+    return np.geomspace(float(highest) / 2 / float(100 * highest / lowest), float(highest) / 2, _POINTS)
+
+
+def axis_label(design: ChainDesign) -> str:
+    """Say what the frequencies are."""
+    return "frequency at the input" if design.rise == 1 else "frequency at the highest rate"
+
+
+def limits(design: ChainDesign) -> list[tuple[float, float, float, str]]:
+    """Return the bands in which aliases and images lie, in Hz, what none of them exceeds, in dB, and its name."""
+    bands = []
+    for each in design.foldings:
+        highest = float(design.spec.base.sample_rate * each.segment.highest)
+        edge = highest / (2 * max(each.segment.rise, each.segment.factor))
+        name = "aliasing" if each.segment.rise == 1 else "image"
+        bands.append((edge, highest / 2, float(level(np.array([float(each.anywhere.gain)]))[0]), name))
+    return bands
 
 
 def level(gain: Values) -> Values:
@@ -38,14 +55,10 @@ def chain_plot(design: ChainDesign, file_format: str) -> bytes:
                 gain = level(stage_gain(stage, frequency))
                 axes.plot(frequency, gain, color=_GREY, lw=1.0, ls=style, label=stage.spec.name)
         axes.plot(frequency, level(np.abs(chain_gain(design, frequency))), color=_BLUE, lw=1.8, label="chain")
-        if design.folding is not None:
-            edge = float(design.spec.base.sample_rate) / (2 * design.factor)
-            most = level(np.array([float(design.folding.gain)]))[0]
-            axes.axvspan(edge, float(frequency[-1]), facecolor=_RED, alpha=0.08, lw=0)
-            axes.plot(
-                [edge, float(frequency[-1])], [most, most], color=_RED, lw=1.2, ls="--", label="proven aliasing limit"
-            )
-        axes.set(xlabel="frequency at the input", ylabel="gain (dB)")
+        for edge, end, most, name in limits(design):
+            axes.axvspan(edge, end, facecolor=_RED, alpha=0.08, lw=0)
+            axes.plot([edge, end], [most, most], color=_RED, lw=1.2, ls="--", label=f"proven {name} limit")
+        axes.set(xlabel=axis_label(design), ylabel="gain (dB)")
         axes.set_title(f"Chain {design.name}", loc="left")
         axes.set_ylim(bottom=-160.0)
         frequency_axis(axes, frequency)

@@ -86,7 +86,7 @@ def _changed(design: ChainDesign, wanted: ChainSpec) -> int:
         ("channels", spec.base.channels, wanted.base.channels),
         ("inputs", spec.base.inputs, wanted.base.inputs),
         ("output", spec.base.output, wanted.base.output),
-        ("stage", *([(s.name, s.kind, s.factor) for s in each.stages] for each in (spec, wanted))),
+        ("stage", *([(s.name, s.kind, s.factor, s.rise) for s in each.stages] for each in (spec, wanted))),
     ):
         if have != other:
             raise SpecificationError(

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure as Canvas
 from sosmith.gen.chain.design import ChainDesign
 from sosmith.gen.chain.facts import chain_tables
 from sosmith.gen.chain.golden import chain_gain, stage_gain
-from sosmith.gen.chain.picture import frequencies, level
+from sosmith.gen.chain.picture import axis_label, frequencies, level, limits
 from sosmith.gen.chain.run import ChainRun
 from sosmith.gen.facts.table import Fact, Table
 from sosmith.gen.quantity import decibels, plain_number, quantity
@@ -38,7 +38,6 @@ def chain_summary(design: ChainDesign, run: ChainRun) -> dict[str, Any]:
     if statistics.max_abs > bound:
         error, limit = quantity(statistics.max_abs, output.unit), quantity(bound, output.unit)
         shortfalls.append(f"The largest error is {error}, over the limit of {limit}.")
-    folding, passing = design.folding, design.passing
     return {
         "name": design.name,
         "core": "chain",
@@ -71,21 +70,24 @@ def chain_summary(design: ChainDesign, run: ChainRun) -> dict[str, Any]:
                 "name": stage.spec.name,
                 "kind": stage.spec.kind,
                 "architecture": stage.design.architecture.name,
-                "decimate": stage.design.datapath.samples_per_result,
+                "interpolate": stage.rate.rise,
+                "decimate": stage.rate.factor,
                 "output_bits": stage.output.bits,
                 "error_bound": float(stage.bound),
                 "gain_to_the_end": float(stage.gain),
             }
             for stage in design.stages
         ],
-        "folding": None
-        if folding is None
-        else {
-            "factor": design.factor,
-            "anywhere_db": _db(float(folding.gain)),
-            "passband_edge": None if passing is None or design.spec.edge is None else float(design.spec.edge),
-            "into_passband_db": None if passing is None else _db(float(passing.gain)),
-        },
+        "folding": [
+            {
+                "interpolate": each.segment.rise,
+                "decimate": each.segment.factor,
+                "anywhere_db": _db(float(each.anywhere.gain)),
+                "passband_edge": None if each.edge is None or design.spec.edge is None else float(design.spec.edge),
+                "into_passband_db": None if each.passing is None else _db(float(each.passing.gain)),
+            }
+            for each in design.foldings
+        ],
         "cycles_per_second": run.cycles_per_second,
         "wall_seconds": run.wall_seconds,
     }
@@ -145,19 +147,20 @@ def _response_figure(design: ChainDesign) -> Figure:
     def paint(canvas: Canvas) -> None:
         axes = canvas.subplots()
         axes.plot(frequency, whole, color=COLOUR["hardware"], lw=1.6)
-        if design.folding is not None:
-            edge = float(design.spec.base.sample_rate) / (2 * design.factor)
-            axes.axvspan(edge, float(frequency[-1]), facecolor=COLOUR["limit"], alpha=0.12, lw=0)
-            most = level(np.array([float(design.folding.gain)]))[0]
-            axes.plot([edge, float(frequency[-1])], [most, most], color=COLOUR["limit"], lw=1.4, ls="--")
+        for edge, end, most, _ in limits(design):
+            axes.axvspan(edge, end, facecolor=COLOUR["limit"], alpha=0.12, lw=0)
+            axes.plot([edge, end], [most, most], color=COLOUR["limit"], lw=1.4, ls="--")
         axes.set_ylabel("gain in dB")
-        axes.set_xlabel("frequency at the input")
+        axes.set_xlabel(axis_label(design))
         frequency_axis(axes, frequency)
 
     legend = [("hardware", "", "exact end-to-end response")]
     caption = "Gain from a sine at the input to the sine at the output."
-    if design.folding is not None:
-        legend.append(("limit", "dashed", "proven aliasing limit"))
+    for _, _, _, name in limits(design):
+        legend.append(("limit", "dashed", f"proven {name} limit"))
+    if design.rise > 1:
+        caption = "Gain from a sine to the output; in the shaded band, to its images, or as an alias of it."
+    elif design.foldings:
         caption += " In the shaded band the output is an alias, at a lower frequency."
     return Figure(
         title="Gain of the chain",
@@ -177,12 +180,14 @@ def _stages_figure(design: ChainDesign) -> Figure:
         for each, stage in zip(axes, filters, strict=True):
             each.plot(frequency, level(stage_gain(stage, frequency)), color=COLOUR["golden"], lw=1.2)
             each.set_ylabel(f"{stage.spec.name}\ndB")
-        axes[-1].set_xlabel("frequency at the input")
+        axes[-1].set_xlabel(axis_label(design))
         frequency_axis(axes[-1], frequency)
 
     height = max(PANEL_HEIGHT, 110 * len(filters))
     return Figure(
         title="Gain of each stage",
         drawing=draw("stages", "Gain of each stage against frequency", NARROW, height, paint),
-        caption="Gain of each stage for a sine at the input of the chain, aliased by the stages before it.",
+        caption="Gain of each stage for a sine at the input of the chain, aliased by the stages before it."
+        if design.rise == 1
+        else "Gain of each stage for a sine; of one that interpolates, at its output.",
     )

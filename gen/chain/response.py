@@ -1,14 +1,17 @@
-"""The exact response of stages in series, at the rate of the first: gains to the end, and aliasing.
+"""The exact response of a chain's stages in series: gains to the end, images and aliases.
 
-A stage filters, hands on every R-th of its results, or both. By the noble identity, filtering after that is the same as
-filtering with ``z**R`` before it. So stages together are one filter at the rate of the first of them, of which every
-R-th result leaves, R being the product of all their factors:
+A stage puts zeros between samples, filters, hands on every R-th of its results, or a part of these. By the noble
+identities, filtering before zeros is filtering with ``z**L`` behind them, and filtering behind what leaves results out
+is the same with ``z**R`` before it. So stages of which none interpolates behind one that decimates, a segment, are one
+filter at the highest of their rates, L being the product of the first, M of the second::
 
-    |> H1(z) -> R1 -> H2(z) -> R2  =  H1(z) H2(z**R1) -> R1 R2
+    |> L1 -> H1(z) -> H2(z) -> M2 -> H3(z)  =  L1 -> H1(z) H2(z) H3(z**M2) -> M2
 
-A result is a sum of all taps of it, whatever its phase. So the sum of their magnitudes is how much of an error before
-the stages reaches the end at most. A sine of the frequency f comes out with its gain at f, at the frequency that f
-folds to.
+A result is a sum over taps ``h(p), h(p + L), ..`` alone, as only one sample in L is not 0, and its phase p is a
+multiple of what L and M have in common. So the largest sum of magnitudes over these p is how much of an error before
+the segment reaches its end at most, and the product over segments how much reaches the end of the chain. Of a sine of
+the amplitude 1, a frequency f at the highest rate has the amplitude ``|H(f)| / L``, if it is one of its images, and
+comes out at the frequency that f folds to.
 """
 
 from __future__ import annotations
@@ -16,13 +19,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from math import gcd, prod
 
-from flint import acb, acb_poly, arb, ctx
+from flint import acb, acb_poly, arb, ctx, fmpq_poly
 
 from sosmith.gen.filter.exact_form import Exact
 from sosmith.gen.filter.largest_gain import Factor, Peak, gain_of_sections, largest
+from sosmith.gen.proof.nodes import polynomial
 from sosmith.gen.proof.peak_gain import Drive, extent
-from sosmith.gen.proof.response import IMPULSE
+from sosmith.gen.proof.response import Response
 from sosmith.model.arithmetic.correct_rounding import ball
 from sosmith.model.dataflow.decimator import impulse_response
 
@@ -37,10 +42,63 @@ _HALF = Fraction(1, 2)
 
 @dataclass(frozen=True)
 class Part:
-    """Sections, of whose results every `factor`-th leaves."""
+    """Sections behind `rise` - 1 zeros for each sample, of whose results every `factor`-th leaves."""
 
     sections: tuple[Exact, ...]
     factor: int = 1
+    rise: int = 1
+
+
+@dataclass(frozen=True)
+class Segment:
+    """Parts in series of which none interpolates behind one that decimates.
+
+    Attributes
+    ----------
+    parts : tuple of Part
+    rate : Fraction
+        Of the samples that enter, in units of the rate of the chain's.
+    """
+
+    parts: tuple[Part, ...]
+    rate: Fraction = Fraction(1)
+
+    @property
+    def rise(self) -> int:
+        """By how much the rate goes up, to the highest."""
+        return prod(part.rise for part in self.parts)
+
+    @property
+    def factor(self) -> int:
+        """By how much it goes down from there."""
+        return prod(part.factor for part in self.parts)
+
+    @property
+    def highest(self) -> Fraction:
+        """The highest rate, in units of that of the chain's samples."""
+        return self.rate * self.rise
+
+    @property
+    def spreads(self) -> list[int]:
+        """Samples at the highest rate for each one of a part's filter."""
+        spreads, rise, factor = [], 1, 1
+        for part in self.parts:
+            rise *= part.rise
+            spreads.append(self.rise * factor // rise)
+            factor *= part.factor
+        return spreads
+
+
+def segments_of(parts: Sequence[Part]) -> list[Segment]:
+    """Split parts before each one that interpolates behind one that decimates."""
+    segments, own, rate = list[Segment](), list[Part](), Fraction(1)
+    for part in parts:
+        if part.rise > 1 and any(each.factor > 1 for each in own):
+            segments.append(Segment(tuple(own), rate))
+            rate *= Fraction(segments[-1].rise, segments[-1].factor)
+            own = []
+        own.append(part)
+    return [*segments, Segment(tuple(own), rate)] if own else segments
 
 
 def cic(factor: int, stages: int) -> Part:
@@ -50,21 +108,50 @@ def cic(factor: int, stages: int) -> Part:
 
 
 def factor_of(parts: Sequence[Part]) -> int:
-    """Return the number of samples for each result."""
-    product = 1
-    for part in parts:
-        product *= part.factor
-    return product
+    """Return by how much parts decimate: the number of samples for each result, if none interpolates."""
+    return prod(part.factor for part in parts)
+
+
+def rise_of(parts: Sequence[Part]) -> int:
+    """Return by how much parts interpolate."""
+    return prod(part.rise for part in parts)
 
 
 def peak_gain(parts: Sequence[Part]) -> Fraction:
-    """Sum of the magnitudes of the response of parts in series, rounded up a little."""
-    response, step = IMPULSE, 1
-    for part in parts:
+    """How much of an error before parts in series reaches their end at most, rounded up a little."""
+    return prod((_peak_gain(segment) for segment in segments_of(parts)), start=Fraction(1))
+
+
+def _peak_gain(segment: Segment) -> Fraction:
+    """Largest sum of the magnitudes of a phase of a segment's response, rounded up a little."""
+    rise = segment.rise
+    over, under = fmpq_poly([1]), list[tuple[Fraction, ...]]()
+    for part, spread in zip(segment.parts, segment.spreads, strict=True):
         for numerator, denominator in part.sections:
-            response = response.all_pole(_spread(denominator, step)).taps(_spread(numerator, step))
-        step *= part.factor
-    return extent([Drive(response, Fraction(-1), Fraction(1))], _ACCURACY).magnitude
+            over *= polynomial(_spread(numerator, spread))
+            if len(denominator) > 1:
+                times = rise // gcd(rise, spread)
+                longer = _of_powers(denominator, times)
+                # Both have the same zeros; behind it, the denominator is one in z**rise.
+                over *= polynomial(_spread(longer, spread * times)) // polynomial(_spread(denominator, spread))
+                under.append(_spread(longer, spread * times // rise))
+    taps, largest = over.coeffs(), Fraction(0)
+    for phase in range(0, rise, gcd(rise, segment.factor)):
+        response = Response(fmpq_poly(taps[phase::rise]), tuple(under))
+        if response.numerator:
+            largest = max(largest, extent([Drive(response, Fraction(-1), Fraction(1))], _ACCURACY).magnitude)
+    return largest
+
+
+def _of_powers(denominator: Sequence[Fraction], times: int) -> tuple[Fraction, ...]:
+    """Return the polynomial with the constant term 1, and the `times`-th powers of the poles; its degree is 1 or 2."""
+    if times == 1:
+        return tuple(denominator)
+    _, first, second = (*denominator, Fraction(0))[:3]
+    sums = [Fraction(2), -first]  # of the powers of both poles
+    for _ in range(times - 1):
+        sums.append(-first * sums[-1] - second * sums[-2])
+    return (Fraction(1), -sums[times], second**times)[: len(denominator)]
 
 
 def _spread(taps: Sequence[Fraction], step: int) -> tuple[Fraction, ...]:
@@ -74,20 +161,20 @@ def _spread(taps: Sequence[Fraction], step: int) -> tuple[Fraction, ...]:
     return tuple(spread)
 
 
-def folding_gain(parts: Sequence[Part]) -> Peak:
-    """Largest gain of a frequency that does not come out as itself, in units of the rate of the first part."""
-    factor = factor_of(parts)
-    return _largest(parts, [(Fraction(1, 2 * factor), _HALF)])
+def folding_gain(segment: Segment) -> Peak:
+    """Largest gain of what comes out at another frequency than it went in, in units of the highest rate."""
+    return _largest(segment, [(Fraction(1, 2 * max(segment.rise, segment.factor)), _HALF)])
 
 
-def gain_into_passband(parts: Sequence[Part], edge: Fraction) -> Peak:
-    """Largest gain of what comes out at a frequency up to `edge` and is no such frequency itself."""
-    return _largest(parts, bands_into_passband(factor_of(parts), edge))
+def gain_into_passband(segment: Segment, edge: Fraction) -> Peak:
+    """Largest gain of what comes out at another frequency, and went in, or comes out, at one up to `edge`."""
+    bands = [band for each in {segment.rise, segment.factor} for band in bands_into_passband(each, edge)]
+    return _largest(segment, sorted(bands))
 
 
-def _largest(parts: Sequence[Part], bands: Sequence[tuple[Fraction, Fraction]]) -> Peak:
+def _largest(segment: Segment, bands: Sequence[tuple[Fraction, Fraction]]) -> Peak:
     with ctx.workprec(_PRECISION):
-        gain = _Gain(parts)
+        gain = _Gain(segment)
     return largest(gain, bands)
 
 
@@ -124,21 +211,20 @@ class _Taps:
 
 
 class _Gain:
-    """What is known of the gain of parts on an interval of frequencies, in units of the rate of the first one."""
+    """What is known of the gain of a segment on an interval of frequencies, in units of its highest rate."""
 
-    def __init__(self, parts: Sequence[Part]) -> None:
+    def __init__(self, segment: Segment) -> None:
         self._taps: list[tuple[_Taps, int]] = []
         self._poles: list[tuple[Exact, int]] = []
-        step = 1
-        for part in parts:
+        self._share = ball(Fraction(1, segment.rise))
+        for part, step in zip(segment.parts, segment.spreads, strict=True):
             for numerator, denominator in part.sections:
                 self._taps.append((_Taps(numerator), step))
                 if len(denominator) > 1:
                     self._poles.append((((Fraction(1),), denominator), step))
-            step *= part.factor
 
     def __call__(self, low: Fraction, high: Fraction) -> Factor:
-        product = Factor(arb(1), arb(1), arb(0))
+        product = Factor(self._share, self._share, arb(0))
         for taps, step in self._taps:
             product = product.times(taps.on(low * step, high * step))
         for section, step in self._poles:

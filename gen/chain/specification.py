@@ -6,10 +6,11 @@ about a filter is that of a filter alone, and what is here is about stages besid
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Context, Decimal, Inexact
 from fractions import Fraction
+from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +34,7 @@ from sosmith.model.port import Port
 from sosmith.model.suggestion import did_you_mean
 
 MAX_FACTOR = 1 << 12
-"""Most samples for each result: the response from end to end is computed at the rate of the samples."""
+"""Most samples for each result, and results for each sample: the response is computed at the highest rate."""
 
 MAX_STAGES = 8
 """Most stages of a chain."""
@@ -47,15 +48,17 @@ _KEYS: dict[str, tuple[str, ...]] = {
     "polynomial": ("coefficients", "data"),
     "gain": ("factor",),
     "iir": ("family", "band", "method", "order", "cutoff", *_EDGES, "freedom", "sos", "sos_file", "decimate"),
-    "fir": ("family", "band", *_EDGES, "taps", "taps_file", "decimate"),
-    "halfband": ("passband_edge", "passband_loss", "stopband_loss", "decimate"),
-    "cic": ("order", "decimate"),
+    "fir": ("family", "band", *_EDGES, "taps", "taps_file", "decimate", "interpolate"),
+    "halfband": ("passband_edge", "passband_loss", "stopband_loss", "decimate", "interpolate"),
+    "cic": ("order", "decimate", "interpolate"),
 }
 """Keys of a stage by its kind, beside those of all."""
 
 KINDS = tuple(_KEYS)
 _OF_ALL = ("architecture", "multipliers", "protect", "reload", "reload_lock", "start", "keep")
 """Keys of ``[hardware]`` that hold for all stages; the realization of one filter is none of another."""
+
+_RISING = tuple(kind for kind, keys in _KEYS.items() if "interpolate" in keys)
 
 _TAKEN = "flags"
 """What a module of the chain itself is called behind its name."""
@@ -87,6 +90,8 @@ class StageSpec:
         What the stage says of its hardware.
     factor : int
         By how much it decimates; 1 if all results leave.
+    rise : int
+        By how much it interpolates; 1 if each sample has one result.
     rate : Fraction
         Of the samples that it takes, in Hz.
     edge : Fraction or None
@@ -98,8 +103,19 @@ class StageSpec:
     tables: Mapping[str, Any]
     hardware: Mapping[str, Any]
     factor: int
+    rise: int
     rate: Fraction
     edge: Fraction | None
+
+    @property
+    def filter_rate(self) -> Fraction:
+        """Rate at which its filter is described, in Hz: that of its samples, or of its results if it interpolates."""
+        return self.rate * self.rise
+
+    @property
+    def given_taps(self) -> tuple[Fraction, ...]:
+        """Taps of the specification, if it has any; others, in a stage that interpolates, are times `rise`."""
+        return () if self.kind == "cic" else tuple(map(number, self.tables["filter"].get("taps", ())))
 
     @property
     def core(self) -> str:
@@ -116,19 +132,45 @@ class StageSpec:
     ) -> Specification:
         """Return the stage by itself, between ports; without `max_error` it may take one LSB of the output.
 
+        Of a stage that interpolates, it is the filter behind the zeros that are put between samples.
+
         Raises
         ------
         SpecificationError
             If the stage breaks a rule.
         """
-        name = f"{chain.name}_{self.name}"
+        return self._alone(chain, self.tables, self.filter_rate, self.name, inputs, output, max_error)
+
+    def phase(
+        self,
+        chain: ChainSpec,
+        k: int,
+        taps: Sequence[Fraction],
+        inputs: tuple[Port, ...],
+        output: Port,
+        max_error: Fraction,
+    ) -> Specification:
+        """Return the filter of phase k of a stage that interpolates, by its taps; the rest is as for `ordinary`."""
+        tables = {"filter": {"taps": [decimal(tap) for tap in taps]}}
+        return self._alone(chain, tables, self.rate, f"{self.name}_p{k}", inputs, output, max_error)
+
+    def _alone(
+        self,
+        chain: ChainSpec,
+        tables: Mapping[str, Any],
+        rate: Fraction,
+        name: str,
+        inputs: tuple[Port, ...],
+        output: Port,
+        max_error: Fraction | None,
+    ) -> Specification:
         hardware = chain.base.source.get("hardware", {})
         tree: dict[str, Any] = {
-            "name": name,
-            "sample_rate": decimal(self.rate),
+            "name": f"{chain.name}_{name}",
+            "sample_rate": decimal(rate),
             "channels": chain.base.channels,
             "input": {port.name: _format(port) for port in inputs},
-            **self.tables,
+            **tables,
             "output": _format(output)
             | {"unit": output.unit}
             | ({} if max_error is None else {"max_error": decimal(max_error)}),
@@ -136,7 +178,7 @@ class StageSpec:
             | {key: hardware[key] for key in _OF_ALL if key in hardware}
             | dict(self.hardware),
         }
-        return from_tree(tree, chain.base.path.parent / f"{chain.base.path.name}: stage {self.name}")
+        return from_tree(tree, chain.base.path.parent / f"{chain.base.path.name}: stage {name}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -167,11 +209,18 @@ class ChainSpec:
 
     @property
     def factor(self) -> int:
-        """Samples of a channel for each result."""
-        product = 1
-        for stage in self.stages:
-            product *= stage.factor
-        return product
+        """By how much all stages together decimate: samples of a channel for each result, if none interpolates."""
+        return prod(stage.factor for stage in self.stages)
+
+    @property
+    def rise(self) -> int:
+        """By how much all stages together interpolate: results for each sample, if none decimates."""
+        return prod(stage.rise for stage in self.stages)
+
+    @property
+    def last_rate(self) -> Fraction:
+        """Results of a channel a second."""
+        return self.base.sample_rate * self.rise / self.factor
 
     @property
     def edge(self) -> Fraction | None:
@@ -253,7 +302,7 @@ def _checked(tree: dict[str, Any], path: Path, text: str | None) -> ChainSpec:
         try:
             _check_rate(rate, f"stage[{k}]")
             read.append(_stage(stage, kinds[k], k, rate))
-            rate /= read[-1].factor
+            rate *= Fraction(read[-1].rise, read[-1].factor)
         except UnfitError as unfit:
             findings.append(unfit)
             if not _is_decimal(rate):
@@ -261,7 +310,7 @@ def _checked(tree: dict[str, Any], path: Path, text: str | None) -> ChainSpec:
     if findings:
         raise together(findings)
     _check_names([stage.name for stage in read])
-    _check_factor([stage.factor for stage in read])
+    _check_factors(read)
     chain = ChainSpec(
         base=base,
         source={key: to_json(value) for key, value in tree.items()},
@@ -269,9 +318,23 @@ def _checked(tree: dict[str, Any], path: Path, text: str | None) -> ChainSpec:
         stages=tuple(read),
     )
     _check_steps(chain)
-    for one in chain.stages[kinds[0] == "polynomial" :]:
-        one.ordinary(chain, (ANY_INPUT,), ANY_OUTPUT)
+    for k, one in enumerate(chain.stages):
+        if one.kind != "polynomial":
+            _check_rising(one, k, one.ordinary(chain, (ANY_INPUT,), ANY_OUTPUT))
     return chain
+
+
+def _check_rising(stage: StageSpec, k: int, alone: Specification) -> None:
+    """Check that a stage that interpolates has neither check bits nor registers: it is several cores."""
+    own = {"protect": (alone.hardware.protect, "none"), "reload": (alone.hardware.reload, False)}
+    for key, (value, wanted) in own.items():
+        if stage.rise > 1 and value != wanted:
+            raise UnfitError(
+                f"{literal(wanted)} in a stage that interpolates, which has a core for each result of a sample",
+                literal(value),
+                where=f"stage[{k}].{key}",
+                later=True,
+            )
 
 
 def _kind(stage: Mapping[str, Any], k: int) -> str:
@@ -287,9 +350,11 @@ def _stage(table: Mapping[str, Any], kind: str, k: int, rate: Fraction) -> Stage
     where = f"stage[{k}]"
     known = (*_COMMON, *_KEYS[kind])
     for key, value in table.items():
-        if key == "interpolate":
+        if key == "interpolate" and kind not in _RISING:
             raise UnfitError(
-                "left out, as stages only lower the rate", literal(value), where=f"{where}.{key}", later=True
+                f"left out in a stage of the kind {kind}: between samples, {', '.join(_RISING)} fill in",
+                literal(value),
+                where=f"{where}.{key}",
             )
         if key not in known:
             raise UnfitError(
@@ -309,21 +374,29 @@ def _stage(table: Mapping[str, Any], kind: str, k: int, rate: Fraction) -> Stage
             literal(kind),
             where=f"{where}.kind",
         )
-    factor = _factor(table, kind, where)
+    factor, rise = _factor(table, kind, where), _rise(table, where)
+    if rise > 1 and "taps_file" in table:
+        raise UnfitError(
+            "left out in a stage that interpolates, whose taps stand in the specification",
+            literal(table["taps_file"]),
+            where=f"{where}.taps_file",
+            later=True,
+        )
     return StageSpec(
         name=name,
         kind=kind,
-        tables=_tables(table, kind, where, rate, factor),
+        tables=_tables(table, kind, where, rate * rise, factor, rise),
         hardware={key: table[key] for key in _OF_ONE if key in table},
         factor=factor,
+        rise=rise,
         rate=rate,
         edge=_edge(table, kind),
     )
 
 
 def _factor(table: Mapping[str, Any], kind: str, where: str) -> int:
-    if kind == "cic" and "decimate" not in table:
-        raise UnfitError("given for a CIC filter", "missing", where=f"{where}.decimate")
+    if kind == "cic" and "decimate" not in table and "interpolate" not in table:
+        raise UnfitError("given for a CIC filter, or interpolate", "missing", where=f"{where}.decimate")
     if table.get("decimate") == AUTO:
         raise UnfitError(
             "a whole number in a stage, as the rates of the stages after it follow from it",
@@ -336,6 +409,21 @@ def _factor(table: Mapping[str, Any], kind: str, where: str) -> int:
         return whole(2, MAX_DECIMATION if kind == "iir" else MAX_DOWNSAMPLING)(table["decimate"])
     except UnfitError as unfit:
         raise unfit.inside(f"{where}.decimate") from None
+
+
+def _rise(table: Mapping[str, Any], where: str) -> int:
+    if "interpolate" not in table:
+        return 1
+    if "decimate" in table:
+        raise UnfitError(
+            "left out beside decimate: a stage that interpolates and one that decimates in series do both",
+            literal(table["interpolate"]),
+            where=f"{where}.interpolate",
+        )
+    try:
+        return whole(2, MAX_DOWNSAMPLING)(table["interpolate"])
+    except UnfitError as unfit:
+        raise unfit.inside(f"{where}.interpolate") from None
 
 
 def _check_rate(rate: Fraction, where: str) -> None:
@@ -355,8 +443,8 @@ def _is_decimal(value: Fraction) -> bool:
     return True
 
 
-def _tables(table: Mapping[str, Any], kind: str, where: str, rate: Fraction, factor: int) -> dict[str, Any]:
-    """Return the tables of the ordinary specification."""
+def _tables(table: Mapping[str, Any], kind: str, where: str, rate: Fraction, factor: int, rise: int) -> dict[str, Any]:
+    """Return the tables of the ordinary specification, of a filter at this rate."""
     decimate = {"decimate": factor} if factor > 1 else {}
     if kind == "polynomial":
         return {"calibration": {key: table[key] for key in _KEYS[kind] if key in table}, "filter": _WIRE}
@@ -365,8 +453,8 @@ def _tables(table: Mapping[str, Any], kind: str, where: str, rate: Fraction, fac
             raise UnfitError("a number other than 0", "missing", where=f"{where}.factor")
         return {"filter": {"taps": [table["factor"]]}}
     if kind == "cic":
-        return {"filter": {"taps": _cic(table, where, factor)} | decimate}
-    given = {key: table[key] for key in _KEYS[kind] if key in table and key not in {"band", "decimate"}}
+        return {"filter": {"taps": _cic(table, where, factor if rise == 1 else rise)} | decimate}
+    given = {key: table[key] for key in _KEYS[kind] if key in table and key not in {"band", "decimate", "interpolate"}}
     if kind == "halfband":
         given |= {"family": "halfband"}
         if "passband_edge" in given:
@@ -398,16 +486,17 @@ def _cic(table: Mapping[str, Any], where: str, factor: int) -> list[Decimal]:
         order = whole(1, 12)(table["order"])
     except UnfitError as unfit:
         raise unfit.inside(f"{where}.order") from None
+    key = "interpolate" if "interpolate" in table else "decimate"
     if factor & (factor - 1):
         raise UnfitError(
-            "a power of two for a CIC filter, whose weights are then exact", literal(factor), where=f"{where}.decimate"
+            "a power of two for a CIC filter, whose weights are then exact", literal(factor), where=f"{where}.{key}"
         )
     if order * (factor - 1) + 1 > MAX_TAPS:
         raise UnfitError(
-            f"such that order * (decimate - 1) is below {MAX_TAPS}, as a CIC filter is built as an FIR filter; two "
-            "stages in series decimate further",
+            f"such that order * ({key} - 1) is below {MAX_TAPS}, as a CIC filter is built as an FIR filter; two "
+            f"stages in series {'decimate' if key == 'decimate' else 'interpolate'} further",
             literal(factor),
-            where=f"{where}.decimate",
+            where=f"{where}.{key}",
         )
     taps = [1]
     for _ in range(order):
@@ -447,17 +536,29 @@ def _check_names(names: list[str]) -> None:
                 )
 
 
-def _check_factor(factors: list[int]) -> None:
-    product = 1
-    for k, factor in enumerate(factors):
-        product *= factor
-        if product > MAX_FACTOR:
-            raise UnfitError(
-                f"such that all stages together decimate by at most {MAX_FACTOR}, as their response is computed at the "
-                "first rate",
-                literal(factor),
-                where=f"stage[{k}].decimate",
-            )
+def _check_factors(stages: Sequence[StageSpec]) -> None:
+    for key, factors in (("decimate", [s.factor for s in stages]), ("interpolate", [s.rise for s in stages])):
+        for k in range(len(factors)):
+            if prod(factors[: k + 1]) > MAX_FACTOR:
+                rate = "first" if key == "decimate" else "last"
+                raise UnfitError(
+                    f"such that all stages together {key} by at most {MAX_FACTOR}, as their response is computed at "
+                    f"the {rate} rate",
+                    literal(factors[k]),
+                    where=f"stage[{k}].{key}",
+                )
+    turns = [k for k, stage in enumerate(stages) if k > 0 and (stage.rise > 1 or stage.factor > 1)]
+    ups = [stages[k].rise > 1 for k in turns]
+    changes = [turns[n] for n in range(1, len(turns)) if ups[n] != ups[n - 1]]
+    if len(changes) > 1:
+        k = changes[1]
+        key = "interpolate" if stages[k].rise > 1 else "decimate"
+        raise UnfitError(
+            "left out where the rate has turned behind the first stage once already, as flags follow one turn",
+            literal(max(stages[k].rise, stages[k].factor)),
+            where=f"stage[{k}].{key}",
+            later=True,
+        )
 
 
 def _check_steps(chain: ChainSpec) -> None:

@@ -10,7 +10,7 @@
     Every core registers its output and takes samples by tvalid and tready alone, so that back-pressure of a core
     reaches the one before it, and the whole keeps the rules of the streams that each core keeps.
     The gate belongs to the flags: `sosmith.gen.chain.flags`. A stage whose constants can be loaded has its own
-    AXI4-Lite port, s_axil_NAME.
+    AXI4-Lite port, s_axil_NAME. A stage that interpolates is several cores, which `sosmith.gen.chain.turns` joins.
 """
 
 from __future__ import annotations
@@ -23,6 +23,8 @@ from amaranth.lib.wiring import Out
 
 from sosmith.gen.chain.design import ChainDesign, StageDesign
 from sosmith.gen.chain.flags import FlagsUnit, flags_unit
+from sosmith.gen.chain.turns import TurnsUnit, modules_of, turns_unit
+from sosmith.gen.chain.verilog_text import range_of
 from sosmith.gen.output.core_facts import InterfaceFacts, StreamFacts, interface_facts
 from sosmith.gen.version import __version__
 from sosmith.hdl.bus.axi_lite import slave_members
@@ -32,7 +34,7 @@ from sosmith.model.templates import in_comment
 
 def chain_interface(design: ChainDesign) -> InterfaceFacts:
     """Facts needed to drive a chain: the streams of its ends, and the clocks of all stages together."""
-    faces, unit = [interface_facts(stage.design) for stage in design.stages], flags_unit(design)
+    faces, unit = [_slowest(stage) for stage in design.stages], flags_unit(design)
     waits = 0 if unit is None else unit.clearing
     return InterfaceFacts(
         name=design.name,
@@ -41,7 +43,13 @@ def chain_interface(design: ChainDesign) -> InterfaceFacts:
         reset_cycles=max(face.reset_cycles for face in faces),
         latency_cycles=sum(face.reset_cycles + face.latency_cycles for face in faces) + waits,
         samples_per_result=design.factor,
+        rates=design.rates if design.rise > 1 else (),
     )
+
+
+def _slowest(stage: StageDesign) -> InterfaceFacts:
+    """Facts about a stage: of cores side by side, those of the one that takes longest."""
+    return max(map(interface_facts, stage.cores), key=lambda face: face.reset_cycles + face.latency_cycles)
 
 
 def top_ports(design: ChainDesign) -> list[tuple[str, str, int]]:
@@ -53,7 +61,7 @@ def top_ports(design: ChainDesign) -> list[tuple[str, str, int]]:
         *_stream("s_axis", face.inputs, "input"),
         *_stream("m_axis", face.outputs, "output"),
         *(
-            (way, f"{_port_of(stage)}_{signal}", width)
+            (way, f"{registers_port(stage)}_{signal}", width)
             for stage in design.stages
             for way, signal, width in _registers(stage)
         ),
@@ -68,28 +76,55 @@ def top_text(design: ChainDesign) -> str:
     ports = top_ports(design)
     lines = [f"module {design.name}({', '.join(name for _, name, _ in ports)});"]
     for direction, name, width in ports:
-        lines += [f"  {direction} {_range(width)}{name};", f"  wire {_range(width)}{name};"]
+        lines += [f"  {direction} {range_of(width)}{name};", f"  wire {range_of(width)}{name};"]
     nets = [net for name, face in zip(names[:-1], faces, strict=False) for net in _stream(name, face.outputs, "output")]
     if unit is not None:
         nets += [("", "gated_tvalid", 1), ("", "gated_tready", 1), ("", "last_tuser", outputs.user_width)]
-    lines += [f"  wire {_range(width)}{net};" for _, net, width in nets]
+    lines += [f"  wire {range_of(width)}{net};" for _, net, width in nets]
     for k, (stage, name, face) in enumerate(zip(design.stages, names, faces, strict=True)):
         before = "s_axis" if k == 0 else names[k - 1]
         behind = "m_axis" if k == len(names) - 1 else name
-        pins = {"aclk": "aclk", "aresetn": "aresetn"}
-        pins |= _pins("s_axis", before, face.inputs) | _pins("m_axis", behind, face.outputs)
-        pins |= {f"s_axil_{signal}": f"{_port_of(stage)}_{signal}" for _, signal, _ in _registers(stage)}
+        given = _pins("s_axis", before, face.inputs) | _pins("m_axis", behind, face.outputs)
         if unit is not None and k == 0:
-            pins["m_axis_tready"] = "gated_tready"
+            given["m_axis_tready"] = "gated_tready"
         if unit is not None and k == 1:
-            pins["s_axis_tvalid"] = "gated_tvalid"
+            given["s_axis_tvalid"] = "gated_tvalid"
         if unit is not None and behind == "m_axis":
-            pins["m_axis_tuser"] = "last_tuser"
-        lines += _instance(face.name, name, pins)
+            given["m_axis_tuser"] = "last_tuser"
+        turns = turns_unit(design, stage)
+        lines += _cores(stage, name, given, face) if turns is None else _in_turn(turns, stage, name, given)
     if unit is not None:
         lines += _instance(unit.name, "flags", _joined(unit, names[0]))
-    before = "" if unit is None else unit.text() + "\n"
+    own = [*(each.text() for each in modules_of(design)), *([] if unit is None else [unit.text()])]
+    before = "".join(f"{text}\n" for text in own)
     return _header(design, chain_interface(design)) + before + "\n".join([*lines, "endmodule", ""])
+
+
+def _cores(stage: StageDesign, name: str, given: Mapping[str, str], face: InterfaceFacts) -> list[str]:
+    pins = {"aclk": "aclk", "aresetn": "aresetn", **given}
+    pins |= {f"s_axil_{signal}": f"{registers_port(stage)}_{signal}" for _, signal, _ in _registers(stage)}
+    return _instance(face.name, name, pins)
+
+
+def _in_turn(unit: TurnsUnit, stage: StageDesign, name: str, given: Mapping[str, str]) -> list[str]:
+    """Instances of the cores of a stage that interpolates, and of what joins them; all get the sample as it is."""
+    lines, pins = list[str](), {"aclk": "aclk", "aresetn": "aresetn"}
+    pins |= {f"s_{signal}": given[f"s_axis_{signal}"] for signal in ("tvalid", "tready")}
+    for k, core in enumerate(stage.cores):
+        own = f"{name}_p{k}"
+        for signal, width in [*unit.payload, ("tvalid", 1), ("tready", 1)]:
+            lines.append(f"  wire {range_of(width)}{own}_{signal};")
+        lines += [f"  wire {own}_given;", f"  wire {own}_taken;"]
+        ports = {"aclk": "aclk", "aresetn": "aresetn"} | {p: n for p, n in given.items() if p.startswith("s_axis_")}
+        ports |= {"s_axis_tvalid": f"{own}_given", "s_axis_tready": f"{own}_taken"}
+        ports |= {port: f"{own}_{port.removeprefix('m_axis_')}" for port in given if port.startswith("m_axis_")}
+        lines += _instance(core.datapath.name, own, ports)
+        pins |= {f"o{k}_tvalid": f"{own}_given", f"o{k}_tready": f"{own}_taken"}
+    for k in range(unit.phases):
+        pins |= {f"i{k}_{signal}": f"{name}_p{k}_{signal}" for signal, _ in unit.payload}
+        pins |= {f"i{k}_{signal}": f"{name}_p{k}_{signal}" for signal in ("tvalid", "tready")}
+    pins |= {f"m_{port.removeprefix('m_axis_')}": net for port, net in given.items() if port.startswith("m_axis_")}
+    return lines + _instance(unit.name, name, pins)
 
 
 def _joined(unit: FlagsUnit, first: str) -> dict[str, str]:
@@ -114,7 +149,8 @@ def _instance(module: str, name: str, pins: Mapping[str, str]) -> list[str]:
     return [f"  {module} {name} (", *(f"{row}," for row in rows[:-1]), rows[-1], "  );"]
 
 
-def _port_of(stage: StageDesign) -> str:
+def registers_port(stage: StageDesign) -> str:
+    """Prefix of the ports of a stage's registers."""
     return f"s_axil_{stage.spec.name}"
 
 
@@ -144,10 +180,6 @@ def _pins(prefix: str, net: str, stream: StreamFacts) -> dict[str, str]:
     return {f"{prefix}{name}": f"{net}{name}" for name in names}
 
 
-def _range(width: int) -> str:
-    return "" if width == 1 else f"[{width - 1}:0] "
-
-
 def _header(design: ChainDesign, interface: InterfaceFacts) -> str:
     spec = design.spec
     unit = in_comment(spec.base.output.unit)
@@ -163,10 +195,12 @@ def _header(design: ChainDesign, interface: InterfaceFacts) -> str:
         "",
         f"Needs the files {', '.join(_sources(design))}.",
     ]
-    if design.factor > 1:
+    if design.rise > 1:
+        rows.append(f"{design.rise} results for each {design.factor} samples of a channel, the first with the first.")
+    elif design.factor > 1:
         rows.append(f"A result for each {interface.samples_per_result} samples of a channel, the first with the first.")
     return "".join(f"// {row}".rstrip() + "\n" for row in rows) + "\n"
 
 
 def _sources(design: ChainDesign) -> Sequence[str]:
-    return [f"{stage.design.datapath.name}.sv" for stage in design.stages]
+    return [f"{core.datapath.name}.sv" for stage in design.stages for core in stage.cores]

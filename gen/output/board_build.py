@@ -10,12 +10,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from sosmith.gen.core import CoreDesign
 from sosmith.gen.fpga.bitstream import Bitstream, build, fingerprint
 from sosmith.gen.fpga.boards import RATE, Board
 from sosmith.gen.fpga.platform_plan import SEED
-from sosmith.gen.output.board_top import board_verilog, schedule_of, top_name, wiring_of
-from sosmith.gen.output.verilog import core_verilog
+from sosmith.gen.output.board_top import Design, board_verilog, schedule_of, top_name, wiring_of
+from sosmith.gen.output.identity import item_of
 from sosmith.gen.version import __version__
 from sosmith.model.text_files import to_json, write_contents
 
@@ -26,7 +25,7 @@ class BoardBuild:
 
     Attributes
     ----------
-    design : CoreDesign
+    design : CoreDesign or BoardItem
         The design.
     rate : int
         Line rate in baud.
@@ -38,7 +37,7 @@ class BoardBuild:
         What the programs produced from it.
     """
 
-    design: CoreDesign
+    design: Design
     rate: int
     verilog: str
     core_verilog: str
@@ -60,7 +59,7 @@ class BoardBuild:
         clock, path = self.bitstream.slowest, self.bitstream.path
         steps = ", ".join(f"{step.kind} {step.delay:.2f} ns to {step.end}" for step in path)
         return (
-            f"{self.design.datapath.name} must run at {clock.wanted:.2f} MHz on {self.board.title}, not "
+            f"{item_of(self.design).name} must run at {clock.wanted:.2f} MHz on {self.board.title}, not "
             f"{clock.achieved:.2f} MHz: the path takes {sum(step.delay for step in path):.2f} ns: {steps}"
         )
 
@@ -110,12 +109,12 @@ class BoardBuild:
         return write_contents(folder, contents)
 
 
-def build_facts(design: CoreDesign, board: Board, rate: int, core: str) -> dict[str, Any]:
+def build_facts(design: Design, board: Board, rate: int, core: str) -> dict[str, Any]:
     """Return what of ``build.json`` is known before anything is built.
 
     Parameters
     ----------
-    design : CoreDesign
+    design : CoreDesign or BoardItem
         The design.
     board : Board
         The board.
@@ -124,22 +123,22 @@ def build_facts(design: CoreDesign, board: Board, rate: int, core: str) -> dict[
     core : str
         The core's SystemVerilog.
     """
-    clock = wiring_of(design, board).clock(board)
+    clock, item = wiring_of(design, board).clock(board), item_of(design)
     devices = [each.reading.converter.title for each in design.spec.converters]
     facts = {
-        "name": design.datapath.name,
+        "name": item.name,
         "sosmith_version": __version__,
         "board": board.name,
         "title": board.title,
         "device": board.device.title,
         "design": hashlib.sha256(core.encode()).hexdigest(),
-        "architecture": design.architecture.name,
+        "architecture": item.architecture,
         "channels": design.spec.channels,
         "clock_hz": int(clock) if clock.denominator == 1 else float(clock),
         "line_rate_baud": rate,
         "converters": devices if design.spec.dac is None else [*devices, design.spec.dac.converter.title],
         # what the core can take at the board's clock, but for the line
-        "samples_per_second": float(clock) / (design.architecture.cycles_per_sample * design.spec.channels),
+        "samples_per_second": float(clock) / (item.cycles_per_sample * design.spec.channels),
     }
     frame = schedule_of(design, clock).frame if design.spec.converters else None
     if frame is None:
@@ -154,7 +153,7 @@ def build_facts(design: CoreDesign, board: Board, rate: int, core: str) -> dict[
 
 
 def build_board(
-    design: CoreDesign,
+    design: Design,
     board: Board,
     *,
     rate: int = RATE,
@@ -164,7 +163,7 @@ def build_board(
 
     Parameters
     ----------
-    design : CoreDesign
+    design : CoreDesign or BoardItem
         The design.
     rate : int
         Line rate in baud.
@@ -180,13 +179,13 @@ def build_board(
 
 
 def board_cost(
-    design: CoreDesign, board: Board, cache: Path | None, progress: Callable[[str], None] = lambda step: None
+    design: Design, board: Board, cache: Path | None, progress: Callable[[str], None] = lambda step: None
 ) -> dict[str, Any]:
     """Return `BoardBuild.summary` of a design; what was built from the same text by the same programs is in `cache`.
 
     Parameters
     ----------
-    design : CoreDesign
+    design : CoreDesign or BoardItem
         The design.
     board : Board
         The board.
@@ -212,10 +211,11 @@ def board_cost(
     return summary
 
 
-def texts(design: CoreDesign, board: Board, rate: int, progress: Callable[[str], None]) -> tuple[str, str]:
+def texts(design: Design, board: Board, rate: int, progress: Callable[[str], None]) -> tuple[str, str]:
     """Return the SystemVerilog of the core, and of the board's top."""
     progress("SystemVerilog of the board")
-    core = core_verilog(design)
+    item = item_of(design)
+    core = item.verilog
     wiring = wiring_of(design, board)
     waits = wiring.pll is not None
-    return core, board_verilog(design, clock=wiring.clock(board), rate=rate, core=core, waits=waits)
+    return core, board_verilog(item, clock=wiring.clock(board), rate=rate, core=core, waits=waits)

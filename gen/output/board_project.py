@@ -8,11 +8,10 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from sosmith.gen.core import CoreDesign
 from sosmith.gen.fpga.boards import RATE, Board
 from sosmith.gen.fpga.vendor_project import TOOL, Project, project
 from sosmith.gen.output.board_build import build_facts, texts
-from sosmith.gen.output.board_top import top_name, wiring_of
+from sosmith.gen.output.board_top import Design, top_name, wiring_of
 from sosmith.model.text_files import to_json, write_contents
 
 
@@ -22,7 +21,7 @@ class BoardProject:
 
     Attributes
     ----------
-    design : CoreDesign
+    design : CoreDesign or BoardItem
         The design.
     rate : int
         Line rate in baud.
@@ -32,7 +31,7 @@ class BoardProject:
         The files.
     """
 
-    design: CoreDesign
+    design: Design
     rate: int
     core_verilog: str
     project: Project
@@ -61,7 +60,7 @@ class BoardProject:
 
 
 def board_project(
-    design: CoreDesign, board: Board, *, rate: int = RATE, progress: Callable[[str], None] = lambda step: None
+    design: Design, board: Board, *, rate: int = RATE, progress: Callable[[str], None] = lambda step: None
 ) -> BoardProject:
     """Make the project of a design for a board; parameters and errors as for `build_board`, but nothing is built."""
     core, verilog = texts(design, board, rate, progress)

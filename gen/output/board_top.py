@@ -9,8 +9,8 @@ from sosmith.gen.core import CoreDesign
 from sosmith.gen.fpga.audio_clock import audio_pll
 from sosmith.gen.fpga.boards import RATE, Board
 from sosmith.gen.fpga.wiring import PLAIN, Wiring
-from sosmith.gen.output.identity import identity
-from sosmith.gen.output.verilog import core_verilog, to_rtlil, to_verilog
+from sosmith.gen.output.identity import BoardItem, identity, item_of
+from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.hdl.boards.board_top import BoardTop
 from sosmith.hdl.bus.command_engine import MAX_CHANNELS, MAX_READINGS, MAX_SAMPLE_BYTES
 from sosmith.hdl.bus.uart import MIN_CLOCKS
@@ -18,21 +18,25 @@ from sosmith.model.converters.i2s_converter import I2sConverter
 from sosmith.model.converters.schedule import Schedule
 from sosmith.model.errors import SpecificationError
 
+Design = CoreDesign | BoardItem
+"""What stands in a board."""
 
-def top_name(design: CoreDesign) -> str:
+
+def top_name(design: Design) -> str:
     """Name of the top module of a design's board."""
-    return f"{design.datapath.name}_board"
+    name = design.name if isinstance(design, BoardItem) else design.datapath.name
+    return f"{name}_board"
 
 
 def board_top(
-    design: CoreDesign, *, clock: Fraction, rate: int = RATE, core: str | None = None, waits: bool = False
+    design: Design, *, clock: Fraction, rate: int = RATE, core: str | None = None, waits: bool = False
 ) -> BoardTop:
     """Return the top of a board that has the core of a design.
 
     Parameters
     ----------
-    design : CoreDesign
-        The core.
+    design : CoreDesign or BoardItem
+        The core, or what stands for it.
     clock : Fraction
         Clock of the board in Hz.
     rate : int
@@ -57,15 +61,16 @@ def board_top(
         )
     if design.spec.channels > MAX_CHANNELS:
         raise SpecificationError(f"channels must be at most {MAX_CHANNELS} over a link, not {design.spec.channels:,}")
-    sample_bytes = sum(port.bytes for port in design.datapath.inputs)
+    item = item_of(design)
+    sample_bytes = sum(port.bytes for port in item.inputs)
     if sample_bytes > MAX_SAMPLE_BYTES:
         raise SpecificationError(f"a sample must have at most {MAX_SAMPLE_BYTES} bytes over a link, not {sample_bytes}")
-    schedule = schedule_of(design, clock) if design.spec.converters else None
-    text = core or core_verilog(design)
+    schedule = schedule_of(item, clock) if design.spec.converters else None
+    text = core or item.verilog
     source: Literal["link", "converter"] = "link" if schedule is None else "converter"
-    about = identity(design, text, baud=rate, clock=float(clock), source=source)
+    about = identity(item, text, baud=rate, clock=float(clock), source=source)
     return BoardTop(
-        design.architecture.component(),
+        item.component(),
         about.memory,
         ratio=clock / rate,
         channels=design.spec.channels,
@@ -75,12 +80,12 @@ def board_top(
     )
 
 
-def schedule_of(design: CoreDesign, clock: Fraction) -> Schedule:
+def schedule_of(design: Design, clock: Fraction) -> Schedule:
     """Return when the board of a design with converters reads which of them.
 
     Parameters
     ----------
-    design : CoreDesign
+    design : CoreDesign or BoardItem
         The core.
     clock : Fraction
         Clock of the board in Hz.
@@ -91,14 +96,15 @@ def schedule_of(design: CoreDesign, clock: Fraction) -> Schedule:
         If the core has other inputs or another output than the converters, more inputs than a message of the link
         holds, or the converters are too slow.
     """
-    spec, ports = design.spec, design.datapath.inputs
+    spec, item = design.spec, item_of(design)
+    ports = item.inputs
     if ports != tuple(each.reading.port for each in spec.converters):
         names = " and ".join(port.name for port in ports)
         wanted = " and ".join(each.reading.port.name for each in spec.converters)
         raise SpecificationError(f"the core must have the inputs {wanted} of the converters, not {names}")
-    if spec.dac is not None and spec.dac.port != design.datapath.output:
+    if spec.dac is not None and spec.dac.port != item.output:
         raise SpecificationError(
-            f"the core must have the output {spec.dac.port.name} of the converter, not {design.datapath.output.name}"
+            f"the core must have the output {spec.dac.port.name} of the converter, not {item.output.name}"
         )
     if spec.channels * len(ports) > MAX_READINGS:
         raise SpecificationError(
@@ -111,11 +117,11 @@ def schedule_of(design: CoreDesign, clock: Fraction) -> Schedule:
         channels=spec.channels,
         clock=clock,
         sample_rate=spec.sample_rate,
-        latency=max(design.architecture.latency_cycles, design.architecture.cycles_per_sample),
+        latency=max(item.latency_cycles, item.cycles_per_sample),
     )
 
 
-def wiring_of(design: CoreDesign, board: Board) -> Wiring:
+def wiring_of(design: Design, board: Board) -> Wiring:
     """Return what the top of a design needs of a board: pins for its converters, and a clock that fits them.
 
     Raises
@@ -141,10 +147,12 @@ def wiring_of(design: CoreDesign, board: Board) -> Wiring:
 
 
 def board_verilog(
-    design: CoreDesign, *, clock: Fraction, rate: int = RATE, core: str | None = None, waits: bool = False
+    design: Design, *, clock: Fraction, rate: int = RATE, core: str | None = None, waits: bool = False
 ) -> str:
     """Return the SystemVerilog of a design's board, with the top module `top_name`.
 
     Parameters and errors are those of `board_top`.
     """
-    return to_verilog(to_rtlil(board_top(design, clock=clock, rate=rate, core=core, waits=waits), top_name(design)))
+    item = item_of(design)
+    top = to_verilog(to_rtlil(board_top(item, clock=clock, rate=rate, core=core, waits=waits), top_name(item)))
+    return top + item.make_modules()

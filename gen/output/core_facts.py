@@ -91,6 +91,8 @@ class InterfaceFacts:
         Samples of a channel for each result; the first sample brings one, and then every so many of them.
     copies_per_result : int
         Times that each result is handed out, one after the other.
+    rates : tuple of tuple of int
+        By how much each stage of a chain that interpolates does so, and decimates, in order; empty for any other.
     """
 
     name: str
@@ -100,6 +102,7 @@ class InterfaceFacts:
     latency_cycles: int
     samples_per_result: int = 1
     copies_per_result: int = 1
+    rates: tuple[tuple[int, int], ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)

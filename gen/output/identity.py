@@ -1,15 +1,21 @@
-"""The identity of the board that a core is built into, for its memory and for the host."""
+"""What a board has to know of the core or chain of cores in it, and the identity that it tells the host."""
 
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
+from amaranth.lib.wiring import Component
 from pydantic import ValidationError
 
 from sosmith.gen.core import CoreDesign, refuse_decimated_channels
 from sosmith.gen.output.core_facts import interface_facts
+from sosmith.gen.output.verilog import core_verilog
 from sosmith.gen.reload.register_writes import bank_size
+from sosmith.gen.specification.specification import Specification
 from sosmith.gen.version import __version__
 from sosmith.model.dataflow.status import Flag
 from sosmith.model.errors import SpecificationError
@@ -22,15 +28,109 @@ _ROOM = 1.1
 """What of the line must be free for other requests, as a factor of what results need."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class BoardItem:
+    """What stands in a board, with one result for each sample.
+
+    Attributes
+    ----------
+    name : str
+        Name of its top module.
+    kind : str
+        One of `sosmith.gen.specification.choices.CORES`, or "chain".
+    architecture : str
+        Name of the architecture; of a chain, those of the stages, joined by an underscore each.
+    spec : Specification
+        What is asked for; of a chain, what is common to all stages.
+    inputs : tuple of Port
+    output : Port
+    flags : dict of str to int
+        Bits of the flags by their names.
+    possible : tuple of int
+        Bits of those that a result can have.
+    cycles_per_sample, latency_cycles : int
+        Clocks between samples of all channels at the highest rate, and from a sample to its result.
+    fingerprint : int or None
+        What the register DESIGN has; None without registers.
+    words : int
+        Words of a set of coefficients.
+    component : callable
+        Makes the component, with the members of a core, for the board's top.
+    make_verilog : callable
+        Makes its SystemVerilog, whose digest the board tells.
+    make_modules : callable
+        Makes the SystemVerilog of modules that the component takes as they are.
+    """
+
+    name: str
+    kind: str
+    architecture: str
+    spec: Specification
+    inputs: tuple[Port, ...]
+    output: Port
+    flags: dict[str, int]
+    possible: tuple[int, ...]
+    cycles_per_sample: int
+    latency_cycles: int
+    fingerprint: int | None
+    words: int
+    component: Callable[[], Component]
+    make_verilog: Callable[[], str]
+    make_modules: Callable[[], str] = lambda: ""
+
+    @cached_property
+    def verilog(self) -> str:
+        """Its SystemVerilog, as it is generated."""
+        return self.make_verilog()
+
+
+def core_item(design: CoreDesign) -> BoardItem:
+    """Return what a board has to know of a core.
+
+    Raises
+    ------
+    SpecificationError
+        If beats of the core hold several samples, or there is not a result for each sample.
+    """
+    _check(design)
+    fingerprint = design.architecture.fingerprint
+    return BoardItem(
+        name=design.datapath.name,
+        kind=design.core,
+        architecture=design.architecture.name,
+        spec=design.spec,
+        inputs=tuple(design.datapath.inputs),
+        output=design.datapath.output,
+        flags=dict(interface_facts(design).outputs.flags),
+        possible=_possible(design),
+        cycles_per_sample=design.architecture.cycles_per_sample,
+        latency_cycles=design.architecture.latency_cycles,
+        fingerprint=fingerprint,
+        words=0 if fingerprint is None else bank_size(design.architecture)[0],
+        component=design.architecture.component,
+        make_verilog=lambda: core_verilog(design),
+    )
+
+
+def item_of(design: CoreDesign | BoardItem) -> BoardItem:
+    """Return an item as it is, and that of a core; errors as those of `core_item`."""
+    return design if isinstance(design, BoardItem) else core_item(design)
+
+
 def identity(
-    design: CoreDesign, verilog: str, *, baud: int, clock: float, source: Literal["link", "converter"] = "link"
+    design: CoreDesign | BoardItem,
+    verilog: str,
+    *,
+    baud: int,
+    clock: float,
+    source: Literal["link", "converter"] = "link",
 ) -> Identity:
     """Return the identity of a board.
 
     Parameters
     ----------
-    design : CoreDesign
-        The core.
+    design : CoreDesign or BoardItem
+        What stands in it.
     verilog : str
         Its SystemVerilog, as `generated` gives it.
     baud : int
@@ -46,48 +146,45 @@ def identity(
         If beats of the core hold several samples, there is not a result for each sample, or a host would refuse the
         identity, as it does with a rate or an LSB outside the ranges of docs/protocol.md.
     """
-    _check(design)
+    item = item_of(design)
     try:
-        return _identity(design, verilog, baud, clock, source)
+        return _identity(item, verilog, baud, clock, source)
     except ValidationError as error:
         raise SpecificationError(
-            f"{design.spec.path}: a board must have an identity as in docs/protocol.md, not: {first_fault(error)}"
+            f"{item.spec.path}: a board must have an identity as in docs/protocol.md, not: {first_fault(error)}"
         ) from None
 
 
-def _identity(
-    design: CoreDesign, verilog: str, baud: int, clock: float, source: Literal["link", "converter"]
-) -> Identity:
-    datapath, fingerprint = design.datapath, design.architecture.fingerprint
-    words, _ = (0, 0) if fingerprint is None else bank_size(design.architecture)
+def _identity(item: BoardItem, verilog: str, baud: int, clock: float, source: Literal["link", "converter"]) -> Identity:
     of_one_sample = Identity(
         protocol=VERSION,
-        name=datapath.name,
-        core=design.core,
+        name=item.name,
+        core=item.kind,
         sosmith=__version__,
         design=hashlib.sha256(verilog.encode()).hexdigest(),
-        architecture=design.architecture.name,
-        channels=design.spec.channels,
-        sample_rate=float(design.spec.sample_rate),
+        architecture=item.architecture,
+        channels=item.spec.channels,
+        sample_rate=float(item.spec.sample_rate),
         clock=float(clock),
         baud=baud,
         source=source,
         samples=1,
-        inputs=tuple(_quantity(port) for port in datapath.inputs),
-        output=_quantity(datapath.output),
-        flags=dict(interface_facts(design).outputs.flags) | ({} if source == "link" else CONVERTER_FLAGS),
-        reload=None if fingerprint is None else Reload(design=fingerprint, words=words),
+        inputs=tuple(_quantity(port) for port in item.inputs),
+        output=_quantity(item.output),
+        flags=item.flags | ({} if source == "link" else CONVERTER_FLAGS),
+        reload=None if item.fingerprint is None else Reload(design=item.fingerprint, words=item.words),
     )
     of_one_sample = of_one_sample.model_copy(
         update={"samples": samples_per_message(of_one_sample.sample_bytes, of_one_sample.result_bytes)}
     )
-    return of_one_sample.model_copy(update={"packed": _packed(design, of_one_sample)})
+    return of_one_sample.model_copy(update={"packed": _packed(item, of_one_sample)})
 
 
-def _packed(design: CoreDesign, identity: Identity) -> tuple[int, ...] | None:
+def _packed(item: BoardItem, identity: Identity) -> tuple[int, ...] | None:
     """Return the flags of packed results, if the line carries the sample rate with them, and not without."""
     needed = _ROOM * identity.sample_rate * identity.channels
-    flags = _possible(design, identity.source)
+    fault = {int(Flag.FAULT)} if identity.source == "converter" else set()
+    flags = tuple(sorted({*item.possible} | fault))
     count = Packing(identity.output_port, flags).per_message(
         1 if identity.source == "converter" else identity.sample_bytes
     )
@@ -95,7 +192,11 @@ def _packed(design: CoreDesign, identity: Identity) -> tuple[int, ...] | None:
     return flags if plain < needed <= packed else None
 
 
-def _possible(design: CoreDesign, source: str) -> tuple[int, ...]:
+def _quantity(port: Port) -> Quantity:
+    return (port.name, port.bits, port.signed, float(port.zero), float(port.lsb), port.unit)
+
+
+def _possible(design: CoreDesign) -> tuple[int, ...]:
     """Bits of the flags that a result can have: with registers, any."""
     datapath = design.datapath
     if design.architecture.fingerprint is not None:
@@ -108,7 +209,7 @@ def _possible(design: CoreDesign, source: str) -> tuple[int, ...]:
         Flag.WEAR_WARNING: bool(datapath.wear),
         Flag.WEAR_CRITICAL: bool(datapath.wear),
         Flag.SETTLING: datapath.settles,
-        Flag.FAULT: source == "converter" or design.spec.hardware.protect != "none",
+        Flag.FAULT: design.spec.hardware.protect != "none",
     }
     return tuple(int(flag) for flag in Flag if can[flag])
 
@@ -127,7 +228,3 @@ def _check(design: CoreDesign) -> None:
             f"{design.spec.path}: filter.hold must be true with filter.decimate = {factor} on a board, which "
             "returns a result for each sample, not false"
         )
-
-
-def _quantity(port: Port) -> Quantity:
-    return (port.name, port.bits, port.signed, float(port.zero), float(port.lsb), port.unit)

@@ -48,7 +48,8 @@ class StreamBench:
 
     def results(self, beats: Beats) -> int:
         """Count what comes out: of each channel a result for the first sample and each group behind it, with copies."""
-        return beats.results(int(self.config["samples_per_result"]), int(self.config["copies_per_result"]))
+        config = self.config
+        return beats.results(int(config["samples_per_result"]), int(config["copies_per_result"]), config["rates"])
 
     def has(self, name: str) -> bool:
         """Whether the streams have the optional signal `name`."""

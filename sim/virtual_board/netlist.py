@@ -20,10 +20,10 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
-from sosmith.gen.core import CoreDesign
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.fpga.synthesis import synthesize
-from sosmith.gen.output.board_top import board_verilog, schedule_of, top_name
+from sosmith.gen.output.board_top import Design, board_verilog, schedule_of, top_name
+from sosmith.gen.output.identity import item_of
 from sosmith.model.arrays import Codes
 from sosmith.model.converters.schedule import Schedule
 from sosmith.model.errors import SpecificationError, ToolError
@@ -145,7 +145,7 @@ class Netlist:
 
 
 def build(
-    design: CoreDesign,
+    design: Design,
     folder: Path,
     *,
     clock: Fraction | None = None,
@@ -157,8 +157,8 @@ def build(
 
     Parameters
     ----------
-    design : CoreDesign
-        The core.
+    design : CoreDesign or BoardItem
+        The core, or what stands for it.
     folder : Path
         For ``<name>_board.sv``, the program, and the files in between.
     clock : Fraction or None
@@ -206,7 +206,8 @@ def build(
         except subprocess.CalledProcessError as error:
             raise ToolError(f"{Path(error.cmd[0]).name} must build the board, not fail: see {log.name}") from None
     # No request keeps the board busier than one whose samples fill a message.
-    quiet = max(WINDOWS) * MAX_BODY * (design.architecture.cycles_per_sample + 100)
+    item = item_of(design)
+    quiet = max(WINDOWS) * MAX_BODY * (item.cycles_per_sample + item.latency_cycles + 100)
     return Netlist(program, rate, baud, quiet if schedule is None else 0, schedule)
 
 

@@ -7,10 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.gen.chain import rising
 from tests.gen.chain.chains import PLAIN, draw, stimulus
+from tests.gen.chain.rising import SHAPES
 
 import sosmith
 from sosmith.gen.chain import flags
+from sosmith.gen.chain.rates import results_of
 from sosmith.sim import chain as simulation
 
 SEEDS = range(24)
@@ -31,6 +34,42 @@ def test_the_hardware_equals_the_models(seed: int, simulator: str, tmp_path: Pat
     assert report.summary["samples"] == -(-700 // chain.factor) * chain.core.spec.base.channels
     assert report.summary["error"]["max_abs"] <= report.summary["error"]["bound"] == float(chain.bound)
     assert (tmp_path / "report.html").read_text(encoding="utf-8").count("<svg") == 2
+
+
+RISING = [
+    pytest.param(seed, simulator, marks=[] if (seed, simulator) == (0, "icarus") else pytest.mark.slow)
+    for simulator, seeds in (("icarus", range(len(SHAPES))), ("verilator", range(1, len(SHAPES), 2)))
+    for seed in seeds
+]
+
+
+@pytest.mark.parametrize(("seed", "simulator"), RISING)
+def test_the_hardware_of_a_chain_that_interpolates_equals_the_models(seed: int, simulator: str, tmp_path: Path) -> None:
+    """With random handshakes, and a reset in mid-stream."""
+    chain = sosmith.design_chain(rising.draw(seed))
+    codes = rising.stimulus(chain, 60, seed)
+    (port,) = chain.core.spec.base.inputs
+    report = chain.simulate({"x": port.decode(codes)}, folder=tmp_path, simulator=simulator, seed=seed)
+    assert report.bit_exact
+    assert report.passed
+    assert report.summary["samples"] == results_of(chain.core.rates, 60) * codes.shape[1]
+
+
+@pytest.mark.slow
+def test_a_stage_whose_results_are_in_another_order_is_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = simulation.whole_text
+
+    def crossed(design: Any, directory: Path) -> str:
+        text = whole(design, directory)
+        assert "is0 ? i0_tdata" in text
+        return text.replace("is0 ? i0_tdata", "is0 ? i1_tdata")
+
+    monkeypatch.setattr(simulation, "whole_text", crossed)
+    chain = sosmith.design_chain(rising.UP)
+    codes = rising.stimulus(chain, 30, 1)
+    (port,) = chain.core.spec.base.inputs
+    report = chain.simulate({"x": port.decode(codes[:, 0])}, folder=tmp_path, simulator="icarus")
+    assert not report.bit_exact
 
 
 def test_a_calibration_before_a_filter(tmp_path: Path) -> None:

@@ -23,13 +23,23 @@ from sosmith.verify.certificate_file import (
     read_entries,
 )
 
+_MARK = b'"format": "sosmith chain certificate '
+
+
+def is_chain_certificate(content: bytes) -> bool:
+    """Say whether the content of a certificate file is that of a chain, by its begin."""
+    return _MARK in content[:100]
+
 
 class ChainStageEntry(Entry):
-    """A stage: its certificate, its own error, and how much of that reaches the end at most."""
+    """A stage: the certificates of its cores, its own error, and how much of that reaches the end at most.
+
+    A stage that interpolates has a core for each of the results of a sample, in their order; any other has one.
+    """
 
     name: Text
     kind: Literal["polynomial", "gain", "iir", "fir", "halfband", "cic"]
-    certificate: FileEntry
+    certificates: Annotated[tuple[FileEntry, ...], Field(min_length=1, max_length=64)]
     error: Rational
     gain: Rational
 
@@ -42,13 +52,15 @@ class LargestEntry(Entry):
 
 
 class FoldingEntry(Entry):
-    """What comes out at another frequency than it went in, as only every `factor`-th sample leaves.
+    """What comes out of some stages at another frequency than it went in; none interpolates behind one that decimates.
 
-    `anywhere` bounds the gain of all of it: of frequencies from half the lower rate on. `passing` bounds that of what
-    comes out at a frequency up to `edge`, in units of the sample rate; both are None without a pass band.
+    Together they interpolate by `rise`, then decimate by `factor`. Frequencies are in units of the rate between.
+    `anywhere` bounds the gain of images and aliases, from half the lower one of both other rates on. `passing` bounds
+    that of what comes in, or out, at a frequency up to `edge`; both are None without a pass band.
     """
 
-    factor: Annotated[int, Field(strict=True, ge=2, le=1 << 20)]
+    rise: Annotated[int, Field(strict=True, ge=1, le=1 << 20)]
+    factor: Annotated[int, Field(strict=True, ge=1, le=1 << 20)]
     anywhere: LargestEntry
     edge: Rational | None = None
     passing: LargestEntry | None = None
@@ -74,7 +86,7 @@ class ChainCertificate(Entry):
     stages: Annotated[tuple[ChainStageEntry, ...], Field(min_length=1, max_length=8)]
     bound: Rational
     settling: Annotated[int, Field(strict=True, ge=0, le=1 << 30)] = 0
-    folding: FoldingEntry | None = None
+    folding: Annotated[tuple[FoldingEntry, ...], Field(max_length=8)] = ()
     files: Annotated[tuple[FileEntry, ...], Field(max_length=8)] = ()
     certificate: Sha256
 

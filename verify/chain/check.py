@@ -14,14 +14,22 @@ from functools import partial
 from pathlib import Path
 
 from sosmith.verify.bounds.l1_response import UndecidedError
-from sosmith.verify.certificate_file import Certificate, ItemEntry, PortEntry, entries_in, entries_text, on_grid
+from sosmith.verify.certificate_file import (
+    Certificate,
+    FileEntry,
+    ItemEntry,
+    PortEntry,
+    entries_in,
+    entries_text,
+    on_grid,
+)
 from sosmith.verify.chain.c_model import check_chain_model
-from sosmith.verify.chain.chain_file import ChainCertificate, sealed_chain
-from sosmith.verify.chain.flags import FlagsClaim
+from sosmith.verify.chain.chain_file import ChainCertificate, ChainStageEntry, sealed_chain
+from sosmith.verify.chain.flags import FlagsClaim, timing_of
 from sosmith.verify.chain.folding import check_folding
 from sosmith.verify.chain.manifest import check_chain_manifest
-from sosmith.verify.chain.responses import Part, factor_of, parts_of, peak_gain, reach_of
-from sosmith.verify.chain.top import check_top
+from sosmith.verify.chain.responses import Part, factor_of, parts_of, peak_gain, reach_of, rise_of
+from sosmith.verify.chain.top import Stage, check_top
 from sosmith.verify.chain.words import check_words
 from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.verdict.door import Judgement, Stated, judge
@@ -33,6 +41,12 @@ from sosmith.verify.verification import Progress
 
 _OWN_FILES = ("{}.sv", "{}.json", "{}.c", "{}.h")
 _GRID = Fraction(1, 1 << 64)
+_RISING = ("fir", "halfband", "cic")
+"""Kinds of stages that may be several cores."""
+
+Groups = Sequence[tuple[Certificate, ...]]
+"""The certificates of each stage's cores."""
+
 _PLAIN = re.compile(r"[A-Za-z_]\w{0,199}", re.ASCII)
 
 
@@ -99,62 +113,75 @@ def judge_chain(
     """
     _check_names(chain)
     _check_seal(chain, content)
-    cores, stages = [], dict[str, Judgement]()
+    groups, stages = list[tuple[Certificate, ...]](), dict[str, Judgement]()
     for entry in chain.stages:
-        name = f"{chain.name}_{entry.name}"
-        require(
-            entry.certificate.name == f"{name}.certificate.json",
-            f"the certificate of stage {entry.name} must be {name}.certificate.json, not {entry.certificate.name}",
-        )
-        path = folder / entry.certificate.name
-        own = content_of(path, links=False)
-        _compare(str(path), entry.certificate.sha256, own)
-        core = entries_in(own, path, Certificate)
-        require(
-            entries_text(core).encode() == own,
-            f"the certificate of stage {entry.name} must have the layout in which it was written, not another one",
-        )
-        require(core.name == name, f"the core of stage {entry.name} must be {name}, not {core.name}")
-        data = about_of(core).measurements
-        stated = (
-            None
-            if text is None
-            else Stated(
-                about_of(core).specification,
-                spec_folder,
-                None if data is None else spec_folder / data.name,
-                "calibration" if entry.kind == "polynomial" else "filter",
-            )
-        )
-        try:
-            stages[entry.name] = judge(
-                core,
-                partial(_named, progress, entry.name),
-                stated=stated,
-                folder=folder if with_files else None,
-                content=own,
-                seconds=seconds,
-            )
-        except RejectedError as error:
-            raise RejectedError(f"stage {entry.name}: {error}") from None
-        cores.append(core)
+        cores = []
+        for label, file in zip(_labels(entry), entry.certificates, strict=True):
+            core = _read(chain, label, file, folder)
+            stated = None
+            if text is not None:
+                stated = _stated(core, spec_folder, "calibration" if entry.kind == "polynomial" else "filter")
+            try:
+                stages[label] = judge(
+                    core,
+                    partial(_named, progress, label),
+                    stated=stated,
+                    folder=folder if with_files else None,
+                    content=entries_text(core).encode(),
+                    seconds=seconds,
+                )
+            except RejectedError as error:
+                raise RejectedError(f"stage {label}: {error}") from None
+            cores.append(core)
+        groups.append(tuple(cores))
     with limited(seconds):
         progress("chain", 0, 0)
-        items = _check_joints(chain, cores)
-        flags = _flags(chain, cores, items)
-        budget = _check_bound(chain, cores)
+        items = _check_joints(chain, groups)
+        flags = _flags(chain, groups, items)
+        budget = _check_bound(chain, groups)
         progress("folding", 0, 0)
         try:
-            check_folding(chain.folding, [part for core in cores for part in parts_of(core)])
+            check_folding(chain.folding, [part for cores in groups for part in parts_of(cores)])
         except UndecidedError as error:
             raise RejectedError(f"{error} could not be decided") from None
         if text is not None:
-            check_words(chain, text, cores)
+            check_words(chain, text, groups)
         files = sum(len(stage.files) for stage in stages.values())
         if with_files:
             progress("files", 0, 0)
-            files += _check_files(chain, folder, cores, items, stages, flags)
+            files += _check_files(chain, folder, groups, items, stages, flags)
     return ChainJudgement(stages, chain.bound, budget, files, _scope(chain, stages, text is not None, with_files))
+
+
+def _labels(entry: ChainStageEntry) -> list[str]:
+    """Return what the cores of a stage are called: its name, with the number of a result where there are several."""
+    count = len(entry.certificates)
+    return [entry.name] if count == 1 else [f"{entry.name}_p{k}" for k in range(count)]
+
+
+def _read(chain: ChainCertificate, label: str, file: FileEntry, folder: Path) -> Certificate:
+    """Read the certificate of a core, which is the one that the chain names."""
+    name = f"{chain.name}_{label}"
+    require(
+        file.name == f"{name}.certificate.json",
+        f"the certificate of stage {label} must be {name}.certificate.json, not {file.name}",
+    )
+    path = folder / file.name
+    own = content_of(path, links=False)
+    _compare(str(path), file.sha256, own)
+    core = entries_in(own, path, Certificate)
+    require(
+        entries_text(core).encode() == own,
+        f"the certificate of stage {label} must have the layout in which it was written, not another one",
+    )
+    require(core.name == name, f"the core of stage {label} must be {name}, not {core.name}")
+    return core
+
+
+def _stated(core: Certificate, spec_folder: Path, kind: str) -> Stated:
+    data = about_of(core).measurements
+    measured = None if data is None else spec_folder / data.name
+    return Stated(about_of(core).specification, spec_folder, measured, kind)
 
 
 def _named(progress: Progress, stage: str, step: str, done: int, total: int) -> None:
@@ -185,55 +212,82 @@ def _compare(what: str, stated: str, content: bytes) -> None:
     require(digest == stated, f"{what} must have the SHA-256 {stated} of the certificate, not {digest}")
 
 
-def _check_joints(chain: ChainCertificate, cores: Sequence[Certificate]) -> list[ItemEntry]:
+def _check_joints(chain: ChainCertificate, groups: Groups) -> list[list[ItemEntry]]:
     """Check that each stage takes what the one before it gives, and that none has what a chain lacks."""
     items, starts = [], set[str]()
     names = [entry.name for entry in chain.stages]
     require(len(set(names)) == len(names), "the stages of a chain must have names of their own")
-    for k, (entry, core) in enumerate(zip(chain.stages, cores, strict=True)):
-        what = f"stage {entry.name}"
-        item = about_of(core).item
-        if item is None:
-            raise RejectedError(f"the certificate of {what} must state what the item is")
-        require(not item.hold and item.samples == 1, f"{what} must be without hold and several samples a clock")
+    for k, (entry, cores) in enumerate(zip(chain.stages, groups, strict=True)):
+        taken = chain.inputs if k == 0 else (_unnamed(groups[k - 1][0].output),)
+        own_items = []
+        for label, core in zip(_labels(entry), cores, strict=True):
+            own_items.append(_check_core(chain, entry, label, core, first=k == 0))
+            own = core.inputs if k == 0 else tuple(map(_unnamed, core.inputs))
+            require(own == taken, f"stage {label} must take what is before it, {taken}, not {own}")
+            require(core.output == cores[0].output, f"the cores of stage {entry.name} must give the same, not others")
         if entry.kind != "polynomial":
-            starts.add(item.start)
-        require(item.channels == chain.channels, f"{what} must have {chain.channels} channels, not {item.channels}")
-        require(
-            (core.ideal.polynomial is not None) == (entry.kind == "polynomial"),
-            f"{what} must have a polynomial if it is one, and no other",
-        )
-        require(
-            entry.kind != "polynomial" or (k == 0 and not core.ideal.sections), "a polynomial must be the first stage"
-        )
-        taken = chain.inputs if k == 0 else (_unnamed(cores[k - 1].output),)
-        own = core.inputs if k == 0 else tuple(map(_unnamed, core.inputs))
-        require(own == taken, f"{what} must take what is before it, {taken}, not {own}")
-        items.append(item)
-    require(_unnamed(cores[-1].output) == _unnamed(chain.output), "the last stage must give the output of the chain")
+            starts |= {item.start for item in own_items}
+        _check_beside(entry, own_items)
+        items.append(own_items)
+    last = groups[-1][0].output
+    require(_unnamed(last) == _unnamed(chain.output), "the last stage must give the output of the chain")
     require(len(starts) < 2, f"all stages must start alike, not from {' and '.join(sorted(starts))}")
     return items
 
 
-def _flags(chain: ChainCertificate, cores: Sequence[Certificate], items: Sequence[ItemEntry]) -> FlagsClaim | None:
+def _check_core(
+    chain: ChainCertificate, entry: ChainStageEntry, label: str, core: Certificate, *, first: bool
+) -> ItemEntry:
+    """Check what a core of a stage is, by itself."""
+    what, item = f"stage {label}", about_of(core).item
+    if item is None:
+        raise RejectedError(f"the certificate of {what} must state what the item is")
+    require(not item.hold and item.samples == 1, f"{what} must be without hold and several samples a clock")
+    require(item.channels == chain.channels, f"{what} must have {chain.channels} channels, not {item.channels}")
+    require(
+        (core.ideal.polynomial is not None) == (entry.kind == "polynomial"),
+        f"{what} must have a polynomial if it is one, and no other",
+    )
+    require(entry.kind != "polynomial" or (first and not core.ideal.sections), "a polynomial must be the first stage")
+    return item
+
+
+def _check_beside(entry: ChainStageEntry, items: Sequence[ItemEntry]) -> None:
+    """Check that cores of one stage have the same streams, and neither check bits nor registers."""
+    if len(items) == 1:
+        return
+    what = f"the cores of stage {entry.name}"
+    require(entry.kind in _RISING, f"{what} must be one for the kind {entry.kind}, not {len(items)}")
+    for item in items:
+        for part in ("taken", "given", "flags", "calibrated"):
+            require(getattr(item, part) == getattr(items[0], part), f"{what} must have the same {part}")
+        require(not item.reload and item.protect == "none", f"{what} must be without reload and protect")
+
+
+def _flags(chain: ChainCertificate, groups: Groups, items: Sequence[Sequence[ItemEntry]]) -> FlagsClaim | None:
     """Check for how many results a chain settles, and return what its flags must be; None for a single stage."""
-    samples, step = 0, 1
-    for core in cores:
-        samples += (core.claims.settling or 0) * step
-        step *= factor_of(parts_of(core))
-    settling = -(-samples // step)
+    rates, settled = [], 0
+    for cores in groups:
+        own = parts_of(cores)
+        rates.append((rise_of(own), factor_of(own)))
+        settled = -(-(settled + max(core.claims.settling or 0 for core in cores)) * rates[-1][0] // rates[-1][1])
+    timing = timing_of(rates[1:])
+    count, settling = timing.bringing(settled) if len(groups) > 1 else (settled, settled)
     require(chain.settling == settling, f"settling of the chain must be {settling} results, not {chain.settling}")
-    if len(cores) == 1:
+    if len(groups) == 1:
         return None
+    first = items[0][0]
     return FlagsClaim(
         name=f"{chain.name}_flags",
-        carried=2 if items[0].calibrated else 1,
-        factor=step // factor_of(parts_of(cores[0])),
-        settling=settling,
+        carried=2 if first.calibrated else 1,
+        timing=timing,
+        settling=count,
         channels=chain.channels,
-        dest=items[0].given.dest_width,
+        dest=first.given.dest_width,
         guarded=tuple(
-            entry.name for entry, item in zip(chain.stages[:-1], items, strict=False) if item.protect != "none"
+            entry.name
+            for entry, own_items in zip(chain.stages[:-1], items, strict=False)
+            if own_items[0].protect != "none"
         ),
     )
 
@@ -242,28 +296,27 @@ def _unnamed(port: PortEntry) -> PortEntry:
     return port.model_copy(update={"name": ""})
 
 
-def _check_bound(chain: ChainCertificate, cores: Sequence[Certificate]) -> dict[str, Fraction]:
+def _check_bound(chain: ChainCertificate, groups: Groups) -> dict[str, Fraction]:
     """Check the gains, the errors, that no port between stages limits anything, and the sum."""
-    parts = [parts_of(core) for core in cores]
+    parts = list(map(parts_of, groups))
     budget: dict[str, Fraction] = {}
-    reach, carried = reach_of(cores[0]), Fraction(0)
-    for k, (entry, core) in enumerate(zip(chain.stages, cores, strict=True)):
+    reach, carried = reach_of(groups[0][0]), Fraction(0)
+    for k, (entry, cores) in enumerate(zip(chain.stages, groups, strict=True)):
         behind = [part for each in parts[k + 1 :] for part in each]
         gain = on_grid(peak_gain(behind)) if behind else Fraction(1)
         require(
             gain <= entry.gain <= gain + 2 * _GRID,
             f"the gain behind stage {entry.name} must be {float(gain):.12g}, not {float(entry.gain):.12g}",
         )
-        error = core.claims.bound * core.output.lsb
+        error, port = max(core.claims.bound for core in cores) * cores[0].output.lsb, cores[0].output
         require(error == entry.error, f"the error of stage {entry.name} must be {error}, not {entry.error}")
         budget[entry.name] = error * entry.gain
-        if k == len(cores) - 1:
+        if k == len(groups) - 1:
             break
         own = list(parts[k])
         carried = (carried * peak_gain(own) if own else Fraction(0)) + error
         so_far: list[Part] = [part for each in parts[: k + 1] for part in each]
         largest = (reach * peak_gain(so_far) if so_far else reach) + carried
-        port = core.output
         require(port.zero == 0 and port.signed, f"the port behind stage {entry.name} must be signed")
         require(
             largest < port.highest * port.lsb,
@@ -282,8 +335,8 @@ def _check_bound(chain: ChainCertificate, cores: Sequence[Certificate]) -> dict[
 def _check_files(
     chain: ChainCertificate,
     folder: Path,
-    cores: Sequence[Certificate],
-    items: Sequence[ItemEntry],
+    groups: Groups,
+    items: Sequence[Sequence[ItemEntry]],
     stages: Mapping[str, Judgement],
     flags: FlagsClaim | None,
 ) -> int:
@@ -296,14 +349,19 @@ def _check_files(
         contents[entry.name] = content_of(folder / entry.name, links=False)
         _compare(str(folder / entry.name), entry.sha256, contents[entry.name])
     sv, json, c, h = wanted
+    cores = [core for each in groups for core in each]
     texts = [
         ascii_text(f"{core.name}.sv", stage.files[f"{core.name}.sv"])
         for core, stage in zip(cores, stages.values(), strict=True)
     ]
-    top, names = ascii_text(sv, contents[sv]), [entry.name for entry in chain.stages]
-    check_top(texts, top, chain.name, [core.name for core in cores], items, names, flags)
-    check_chain_manifest(contents[json], chain, cores, items)
-    check_chain_model(unicode_text(c, contents[c]), unicode_text(h, contents[h]), chain, cores, flags)
+    top = ascii_text(sv, contents[sv])
+    joined = [
+        Stage(entry.name, tuple(core.name for core in own), own_items[0])
+        for entry, own, own_items in zip(chain.stages, groups, items, strict=True)
+    ]
+    check_top(texts, top, chain.name, joined, flags)
+    check_chain_manifest(contents[json], chain, groups, items)
+    check_chain_model(unicode_text(c, contents[c]), unicode_text(h, contents[h]), chain, groups, flags)
     return len(contents)
 
 
@@ -315,7 +373,7 @@ def _scope(
     for name in next(iter(stages.values())).scope:
         scope[name] = _together({stage: each.scope[name] for stage, each in stages.items()})
     gains = "each stage's error and its gain to the end bound the whole, and no port between stages limits what passes"
-    folds = "; no alias has more than the gains that are claimed" if chain.folding is not None else ""
+    folds = "; no alias or image has more than the gains that are claimed" if chain.folding else ""
     chained = {"chain": ScopePart(State.PROVEN, gains + folds)}
     if specified:
         chained["stages"] = ScopePart(State.PROVEN, "each stage is the one that the words of the chain ask for")

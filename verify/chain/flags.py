@@ -1,21 +1,91 @@
 """Reads the module that joins the flags of a chain: it must be the one that is written here.
 
-It holds back samples of the first stage while its queue is full, and gives each result an entry of the queue. That the
-flags of a result are those of its samples follows once: of this module, for cores that give results in the order of
-their samples. Its queue may be of any depth that is a power of two: a shallow one is slow, not wrong.
+It holds back samples of the first stage while its queue is full, and gives each result an entry of the queue, which
+leaves with the last result that has it. That the flags of a result are those of its samples follows once: of this
+module, for cores that give results in the order of their samples. Its queue may be of any depth that is a power of two:
+a shallow one is slow, not wrong.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
+from itertools import pairwise
+from operator import mul
 
-from sosmith.verify.graph import RejectedError, require
-from sosmith.verify.reader.source import read_source
+from sosmith.verify.chain.written import check_written
+from sosmith.verify.graph import require
 from sosmith.verify.reader.syntax import Module
 
 _USER = 8
 _FAULT, _SETTLING = 6, 5
 _MOST_ENTRIES = 1 << 12
+
+
+@dataclass(frozen=True)
+class Timing:
+    """What stages behind the first make of its results: `up` times as many, and one of `down`.
+
+    They are left out first if `down_first`, and each left brings `up` results. If not, each brings up / down results,
+    rounded to a whole number of one or the other side, so that there is never less than that in all.
+    """
+
+    up: int
+    down: int
+    down_first: bool
+
+    @property
+    def sure(self) -> int:
+        """Results that come whenever any do, or always."""
+        return self.up if self.down_first else self.up // self.down
+
+    @property
+    def share(self) -> int:
+        """Of `down`, how many bring one more, or any."""
+        return 1 if self.down_first else self.up % self.down
+
+    @property
+    def uneven(self) -> bool:
+        """Whether some bring more than others."""
+        return self.down > 1 and self.share > 0
+
+    @property
+    def silent(self) -> bool:
+        """Whether some bring none."""
+        return self.uneven and (self.down_first or self.sure == 0)
+
+    @property
+    def most(self) -> int:
+        """Results that one brings at most."""
+        return self.sure if self.down_first or not self.uneven else self.sure + 1
+
+    def bringing(self, results: int) -> tuple[int, int]:
+        """Count those that bring at least so many results, the first of which bring any, and these results."""
+        if self.down_first:
+            count = -(-results // self.up)
+            return count, count * self.up
+        if not self.sure or not results:
+            return results, results
+        count = (results - 1) * self.down // self.up + 1
+        return count, -(-count * self.up // self.down)
+
+
+def timing_of(rates: Sequence[tuple[int, int]]) -> Timing:
+    """Return the timing of stages that put in zeros, or leave results out, by these factors.
+
+    Raises
+    ------
+    RejectedError
+        If they do one, the other, and the first again.
+    """
+    turns = [up > 1 for up, down in rates if (up, down) != (1, 1)]
+    require(
+        sum(one != other for one, other in pairwise(turns)) < 2,
+        "the rate must turn once at most behind the first stage",
+    )
+    up, down = (reduce(mul, factors, 1) for factors in zip(*rates, strict=True)) if rates else (1, 1)
+    return Timing(up, down, down_first=up > 1 and not turns[0])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,10 +98,10 @@ class FlagsClaim:
         Name of the module.
     carried : int
         Flags of the inputs: 1 for `input_at_rail`, 2 with `outside_calibration`.
-    factor : int
-        Results of the first stage for each result of the chain.
+    timing : Timing
+        Which results of the first stage bring how many of the chain.
     settling : int
-        Results of a channel that are flagged as settling.
+        Of those of a channel that bring any, how many have results that are flagged as settling.
     channels, dest : int
         Channels, and bits of ``tdest``.
     guarded : tuple of str
@@ -40,7 +110,7 @@ class FlagsClaim:
 
     name: str
     carried: int
-    factor: int
+    timing: Timing
     settling: int
     channels: int
     dest: int
@@ -83,24 +153,17 @@ def check_flags(module: Module, claim: FlagsClaim) -> None:
         2 <= depth <= _MOST_ENTRIES and depth & (depth - 1) == 0,
         f"the queue of {claim.name} must have a power of two of entries up to {_MOST_ENTRIES}, not {depth}",
     )
-    wanted = read_source(_text(claim, depth), claim.name).modules[claim.name]
-    for part in ("ports", "widths", "registers", "depths", "contents", "instances"):
-        own, read = getattr(wanted, part), getattr(module, part)
-        require(own == read, f"the {part} of {claim.name} must be {own}, not {read}")
-    for own, read in zip(wanted.assigns, module.assigns, strict=False):
-        require(own == read, f"{claim.name} must assign {own[1]} to {own[0]}, not {read[1]} to {read[0]}")
-    for own, read in zip(wanted.clocked, module.clocked, strict=False):
-        require(own == read, f"{claim.name} must have the statements {own[1]}, not {read[1]}")
-    if module != wanted:
-        raise RejectedError(f"{claim.name} must have no more and no less than the flags of the chain")
+    check_written(module, _text(claim, depth), claim.name, "the flags of the chain")
 
 
 def _text(claim: FlagsClaim, depth: int) -> str:
     """Return the module as it must be."""
-    carried, settling, several = claim.carried, claim.settling, claim.factor > 1
-    phase, age, pointer = (claim.factor - 1).bit_length(), settling.bit_length(), depth.bit_length() - 1
-    entry = carried + (1 if settling else 0)
-    known = [("kept", carried), ("left", phase)] if several else []
+    carried, settling, timing = claim.carried, claim.settling, claim.timing
+    phase, age, pointer = (timing.down - 1).bit_length(), settling.bit_length(), depth.bit_length() - 1
+    longer = timing.uneven and not timing.silent
+    entry = carried + (1 if settling else 0) + (1 if longer else 0)
+    known = [("kept", carried)] if timing.silent else []
+    known += [("left", phase)] if timing.uneven else []
     known += [("count", age)] if settling else []
     swept = claim.channels > 1 and bool(known)
     ports = [("input", name, width) for name, width in (("aclk", 1), ("aresetn", 1), ("i_tuser", _USER))]
@@ -127,17 +190,7 @@ def _text(claim: FlagsClaim, depth: int) -> str:
     ]
     text += _channels(claim, known) if swept else _one_channel(known)
     inputs = "i_tuser[0]" if carried == 1 else f"i_tuser[{carried - 1}:0]"
-    if several:
-        text += [
-            *_assigned("due", 1, f"left == {phase}'h0"),
-            *_assigned("less", phase, f"left - {phase}'h1"),
-            f"assign next_left = due ? {phase}'d{claim.factor - 1} : less;",
-            *_assigned("gathered", carried, f"{inputs} | kept"),
-            f"assign next_kept = due ? {carried}'h0 : gathered;",
-            *_assigned("brings", 1, "taken & due"),
-        ]
-    else:
-        text += [*_assigned("gathered", carried, inputs), *_assigned("brings", 1, "taken")]
+    text += _bringing(timing, carried, inputs)
     if settling:
         text += [
             *_assigned("young", 1, f"count != {age}'d{settling}"),
@@ -146,21 +199,20 @@ def _text(claim: FlagsClaim, depth: int) -> str:
             "assign next_count = grows ? older : count;",
         ]
     text += [_declared("reg", entry, f"queue [{depth - 1}:0]"), *_emptied("queue", depth, entry)]
-    text += [_declared("reg", pointer + 1, f"head = {pointer + 1}'h0"), *_assigned("leaves", 1, "r_tvalid & m_tready")]
+    text += [_declared("reg", pointer + 1, f"head = {pointer + 1}'h0"), *_leaving(timing, entry, longer=longer)]
     text += _counts("head", pointer + 1, "leaves")
     text += [_declared("reg", pointer + 1, f"tail = {pointer + 1}'h0"), *_counts("tail", pointer + 1, "brings")]
-    text += (
-        [f"always_ff @(posedge aclk) if (brings) queue[tail[{pointer - 1}:0]] <= {{young, gathered}};"]
-        if settling
-        else [f"always_ff @(posedge aclk) if (brings) queue[tail[{pointer - 1}:0]] <= gathered;"]
-    )
+    joined = [*(["due"] if longer else []), *(["young"] if settling else []), "gathered"]
+    stored = f"{{{', '.join(joined)}}}" if len(joined) > 1 else "gathered"
+    text += [f"always_ff @(posedge aclk) if (brings) queue[tail[{pointer - 1}:0]] <= {stored};"]
+    front = f"empty ? {stored} : stored"
     text += [
         *_assigned("waiting", pointer + 1, "tail - head"),
         *_assigned("spare", 1, f"~waiting[{pointer}]"),
         f"assign room = {'spare & open' if swept else 'spare'};",
         *_assigned("stored", entry, f"queue[head[{pointer - 1}:0]]"),
         *_assigned("empty", 1, "tail == head"),
-        *_assigned("front", entry, f"empty ? {'{young, gathered}' if settling else 'gathered'} : stored"),
+        *([f"assign front = {front};"] if longer else _assigned("front", entry, front)),
     ]
     others = "1'h0"
     for stage in claim.guarded:
@@ -179,6 +231,44 @@ def _text(claim: FlagsClaim, depth: int) -> str:
     placed = ["1'h0", "fault" if claim.guarded else "1'h0", f"front[{carried}]" if settling else "1'h0"]
     placed += [f"{_SETTLING - carried}'h0", rails]
     return "\n".join([*text, f"assign m_tuser = r_tuser | {{{', '.join(placed)}}};", "endmodule", ""])
+
+
+def _bringing(timing: Timing, carried: int, inputs: str) -> list[str]:
+    """Return what says that a sample brings results, and which flags go with it."""
+    phase, share, text = (timing.down - 1).bit_length(), timing.share, list[str]()
+    if timing.uneven:
+        text += _assigned("due", 1, f"left == {phase}'h0" if share == 1 else f"left < {phase}'d{share}")
+        text += _assigned("less", phase, f"left - {phase}'d{share}")
+        if share == 1:
+            text += [f"assign next_left = due ? {phase}'d{timing.down - 1} : less;"]
+        else:
+            text += _assigned("more", phase, f"left + {phase}'d{timing.down - share}")
+            text += ["assign next_left = due ? more : less;"]
+    if not timing.silent:
+        return [*text, *_assigned("gathered", carried, inputs), *_assigned("brings", 1, "taken")]
+    return [
+        *text,
+        *_assigned("gathered", carried, f"{inputs} | kept"),
+        f"assign next_kept = due ? {carried}'h0 : gathered;",
+        *_assigned("brings", 1, "taken & due"),
+    ]
+
+
+def _leaving(timing: Timing, entry: int, *, longer: bool) -> list[str]:
+    """Return what says that an entry leaves, with the last result that has it."""
+    if timing.most <= 1:
+        return _assigned("leaves", 1, "r_tvalid & m_tready")
+    bits = (timing.most - 1).bit_length()
+    text = [_declared("reg", bits, f"turn = {bits}'h0"), *_assigned("goes", 1, "r_tvalid & m_tready")]
+    if longer:
+        text += [_declared("wire", entry, "front"), *_assigned("longer", 1, f"front[{entry - 1}]")]
+        text += _assigned("end_turn", bits, f"longer ? {bits}'d{timing.most - 1} : {bits}'d{timing.most - 2}")
+        text += _assigned("last", 1, "turn == end_turn")
+    else:
+        text += _assigned("last", 1, f"turn == {bits}'d{timing.most - 1}")
+    text += [*_assigned("leaves", 1, "goes & last"), *_assigned("later", bits, f"turn + {bits}'h1")]
+    text += _assigned("next_turn", bits, f"last ? {bits}'h0 : later")
+    return [*text, _loaded("turn", bits, "goes", "next_turn")]
 
 
 def _one_channel(known: list[tuple[str, int]]) -> list[str]:

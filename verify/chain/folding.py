@@ -16,7 +16,7 @@ from flint import acb, acb_poly, arb, ctx, fmpq
 
 from sosmith.verify.bounds.l1_response import UndecidedError
 from sosmith.verify.chain.chain_file import FoldingEntry, LargestEntry
-from sosmith.verify.chain.responses import Part, factor_of
+from sosmith.verify.chain.responses import Part, Run, runs_of
 from sosmith.verify.graph import require
 
 _PRECISION = 256
@@ -29,8 +29,8 @@ _HALF = Fraction(1, 2)
 Band = tuple[Fraction, Fraction]
 
 
-def check_folding(entry: FoldingEntry | None, parts: Sequence[Part]) -> None:
-    """Check what is claimed of frequencies that fold.
+def check_folding(entries: Sequence[FoldingEntry], parts: Sequence[Part]) -> None:
+    """Check what is claimed of images and aliases, of each run of parts that changes the rate.
 
     Raises
     ------
@@ -39,27 +39,38 @@ def check_folding(entry: FoldingEntry | None, parts: Sequence[Part]) -> None:
     UndecidedError
         If that cannot be decided.
     """
-    factor = factor_of(parts)
-    require((entry is not None) == (factor > 1), "what folds must be claimed of chains that decimate, and of no other")
-    if entry is None:
-        return
-    require(entry.factor == factor, f"the factor of the chain must be {factor}, not {entry.factor}")
+    runs = [run for run in runs_of(parts) if run.rise > 1 or run.factor > 1]
+    require(
+        len(entries) == len(runs),
+        f"what folds must be claimed of each of {len(runs)} parts of the chain that change the rate, not of "
+        f"{len(entries)}",
+    )
+    for entry, run in zip(entries, runs, strict=True):
+        _check_run(entry, run)
+
+
+def _check_run(entry: FoldingEntry, run: Run) -> None:
+    rates = {"rise": (entry.rise, run.rise), "factor": (entry.factor, run.factor)}
+    for name, (claimed, own) in rates.items():
+        require(claimed == own, f"the {name} of what folds must be {own}, not {claimed}")
+    most = max(run.rise, run.factor)
     with ctx.workprec(_PRECISION):
-        gain = _Gain(parts)
-        _check(gain, entry.anywhere, [(Fraction(1, 2 * factor), _HALF)], "the largest gain of what folds")
+        gain = _Gain(run)
+        _check(gain, entry.anywhere, [(Fraction(1, 2 * most), _HALF)], "the largest gain of what folds")
         require(
             (entry.edge is None) == (entry.passing is None), "a pass band must have both an edge and a gain into it"
         )
         if entry.edge is not None and entry.passing is not None:
             require(
-                0 < entry.edge <= Fraction(1, 2 * factor),
+                0 < entry.edge <= Fraction(1, 2 * most),
                 f"the edge of the pass band must be above 0 and at most half the lower rate, not {entry.edge}",
             )
-            _check(gain, entry.passing, _into(factor, entry.edge), "the largest gain into the pass band")
+            bands = _into(run.factor, entry.edge) + (_into(run.rise, entry.edge) if run.rise != run.factor else [])
+            _check(gain, entry.passing, bands, "the largest gain into the pass band")
 
 
 def _into(factor: int, edge: Fraction) -> list[Band]:
-    """Bands around the multiples of the lower rate."""
+    """Bands around the multiples of a lower rate."""
     bands = []
     for multiple in range(1, factor):
         low, high = Fraction(multiple, factor) - edge, Fraction(multiple, factor) + edge
@@ -100,7 +111,7 @@ def _check(gain: _Gain, claim: LargestEntry, bands: Sequence[Band], what: str) -
 
 
 class _Polynomial:
-    """A polynomial of a section, at the rate of a part, which is 1 of `step` of the first one's."""
+    """A polynomial of a section, at the rate of a part, which is 1 of `step` of the highest one."""
 
     def __init__(self, taps: Sequence[Fraction], step: int) -> None:
         centre = Fraction(len(taps) - 1, 2)
@@ -120,22 +131,20 @@ class _Polynomial:
 
 
 class _Gain:
-    """The gain of parts one behind the other."""
+    """The gain of parts one behind the other, of one of the images."""
 
-    def __init__(self, parts: Sequence[Part]) -> None:
+    def __init__(self, run: Run) -> None:
         self._over: list[_Polynomial] = []
         self._under: list[_Polynomial] = []
-        step = 1
-        for part in parts:
-            for section in part.sections:
-                self._over.append(_Polynomial(section.numerator, step))
-                if len(section.denominator) > 1:
-                    self._under.append(_Polynomial(section.denominator, step))
-            step *= part.factor
+        self._images = run.rise
+        for section, step in run.spread():
+            self._over.append(_Polynomial(section.numerator, step))
+            if len(section.denominator) > 1:
+                self._under.append(_Polynomial(section.denominator, step))
 
     def at(self, frequency: Fraction) -> arb:
-        """Enclose the gain at a frequency in units of the first rate."""
-        value = arb(1)
+        """Enclose the gain at a frequency in units of the highest rate."""
+        value = arb(1) / self._images
         for each in self._over:
             value *= abs(each.tangent(frequency)[0])
         for each in self._under:
@@ -145,7 +154,7 @@ class _Gain:
     def within(self, low: Fraction, high: Fraction, most: arb) -> bool:
         """Say whether the gain is shown to be at most `most` between two frequencies."""
         middle, reach = (low + high) / 2, arb.pi() * _ball(high - low)
-        above, below = arb(1), arb(1)
+        above, below = arb(1) / self._images, arb(1)
         for each in self._over:
             value, slope = each.tangent(middle)
             above *= abs(value + slope * reach).max(abs(value - slope * reach)) + each.beside(reach)

@@ -9,14 +9,17 @@ from typing import Any
 
 from sosmith.verify.certificate_file import Certificate, ItemEntry, PortEntry, StreamEntry
 from sosmith.verify.chain.chain_file import ChainCertificate
-from sosmith.verify.chain.responses import factor_of, parts_of
+from sosmith.verify.chain.responses import factor_of, parts_of, rise_of
 from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.specified.words import words_of
 from sosmith.verify.verdict.generated_files import about_of, unicode_text
 
 
 def check_chain_manifest(
-    content: bytes, chain: ChainCertificate, cores: Sequence[Certificate], items: Sequence[ItemEntry]
+    content: bytes,
+    chain: ChainCertificate,
+    groups: Sequence[tuple[Certificate, ...]],
+    items: Sequence[Sequence[ItemEntry]],
 ) -> None:
     """Check the manifest of a chain.
 
@@ -29,7 +32,7 @@ def check_chain_manifest(
         tree = json.loads(unicode_text(f"{chain.name}.json", content), object_pairs_hook=_without_duplicates)
     except (ValueError, RecursionError):
         raise RejectedError("the manifest must be JSON") from None
-    wanted = _wanted(chain, cores, items)
+    wanted = _wanted(chain, groups, items)
     require(isinstance(tree, dict) and [*tree] == [*wanted], f"the manifest must have the fields {', '.join(wanted)}")
     for name, value in wanted.items():
         require(_is_same(tree[name], value), f"{name} of the manifest must be {value}, not {tree[name]}")
@@ -52,31 +55,36 @@ def _is_same(read: Any, value: Any) -> bool:
     return isinstance(read, bool) == isinstance(value, bool) and bool(read == value)
 
 
-def _wanted(chain: ChainCertificate, cores: Sequence[Certificate], items: Sequence[ItemEntry]) -> dict[str, Any]:
-    parts = [parts_of(core) for core in cores]
+def _wanted(
+    chain: ChainCertificate, groups: Sequence[tuple[Certificate, ...]], items: Sequence[Sequence[ItemEntry]]
+) -> dict[str, Any]:
+    parts = list(map(parts_of, groups))
+    whole, first, last = [part for own in parts for part in own], groups[0][0], groups[-1][0]
     return {
         "name": chain.name,
         "core": "chain",
-        "sosmith_version": about_of(cores[0]).versions["sosmith"],
+        "sosmith_version": about_of(first).versions["sosmith"],
         "spec": _plain(words_of(chain.specification)),
         "channels": chain.channels,
         "streams": {
-            "s_axis": _stream(items[0].taken, cores[0].inputs, {}),
-            "m_axis": _stream(items[-1].given, (cores[-1].output,), items[-1].flags),
+            "s_axis": _stream(items[0][0].taken, first.inputs, {}),
+            "m_axis": _stream(items[-1][0].given, (last.output,), items[-1][0].flags),
         },
         "stages": [
             {
                 "name": entry.name,
                 "kind": entry.kind,
-                "core": core.name,
-                "architecture": item.architecture,
+                "cores": [core.name for core in cores],
+                "architectures": [item.architecture for item in own_items],
+                "interpolate": rise_of(own),
                 "decimate": factor_of(own),
                 "error_bound": float(entry.error),
                 "gain_to_the_end": float(entry.gain),
             }
-            for entry, core, item, own in zip(chain.stages, cores, items, parts, strict=True)
+            for entry, cores, own_items, own in zip(chain.stages, groups, items, parts, strict=True)
         ],
-        "decimate": factor_of([part for own in parts for part in own]),
+        "interpolate": rise_of(whole),
+        "decimate": factor_of(whole),
         "settling_results": chain.settling,
         "error_bound": float(chain.bound),
         "error_parts": {entry.name: float(entry.error * entry.gain) for entry in chain.stages},

@@ -1,12 +1,13 @@
 """The exact response of a chain's stages, from their certificates, and bounds of what it lets through.
 
-A stage is filters with R-th results between them, written as parts. Parts one behind the other have one response at the
-rate of the first: that of a part is spread by the product of the factors before it. Numerators are multiplied exactly.
-Each denominator is inverted by itself (`sosmith.verify.bounds.l1_response`), and errors of the inverses add up to
+A stage is filters with zeros before them and R-th results behind them, written as parts. Parts of which none puts in
+zeros behind one that leaves results out have one response at the highest of their rates: that of a part is spread by
+what lies between. Numerators are multiplied exactly. Each denominator is inverted by itself
+(`sosmith.verify.bounds.l1_response`), and errors of the inverses add up to
 
     |N| ((|h1| + e1) (|h2| + e2) .. - |h1| |h2| ..)
 
-in the sum of magnitudes.
+in the sum of magnitudes. With zeros before, a result has only taps that are so many apart.
 """
 
 from __future__ import annotations
@@ -14,12 +15,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cache, reduce
+from functools import reduce
+from math import gcd
 from operator import mul
 
 from flint import fmpq, fmpq_poly, fmpz_poly
 
-from sosmith.verify.bounds.l1_response import Inverse, inverse
+from sosmith.verify.bounds.l1_response import inverse
 from sosmith.verify.certificate_file import Certificate, PortEntry, SectionEntry
 from sosmith.verify.graph import require
 
@@ -29,14 +31,59 @@ _MOST_TAPS = 1 << 22
 
 @dataclass(frozen=True)
 class Part:
-    """Ideal sections, of whose results every `factor`-th leaves."""
+    """Ideal sections behind `rise` - 1 zeros for each sample, of whose results every `factor`-th leaves."""
 
     sections: tuple[SectionEntry, ...]
     factor: int
+    rise: int = 1
 
 
-def parts_of(certificate: Certificate) -> tuple[Part, ...]:
-    """Return what the ideal of a stage does; nothing for a polynomial."""
+@dataclass(frozen=True)
+class Run:
+    """Parts one behind the other, of which none puts in zeros behind one that leaves results out.
+
+    `rate` is that of the samples that enter, in units of the chain's.
+    """
+
+    parts: tuple[Part, ...]
+    rate: Fraction
+
+    @property
+    def rise(self) -> int:
+        """By how much the rate goes up first."""
+        return reduce(mul, (part.rise for part in self.parts), 1)
+
+    @property
+    def factor(self) -> int:
+        """By how much it goes down then."""
+        return factor_of(self.parts)
+
+    def spread(self) -> list[tuple[SectionEntry, int]]:
+        """Return the sections, and how many samples at the highest rate are one of theirs."""
+        up, down, sections = 1, 1, []
+        for part in self.parts:
+            up *= part.rise
+            sections += [(section, self.rise // up * down) for section in part.sections]
+            down *= part.factor
+        return sections
+
+
+def runs_of(parts: Sequence[Part]) -> list[Run]:
+    """Return runs of parts, each as long as it can be."""
+    runs, start, rate, lowered = list[Run](), 0, Fraction(1), False
+    for k, part in enumerate(parts):
+        if part.rise > 1 and lowered:
+            runs.append(Run(tuple(parts[start:k]), rate))
+            rate, start, lowered = rate * runs[-1].rise / runs[-1].factor, k, False
+        lowered = lowered or part.factor > 1
+    return [*runs, Run(tuple(parts[start:]), rate)] if parts else runs
+
+
+def parts_of(cores: Sequence[Certificate]) -> tuple[Part, ...]:
+    """Return what the ideals of a stage's cores do; nothing for a polynomial."""
+    if len(cores) > 1:
+        return (_in_turn(cores),)
+    (certificate,) = cores
     sections = certificate.ideal.sections
     if certificate.decimation is not None:
         return _cic(certificate.decimation.factor, certificate.decimation.stages), Part(sections, 1)
@@ -44,7 +91,35 @@ def parts_of(certificate: Certificate) -> tuple[Part, ...]:
     return (Part(sections, 1 if down is None else down.factor),) if sections else ()
 
 
-@cache
+def taps_in_turn(cores: Sequence[Certificate]) -> tuple[Fraction, ...]:
+    """Return the taps of which each core has every so many-th, without zeros at the end.
+
+    Raises
+    ------
+    RejectedError
+        If the ideal of a core is anything but taps.
+    """
+    phases = []
+    for core in cores:
+        sections = core.ideal.sections
+        plain = len(sections) == 1 and list(sections[0].denominator) == [Fraction(1)]
+        require(
+            plain and core.decimation is None and core.downsampling is None,
+            f"the core {core.name}, one of several, must be a filter of taps",
+        )
+        phases.append(sections[0].numerator)
+    taps = [Fraction(0)] * (len(phases) * max(map(len, phases)))
+    for k, phase in enumerate(phases):
+        for n, tap in enumerate(phase):
+            taps[n * len(phases) + k] = tap
+    return tuple(taps[: max((n + 1 for n, tap in enumerate(taps) if tap), default=1)])
+
+
+def _in_turn(cores: Sequence[Certificate]) -> Part:
+    section = SectionEntry.model_construct(numerator=taps_in_turn(cores), denominator=(Fraction(1),))
+    return Part((section,), 1, len(cores))
+
+
 def _cic(factor: int, stages: int) -> Part:
     """Return a CIC filter, by the powers of its moving sum, in pieces that a section can have."""
     ones = tuple(Fraction(1, factor) for _ in range(factor))
@@ -54,35 +129,41 @@ def _cic(factor: int, stages: int) -> Part:
 
 
 def factor_of(parts: Sequence[Part]) -> int:
-    """Return the number of samples for each result."""
+    """Return by how much parts leave results out."""
     return reduce(mul, (part.factor for part in parts), 1)
 
 
+def rise_of(parts: Sequence[Part]) -> int:
+    """Return by how much parts put in zeros."""
+    return reduce(mul, (part.rise for part in parts), 1)
+
+
 def peak_gain(parts: Sequence[Part]) -> Fraction:
-    """Bound the sum of the magnitudes of the response of parts one behind the other, from above."""
-    length, step = 1, 1
-    for part in parts:
-        length += sum((len(section.numerator) - 1) * step for section in part.sections)
-        step *= part.factor
-    _check_length(length)
-    numerator, step, inverses = fmpq_poly([1]), 1, list[tuple[Inverse, int]]()
-    for part in parts:
-        under = fmpq_poly([1])
-        for section in part.sections:
-            numerator *= _spread(section.numerator, step)
-            under *= _spread(section.denominator, 1)
-        if under.degree() > 0:
-            inverses.append((inverse(under), step))
-        step *= part.factor
+    """Bound how much of an error before parts one behind the other is in any result: run by run."""
+    return reduce(mul, map(_peak_gain, runs_of(parts)), Fraction(1))
+
+
+def _peak_gain(run: Run) -> Fraction:
+    """Bound the largest sum of the magnitudes of taps that are `rise` apart, from above."""
+    sections = run.spread()
+    _check_length(1 + sum((len(section.numerator) - 1) * step for section, step in sections))
+    numerator, under = fmpq_poly([1]), dict[int, fmpq_poly]()
+    for section, step in sections:
+        numerator *= _spread(section.numerator, step)
+        if len(section.denominator) > 1:
+            under[step] = under.get(step, fmpq_poly([1])) * _spread(section.denominator, 1)
     samples, scale, exact, wide = numerator.numer(), Fraction(1, int(numerator.denom())), Fraction(1), Fraction(1)
     own = _norm(samples) * scale
-    for one, spread in inverses:
+    for spread, polynomial in under.items():
+        one = inverse(polynomial)
         size = _norm(one.samples) / (1 << one.bits)
         exact, wide = exact * size, wide * (size + one.error)
         _check_length(len(samples) + len(one.samples) * spread)
         apart = one.samples(fmpz_poly([0] * spread + [1])) if spread > 1 else one.samples
         samples, scale = samples * apart, scale / (1 << one.bits)
-    return _norm(samples) * scale + own * (wide - exact)
+    magnitudes = [abs(int(sample)) for sample in samples.coeffs()]
+    largest = max(sum(magnitudes[k :: run.rise]) for k in range(0, run.rise, gcd(run.rise, run.factor)))
+    return Fraction(largest) * scale + own * (wide - exact)
 
 
 def _check_length(samples: int) -> None:

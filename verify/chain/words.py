@@ -13,7 +13,10 @@ from typing import Any
 
 from sosmith.verify.certificate_file import Certificate
 from sosmith.verify.chain.chain_file import ChainCertificate
+from sosmith.verify.chain.responses import taps_in_turn
 from sosmith.verify.graph import RejectedError, require
+from sosmith.verify.specified.filter_table import read_filter_table
+from sosmith.verify.specified.fir_mask import keeps_to_losses
 from sosmith.verify.specified.stated_specification import CALIBRATED, stated_number, stated_port
 from sosmith.verify.specified.words import words_of
 from sosmith.verify.verdict.generated_files import about_of
@@ -26,10 +29,14 @@ _CLOCK = 12_000_000
 
 _BY_ITSELF = ("taps", "taps_file", "sos", "sos_file")
 _WITH_EDGES = ("iir", "fir", "halfband")
-_OF_STAGES = ("name", "kind", *_OF_ONE, "band", "order", "decimate", "factor")
+_OF_STAGES = ("name", "kind", *_OF_ONE, "band", "order", "decimate", "interpolate", "factor")
 
 
-def check_words(chain: ChainCertificate, text: str, cores: Sequence[Certificate]) -> None:
+Groups = Sequence[tuple[Certificate, ...]]
+"""The certificates of each stage's cores."""
+
+
+def check_words(chain: ChainCertificate, text: str, groups: Groups) -> None:
     """Check that a chain and its stages are those that a specification describes.
 
     Raises
@@ -39,12 +46,12 @@ def check_words(chain: ChainCertificate, text: str, cores: Sequence[Certificate]
     """
     require(text == chain.specification, "the specification must have the text in the certificate of the chain")
     try:
-        _check(chain, words_of(text), cores)
+        _check(chain, words_of(text), groups)
     except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
         raise RejectedError(f"the specification must be valid and complete, not: {error!r}") from None
 
 
-def _check(chain: ChainCertificate, tree: Mapping[str, Any], cores: Sequence[Certificate]) -> None:
+def _check(chain: ChainCertificate, tree: Mapping[str, Any], groups: Groups) -> None:
     stages = tree["stage"]
     kinds = [stage["kind"] for stage in stages]
     _same("the name", chain.name, tree["name"])
@@ -59,30 +66,66 @@ def _check(chain: ChainCertificate, tree: Mapping[str, Any], cores: Sequence[Cer
     _same("the output", chain.output.model_copy(update={"name": output.name}), output)
     allowed = tree["output"].get("max_error", "faithful")
     _same("max_error", chain.max_error, output.lsb if allowed == "faithful" else stated_number(allowed))
-    rate = stated_number(tree["sample_rate"])
-    for stage, core in zip(stages, cores, strict=True):
-        own = words_of(about_of(core).specification)
-        what = f"stage {stage['name']}"
-        _same(f"the sample_rate of {what}", stated_number(own["sample_rate"]), rate)
-        _same(f"the channels of {what}", own.get("channels", 1), chain.channels)
+    rate = first = stated_number(tree["sample_rate"])
+    for stage, cores in zip(stages, groups, strict=True):
+        rise = stage.get("interpolate", 1)
+        _same(f"the number of cores of stage {stage['name']}", len(cores), rise)
+        for core in cores:
+            _check_core(chain, tree, stage, core, rate)
         table = "calibration" if stage["kind"] == "polynomial" else "filter"
-        require(stage["kind"] == "polynomial" or "calibration" not in own, f"{what} must have no calibration")
-        _same(f"the {table} of {what}", _plain(own[table]), _plain(_table(stage, rate)))
-        hardware = tree.get("hardware", {})
-        wanted = {"clock": hardware.get("clock", _CLOCK)}
-        for keys, words in ((_OF_ALL, hardware), (_OF_ONE, stage)):
-            wanted |= {key: words[key] for key in keys if key in words}
-        _same(f"the hardware of {what}", _plain(own.get("hardware", {})), _plain(wanted))
-        others = [key for key in own if key not in _TABLES]
-        require(not others, f"the specification of {what} must be without {', '.join(others)}")
-        rate /= stage.get("decimate", 1)
-    _check_edge(chain, stages, stated_number(tree["sample_rate"]), rate)
+        if rise > 1:
+            _check_taps(stage, cores, rate * rise)
+        else:
+            own = words_of(about_of(cores[0]).specification)
+            _same(f"the {table} of stage {stage['name']}", _plain(own[table]), _plain(_table(stage, rate)))
+        rate = rate * rise / stage.get("decimate", 1)
+    _check_edges(chain, stages, first)
 
 
-def _check_edge(chain: ChainCertificate, stages: Sequence[Mapping[str, Any]], rate: Fraction, last: Fraction) -> None:
-    """Check that the pass band ends at the lowest edge of the low-pass filters, if that comes out as itself."""
-    if chain.folding is None:
+def _check_core(
+    chain: ChainCertificate, tree: Mapping[str, Any], stage: Mapping[str, Any], core: Certificate, rate: Fraction
+) -> None:
+    """Check all but the filter or calibration of a core's specification."""
+    own = words_of(about_of(core).specification)
+    what = f"stage {stage['name']}"
+    _same(f"the sample_rate of {what}", stated_number(own["sample_rate"]), rate)
+    _same(f"the channels of {what}", own.get("channels", 1), chain.channels)
+    require(stage["kind"] == "polynomial" or "calibration" not in own, f"{what} must have no calibration")
+    hardware = tree.get("hardware", {})
+    wanted = {"clock": hardware.get("clock", _CLOCK)}
+    for keys, words in ((_OF_ALL, hardware), (_OF_ONE, stage)):
+        wanted |= {key: words[key] for key in keys if key in words}
+    _same(f"the hardware of {what}", _plain(own.get("hardware", {})), _plain(wanted))
+    others = [key for key in own if key not in _TABLES]
+    require(not others, f"the specification of {what} must be without {', '.join(others)}")
+
+
+def _check_taps(stage: Mapping[str, Any], cores: Sequence[Certificate], rate: Fraction) -> None:
+    """Check the taps of a stage that interpolates, of which core k has every L-th, from tap k on.
+
+    Those that are given are as they are, and others times L, so that the gain in the pass band is about 1.
+    """
+    what, rise = f"stage {stage['name']}", len(cores)
+    tables = [words_of(about_of(core).specification)["filter"] for core in cores]
+    require(all(list(table) == ["taps"] for table in tables), f"the filters of {what} must have their taps alone")
+    if stage["kind"] == "cic" or "taps" in stage:
+        if stage["kind"] == "cic":
+            wanted = [tap * rise for tap in _moving_sums(rise, stage["order"])]
+        else:
+            wanted = [stated_number(tap) for tap in stage["taps"]]
+        for k, table in enumerate(tables):
+            own = [stated_number(tap) for tap in table["taps"]]
+            _same(f"the taps of {what}, phase {k},", own, wanted[k::rise])
         return
+    read = read_filter_table(_table(stage, rate), rate)
+    require(
+        read.is_fir and keeps_to_losses([tap / rise for tap in taps_in_turn(cores)], read),
+        f"the filter of {what} must keep to its edges and losses, with symmetric taps",
+    )
+
+
+def _check_edges(chain: ChainCertificate, stages: Sequence[Mapping[str, Any]], rate: Fraction) -> None:
+    """Check that the pass band ends at the lowest edge of the low-pass filters, where that comes out as itself."""
     ends = [
         stated_number(stage.get("passband_edge", stage.get("cutoff")))
         for stage in stages
@@ -90,8 +133,12 @@ def _check_edge(chain: ChainCertificate, stages: Sequence[Mapping[str, Any]], ra
         and stage.get("band", "lowpass") == "lowpass"
         and ("passband_edge" in stage or "cutoff" in stage)
     ]
-    edge = min(ends) / rate if ends and 2 * min(ends) <= last else None
-    _same("the edge of the pass band, in units of the sample rate,", chain.folding.edge, edge)
+    for entry in chain.folding:
+        highest = rate * entry.rise
+        lowest = min(rate, highest / entry.factor)
+        edge = min(ends) / highest if ends and 2 * min(ends) <= lowest else None
+        _same("the edge of the pass band, in units of the highest rate,", entry.edge, edge)
+        rate = highest / entry.factor
 
 
 def _table(stage: Mapping[str, Any], rate: Fraction) -> dict[str, Any]:

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from sosmith.commands.chain import refuse, serve_chain
 from sosmith.commands.options import BAUD, CORE, REALIZATION, SEED, SPEC, completed_by
 from sosmith.interface.choices import BUILDABLE, PROJECTS, board_named
 from sosmith.interface.files import default_folder
 from sosmith.model.errors import SpecificationError
 from sosmith.output_paths import folder_option
 from sosmith.terminal import note, show_progress
+
+if TYPE_CHECKING:
+    from sosmith.interface.specification import Specification
 
 
 class _Speed(click.ParamType[float]):
@@ -121,20 +125,19 @@ def board_command(
     """
     if not virtual:
         raise SpecificationError("--virtual must be given: a real board is made by `sosmith build`")
-    from sosmith.interface.specification import Specification
+    from sosmith.interface.chain.specification import ChainSpecification, specification_in
     from sosmith.interface.virtual_board import LineDamage, ModelBoard, NetlistBoard, Terminal
 
-    asked = Specification.load(spec)
+    asked = specification_in(spec)
     damage = None if fault is None else LineDamage(fault, seed, tuple(fault_kinds.split(",")))
-    measures = bool(asked.checked.converters)
-    if trace is not None and not measures:
-        raise SpecificationError("--trace must come with [converter.NAME] tables in SPEC, or be given to `monitor`")
-    if heard is not None and asked.checked.dac is None:
-        raise SpecificationError("--heard must come with a table [converter.output] in SPEC")
     if board is not None and clock is not None:
         raise SpecificationError("--clock must be left out with --board, which has its own")
-    if model and measures:
-        raise SpecificationError("--model must be left out for a board with converters")
+    if isinstance(asked, ChainSpecification):
+        refuse(core=core, realization=realization, model=model, heard=heard, trace=trace)
+        options: dict[str, Any] = {"clock": clock, "board": board, "baud": baud, "seed": seed}
+        serve_chain(asked, output or default_folder(asked.name) / "board", damage, speed, **options)
+        return
+    _check(asked, trace, heard, model=model)
     with show_progress() as step:
         from sosmith.interface.design import design
 
@@ -164,3 +167,20 @@ def board_command(
         else:
             note(f"{asked.name} is at {terminal.path}; Ctrl-C ends it")
             netlist.serve(terminal, damage, speed)
+
+
+def _check(asked: Specification, trace: str | None, heard: Path | None, *, model: bool) -> None:
+    """Check that a specification has the converters that options are about.
+
+    Raises
+    ------
+    SpecificationError
+        If it has none, or those that it has are not in the model.
+    """
+    measures = bool(asked.checked.converters)
+    if trace is not None and not measures:
+        raise SpecificationError("--trace must come with [converter.NAME] tables in SPEC, or be given to `monitor`")
+    if heard is not None and asked.checked.dac is None:
+        raise SpecificationError("--heard must come with a table [converter.output] in SPEC")
+    if model and measures:
+        raise SpecificationError("--model must be left out for a board with converters")

@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from sosmith.commands.chain import refuse
 from sosmith.commands.options import CORE, REALIZATION, SPEC, completed_by, print_tables
 from sosmith.interface.choices import BUILDABLE, PROJECTS, board_named
 from sosmith.interface.files import default_folder
 from sosmith.model.errors import SpecificationError
 from sosmith.output_paths import folder_option
 from sosmith.terminal import JSON_OPTION, note, print_json, show_progress
+
+if TYPE_CHECKING:
+    from sosmith.interface.chain.design import Chain
+    from sosmith.interface.design import Design
 
 
 @click.command("build")
@@ -56,6 +61,9 @@ def build_command(
     programs give the same bitstream. With [converter.NAME] tables in SPEC, the board reads its inputs from these
     converters, instead of over the link.
 
+    Of a chain of stages, the board has all cores behind one link. Where the chain decimates, a result is repeated until
+    the next one, so that each sample has one.
+
     For a board with a Xilinx FPGA it writes the files of a Vivado project: Verilog, constraints (XDC), the script
     (Tcl), and build.json. No bitstream is made: only Vivado tells whether the design fits and meets its timing.
 
@@ -63,16 +71,24 @@ def build_command(
         sosmith build my.toml --board icebreaker
         sosmith build my.toml --board ulx3s_25f --baud 3000000 --program
     """
-    from sosmith.interface.specification import Specification
+    from sosmith.interface.chain.specification import ChainSpecification, specification_in
 
     if program and board in PROJECTS:
         raise SpecificationError(f"--program must be left out for {board}: no bitstream is made for it")
-    asked = Specification.load(spec)
+    asked = specification_in(spec)
     folder = output or default_folder(asked.name) / board
+    if isinstance(asked, ChainSpecification):
+        refuse(core=core, realization=realization)
     with show_progress() as step:
-        from sosmith.interface.design import design
+        designed: Chain | Design
+        if isinstance(asked, ChainSpecification):
+            from sosmith.interface.chain.design import design_chain
 
-        designed = design(asked, core=core, realization=realization, board=board, progress=step)
+            designed = design_chain(asked, board=board, progress=step)
+        else:
+            from sosmith.interface.design import design
+
+            designed = design(asked, core=core, realization=realization, board=board, progress=step)
         designed.generate(folder, step)
         if board in PROJECTS:
             _show_project(designed.project(board, folder=folder, rate=baud, progress=step), folder, as_json=as_json)
@@ -85,7 +101,7 @@ def build_command(
         print_json(built.summary)
     else:
         print_tables([built.table])
-    most, wanted = built.summary["samples_per_second"], float(asked.checked.sample_rate)
+    most, wanted = built.summary["samples_per_second"], asked.sample_rate
     if most < wanted:
         note(f"note: at the board's clock the core takes {most:,.0f} samples a second per channel, not {wanted:,.0f}")
     if built.shortfall is not None:

@@ -1,4 +1,4 @@
-"""What `design`, `generate`, `package`, `reload`, `simulate` and `verify` do with a chain of stages."""
+"""What commands do with a chain of stages."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sosmith.commands.options import print_tables
+from sosmith.interface.choices import BUILDABLE
 from sosmith.interface.files import default_folder, to_json, write_file
 from sosmith.model.errors import ShortfallError, SpecificationError
 from sosmith.terminal import note, print_json, reader_may_leave, show_progress
@@ -15,6 +16,7 @@ from sosmith.terminal import note, print_json, reader_may_leave, show_progress
 if TYPE_CHECKING:
     from sosmith.interface.chain.certificate import ChainCertificate
     from sosmith.interface.chain.specification import ChainSpecification
+    from sosmith.interface.virtual_board import LineDamage
 
 
 def refuse(instead: str = "", **options: Any) -> None:
@@ -38,21 +40,26 @@ def refuse(instead: str = "", **options: Any) -> None:
 def show_chain(
     asked: ChainSpecification, board: str | None, plot: Path | None, *, details: bool, as_json: bool
 ) -> None:
-    """Design a chain, show it, and draw it into the file `plot` if there is one."""
+    """Design a chain, show it, built for a board if there is one, and draw it into the file `plot`."""
     from sosmith.interface.chain.design import design_chain
 
     with show_progress() as step:
         chain = design_chain(asked, board=board, progress=step)
         step("aliasing", 0, 0)
         tables = [] if as_json else chain.tables(details=details)
+        cost = None if board not in BUILDABLE else chain.cost_on(board, step)
         if plot is not None:
             step("drawing", 0, 0)
             chain.plot(plot)
     if plot is not None:
         note(f"wrote {plot}")
     if as_json:
-        print_json(chain.as_dict())
+        print_json(chain.as_dict() if cost is None else chain.as_dict() | {"board": cost})
         return
+    if cost is not None:
+        from sosmith.interface.build import build_table
+
+        tables.append(build_table(cost))
     print_tables(tables)
 
 
@@ -85,7 +92,7 @@ def reload_chain(
     reset: bool,
     version: int,
     as_json: bool,
-) -> None:
+) -> dict[str, Any]:
     """Prove other coefficients of a stage, write the register writes into the file `path`, and show what is proven."""
     from sosmith.interface.chain.design import design_chain
 
@@ -98,6 +105,23 @@ def reload_chain(
     else:
         print_tables(proven.tables())
     note(f"wrote {path}")
+    return proven.writes
+
+
+def serve_chain(
+    asked: ChainSpecification, folder: Path, damage: LineDamage | None, speed: float | None, **options: Any
+) -> None:
+    """Run the board of a chain behind a pseudo-terminal, whose path is printed first, until interrupted."""
+    from sosmith.interface.chain.design import design_chain
+    from sosmith.interface.virtual_board import NetlistBoard, Terminal
+
+    with show_progress() as step:
+        chain = design_chain(asked, progress=step)
+        netlist = NetlistBoard(chain, folder, trace=None, progress=step, **options)
+    with Terminal() as terminal:
+        click.echo(terminal.path)
+        note(f"{asked.name} is at {terminal.path}; Ctrl-C ends it")
+        netlist.serve(terminal, damage, speed)
 
 
 def run_chain(

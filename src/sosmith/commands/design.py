@@ -80,8 +80,7 @@ def design_command(
     """Show the design of SPEC: order, realization, architecture, cost and error budget.
 
     With --board, it is built for that board as `sosmith build` does, which takes some tens of seconds the first time,
-    and the cells are those that it takes there, with the serial link. A chain of stages is not built: --board only
-    says which multipliers there are, and --details shows the cost of each stage.
+    and the cells are those that it takes there, with the serial link.
 
     \b
         sosmith design my.toml

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -92,9 +93,10 @@ def reload_command(
     if lock and port is None:
         raise click.UsageError("--lock must have --port, the board to lock")
     if isinstance(chain := specification_in(spec), ChainSpecification):
-        refuse(core=core, realization=realization, widths_of=widths_of, active=active, port=port)
+        refuse(core=core, realization=realization, widths_of=widths_of, active=active)
         path = output or default_folder(chain.name) / f"{other.stem}.reload.json"
-        reload_chain(chain, other, board, path, reset=reset, version=version, as_json=as_json)
+        writes = reload_chain(chain, other, board, path, reset=reset, version=version, as_json=as_json)
+        _load(writes, port, baud, lock=lock)
         return
     asked, wanted = Specification.load(spec), Specification.load(other)
     running = None if active is None else Specification.load(active)
@@ -110,13 +112,19 @@ def reload_command(
     else:
         print_tables([proven.table])
     note(f"wrote {path}")
-    if port is not None:
-        from sosmith import Board
+    _load(proven.writes, port, baud, lock=lock)
 
-        with Board(port, baud=baud) as client:
-            loaded = client.load(proven.writes)
-            if lock:
-                client.lock()
-        note(f"active on {port}: version {loaded.version}, CRC {loaded.crc:#010x}, {loaded.words} words")
+
+def _load(writes: dict[str, Any], port: str | None, baud: int, *, lock: bool) -> None:
+    """Load a set into the board at a port, if one is given."""
+    if port is None:
+        return
+    from sosmith import Board
+
+    with Board(port, baud=baud) as client:
+        loaded = client.load(writes)
         if lock:
-            note(f"locked on {port}: no set can be loaded until a reset")
+            client.lock()
+    note(f"active on {port}: version {loaded.version}, CRC {loaded.crc:#010x}, {loaded.words} words")
+    if lock:
+        note(f"locked on {port}: no set can be loaded until a reset")

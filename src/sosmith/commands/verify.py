@@ -99,7 +99,7 @@ def verify(
     read = certificate_in(certificate)
     limit = {} if time_limit is None else {"seconds": time_limit}
     if isinstance(read, ChainCertificate):
-        stage = certificate.with_name(read.entries.stages[0].certificate.name)
+        stage = certificate.with_name(read.entries.stages[0].certificates[0].name)
         instead = f": give it with the certificate of each stage, such as {stage}"
         refuse(instead, rebuild=rebuild, core=core, second_reader=second_reader, rocq=rocq, export=export, smt=smt)
         if not prove_chain(read, certificate, spec=spec, files=files, limit=limit, as_json=as_json) and not partial:

@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from sosmith.model.errors import ShortfallError, SpecificationError
-from sosmith.model.foreign_files import read_json
+from sosmith.model.foreign_files import MAX_JSON, read_bytes, read_json
 from sosmith.model.link.identity import CONVERTER_FLAGS, Identity
 from sosmith.verify.certificate_file import read_certificate
+from sosmith.verify.chain.chain_file import is_chain_certificate, read_chain
 
 
 def check_design(identity: Identity, verilog: str) -> None:
@@ -35,13 +36,12 @@ def check_files(identity: Identity, folder: Path) -> dict[str, Any]:
         If the files cannot be read, or are not those of a core.
     """
     manifest = _manifest(folder / f"{identity.name}.json")
-    certificate = read_certificate(folder / f"{identity.name}.certificate.json")
-    files = {} if certificate.about is None else {file.name: file.sha256 for file in certificate.about.files}
+    name, files = _certified(folder / f"{identity.name}.certificate.json")
     source = f"{identity.name}.sv"
     if source not in files:
         raise SpecificationError(f"{folder}: the certificate must be one that lists {source}, not without it")
     _check(identity, "design", files[source][:12], identity.design[:12])
-    _check(identity, "name", certificate.name, identity.name)
+    _check(identity, "name", name, identity.name)
     added = CONVERTER_FLAGS if identity.source == "converter" else {}
     try:
         streams = manifest["streams"]
@@ -75,8 +75,7 @@ def folder_of(identity: Identity, folder: Path) -> Path | None:
     name = f"{identity.name}.certificate.json"
     folders = [place.parent for place in (folder / name, *sorted(folder.glob(f"*/{name}"))) if place.exists()]
     for place in folders:
-        certificate = read_certificate(place / name)
-        files = {} if certificate.about is None else {file.name: file.sha256 for file in certificate.about.files}
+        _, files = _certified(place / name)
         if files.get(f"{identity.name}.sv") == identity.design:
             return place
     if folders:
@@ -86,6 +85,16 @@ def folder_of(identity: Identity, folder: Path) -> Path | None:
             "generate` on its specification with the options of the board, or name the folder with --files"
         )
     return None
+
+
+def _certified(path: Path) -> tuple[str, dict[str, str]]:
+    """Return the name of the core, or of the chain, of a certificate, and the digests of its files."""
+    if is_chain_certificate(read_bytes(path, what="the certificate", max_bytes=MAX_JSON)):
+        chain = read_chain(path)
+        return chain.name, {file.name: file.sha256 for file in chain.files}
+    certificate = read_certificate(path)
+    files = () if certificate.about is None else certificate.about.files
+    return certificate.name, {file.name: file.sha256 for file in files}
 
 
 def _check(identity: Identity, key: str, expected: Any, actual: Any) -> None:

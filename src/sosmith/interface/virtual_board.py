@@ -9,10 +9,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sosmith.gen.chain.board import chain_item
+from sosmith.gen.core import CoreDesign
 from sosmith.gen.fpga.boards import find_board
 from sosmith.gen.output.board_top import wiring_of
+from sosmith.gen.output.identity import BoardItem
 from sosmith.instrument.scenarios.traces import default_scenario, traces_for
 from sosmith.interface.certificate import Progress
+from sosmith.interface.chain.design import Chain
 from sosmith.interface.design import Design
 from sosmith.model.errors import SpecificationError, ToolError
 from sosmith.model.port import Port
@@ -59,7 +63,7 @@ class NetlistBoard:
 
     def __init__(
         self,
-        design: Design,
+        design: Design | Chain,
         folder: Path,
         *,
         clock: float | None,
@@ -71,10 +75,11 @@ class NetlistBoard:
     ) -> None:
         from sosmith.sim.virtual_board.netlist import build
 
-        core = design.core
+        core: CoreDesign | BoardItem
+        core = chain_item(design.core) if isinstance(design, Chain) else design.core
         self._measures = bool(core.spec.converters)
         self._codes: Codes | None = None
-        if self._measures:
+        if self._measures and isinstance(core, CoreDesign):
             traces = traces_for(core, trace or default_scenario(core), seed=seed)
             self._codes = np.stack([each.codes for each in traces], axis=1)
         self._core = core
@@ -105,7 +110,7 @@ class NetlistBoard:
             If the board has no DAC, the sample rate is none of a WAV file, or the file cannot be written.
         """
         schedule, spec = self._netlist.schedule, self._core.spec
-        if schedule is None or schedule.writing is None or self._codes is None:
+        if schedule is None or schedule.writing is None or self._codes is None or isinstance(self._core, BoardItem):
             raise SpecificationError("the board must have a converter of the output to be heard, not results only")
         check_rate(heard, spec.sample_rate)
         words = self._netlist.play(self._codes)

@@ -73,7 +73,26 @@ def hardware(**keys: Any) -> Callable[[dict[str, Any]], object]:
 REFUSED: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
     "interpolate": (
         stage(0, interpolate=2),
-        "not yet available: stage[0].interpolate must be left out, as stages only lower the rate, not 2",
+        "stage[0].interpolate must be left out beside decimate: a stage that interpolates and one that decimates in "
+        "series do both, not 2",
+    ),
+    "interpolate poles": (
+        stage(2, interpolate=2),
+        "stage[2].interpolate must be left out in a stage of the kind iir: between samples, fir, halfband, cic fill "
+        "in, not 2",
+    ),
+    "interpolate too much": (
+        stage(0, decimate=None, interpolate=65),
+        "stage[0].interpolate must be a whole number from 2 to 64, not 65",
+    ),
+    "interpolate by 3": (
+        stage(0, decimate=None, interpolate=3),
+        "stage[0].interpolate must be a power of two for a CIC filter, whose weights are then exact, not 3",
+    ),
+    "interpolate and protect": (
+        stage(0, decimate=None, interpolate=2, protect="detect"),
+        "not yet available: stage[0].protect must be 'none' in a stage that interpolates, which has a core for each "
+        "result of a sample, not 'detect'",
     ),
     "unknown key": (
         stage(3, order=2),
@@ -94,7 +113,10 @@ REFUSED: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
         "stage[2].decimate must be a whole number in a stage, as the rates of the stages after it follow from it, not "
         "'auto'",
     ),
-    "cic without": (stage(0, decimate=None), "stage[0].decimate must be given for a CIC filter, not missing"),
+    "cic without": (
+        stage(0, decimate=None),
+        "stage[0].decimate must be given for a CIC filter, or interpolate, not missing",
+    ),
     "no kind": (
         stage(0, kind=None),
         "stage[0].kind must be one of polynomial, gain, iir, fir, halfband, cic, not missing",
@@ -218,9 +240,9 @@ def test_a_chain_is_no_specification_of_a_core() -> None:
     with pytest.raises(SpecificationError) as refused:
         sosmith.Specification.load(TREE)
     assert str(refused.value) == (
-        "specification: not yet available: stage must be left out here, as only design, generate, package, reload, "
-        "simulate and verify take a chain: `sosmith generate` writes a specification of each stage beside the chain's "
-        "files, for what takes a single core, not [a table, a table, a table, a table]"
+        "specification: not yet available: stage must be left out here, as only board, build, design, generate, "
+        "package, reload, simulate and verify take a chain: `sosmith generate` writes a specification of each stage "
+        "beside the chain's files, for what takes a single core, not [a table, a table, a table, a table]"
     )
 
 

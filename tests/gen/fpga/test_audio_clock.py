@@ -9,7 +9,7 @@ import pytest
 import sosmith
 from sosmith.gen.fpga.audio_clock import audio_pll
 from sosmith.gen.fpga.boards import BOARDS
-from sosmith.gen.output import board_build
+from sosmith.gen.output import board_build, identity
 from sosmith.hdl.boards.pll import Pll, pll_near
 from sosmith.model.converters.i2s_converter import I2S_CONVERTERS
 from sosmith.model.converters.i2s_frame import I2sFrame
@@ -78,7 +78,7 @@ def test_the_link_waits_for_a_pll(board: str | None, waits: bool, monkeypatch: p
     """The link of a board whose clock is its own has no reset."""
     own = replace(BOARDS["ulx3s_25f"], clock=24_576_000)
     given: list[bool] = []
-    monkeypatch.setattr(board_build, "core_verilog", lambda design: "")
+    monkeypatch.setattr(identity, "core_verilog", lambda design: "")
     monkeypatch.setattr(board_build, "board_verilog", lambda design, *, waits, **others: given.append(waits) or "")
     board_build.texts(sosmith.design(LIVE).core, BOARDS[board] if board else own, 1_000_000, lambda step: None)
     assert given == [waits]

@@ -17,7 +17,7 @@ def sealed_again(folder: Path, change: Callable[[dict[str, Any]], None] = lambda
     """Change claims, and give the certificate the digests of the files as they are, and its own."""
     tree = read_chain(folder / CERTIFICATE).model_dump(mode="json")
     change(tree)
-    for entry in (*tree["files"], *(stage["certificate"] for stage in tree["stages"])):
+    for entry in (*tree["files"], *(file for stage in tree["stages"] for file in stage["certificates"])):
         entry["sha256"] = hashlib.sha256((folder / entry["name"]).read_bytes()).hexdigest()
     certificate = sealed_chain(ChainCertificate.model_validate(tree))
     (folder / CERTIFICATE).write_text(entries_text(certificate), encoding="utf-8")

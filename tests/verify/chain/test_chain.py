@@ -15,7 +15,7 @@ from tests.verify.chain.sealing import CERTIFICATE, sealed_again
 
 import sosmith
 from sosmith.gen.chain import design as chain_design
-from sosmith.gen.chain.response import gain_into_passband
+from sosmith.gen.chain.response import Segment, gain_into_passband
 from sosmith.model.errors import ShortfallError, SpecificationError
 from sosmith.verify.certificate_file import Certificate, SectionEntry, on_grid
 from sosmith.verify.chain import check
@@ -149,10 +149,14 @@ def more(text: str) -> str:
         ("stages.1.error", less, r"^the error of stage low must be .*, not .*$"),
         ("bound", less, r"^the bound of the chain must be .*, not .*$"),
         ("max_error", lambda _: "1/4096", r"^the bound of the chain must be at most 0\.000244141, not .*$"),
-        ("folding.anywhere.gain", less, r"^the largest gain of what folds must be at least .*, not .*$"),
-        ("folding.anywhere.gain", more, r"^the largest gain of what folds must be that at .* or little more, not .*$"),
-        ("folding.passing.gain", less, r"^the largest gain into the pass band must be at least .*, not .*$"),
-        ("folding.factor", lambda _: 8, r"^the factor of the chain must be 4, not 8$"),
+        ("folding.0.anywhere.gain", less, r"^the largest gain of what folds must be at least .*, not .*$"),
+        (
+            "folding.0.anywhere.gain",
+            more,
+            r"^the largest gain of what folds must be that at .* or little more, not .*$",
+        ),
+        ("folding.0.passing.gain", less, r"^the largest gain into the pass band must be at least .*, not .*$"),
+        ("folding.0.factor", lambda _: 8, r"^the factor of what folds must be 4, not 8$"),
         ("settling", lambda _: 1, r"^settling of the chain must be 0 results, not 1$"),
         ("channels", lambda _: 2, r"^stage slow must have 2 channels, not 1$"),
         ("stages.2.kind", lambda _: "polynomial", r"^stage out must have a polynomial if it is one, and no other$"),
@@ -254,7 +258,7 @@ def test_another_wire_is_refused(old: str, new: str, sentence: str, folder: Path
         ("rx.h", "rx_low_state stage_low;", "rx_slow_state stage_low;", r"^rx\.h must have rx_low_state after "),
         ("rx.json", '"decimate": 4', '"decimate": 2', r"^decimate of the manifest must be 4, not 2$"),
         ("rx.json", '"channels": 1', '"channels": true', r"^channels of the manifest must be 1, not True$"),
-        ("rx.json", '"core": "rx_low"', '"core": "other", "core": "rx_low"', r"^the manifest must be JSON$"),
+        ("rx.json", '"kind": "iir"', '"kind": "other", "kind": "iir"', r"^the manifest must be JSON$"),
     ],
 )
 def test_another_model_or_manifest_is_refused(file: str, old: str, new: str, sentence: str, folder: Path) -> None:
@@ -311,26 +315,26 @@ def test_other_hardware_than_the_words_ask_for_is_refused(old: str, new: str, fo
 @pytest.mark.parametrize("edge", [None, "1/40"])
 def test_another_pass_band_than_that_of_the_words_is_refused(edge: str | None, folder: Path) -> None:
     """What is claimed of it is true, of another band than the one that the specification states."""
-    change = changed("folding.edge", lambda _: "1/20") if edge is None else changed("folding.edge", lambda _: edge)
+    change = changed("folding.0.edge", lambda _: "1/20") if edge is None else changed("folding.0.edge", lambda _: edge)
 
     def narrow(tree: dict[str, Any]) -> None:
         change(tree)
         if edge is None:
-            tree["folding"] |= {"edge": None, "passing": None}
+            tree["folding"][0] |= {"edge": None, "passing": None}
         else:
-            tree["folding"]["passing"] = passing
+            tree["folding"][0]["passing"] = passing
 
     passing = tight_passing(folder, Fraction(edge)) if edge is not None else None
     sealed_again(folder, narrow)
     proven(folder, spec=False)
-    with pytest.raises(ShortfallError, match=r"^the edge of the pass band, in units of the sample rate, must be as "):
+    with pytest.raises(ShortfallError, match=r"^the edge of the pass band, in units of the highest rate, must be as "):
         proven(folder)
 
 
 def tight_passing(folder: Path, edge: Fraction) -> dict[str, str]:
     """Return what is reached of what folds into a pass band that ends at `edge`."""
     parts = sosmith.design_chain(folder / "rx.toml").core.parts
-    peak = gain_into_passband(parts, edge)
+    peak = gain_into_passband(Segment(parts), edge)
     return {"gain": str(on_grid(peak.gain)), "at": str(peak.at)}
 
 

@@ -17,11 +17,9 @@ from sosmith.model.errors import SpecificationError
 from sosmith.model.foreign_files import MAX_JSON, read_bytes
 from sosmith.verify.certificate_file import entries_text
 from sosmith.verify.chain.chain_file import ChainCertificate as Entries
-from sosmith.verify.chain.chain_file import read_chain
+from sosmith.verify.chain.chain_file import is_chain_certificate, read_chain
 from sosmith.verify.chain.check import judge_chain
 from sosmith.verify.verdict.limits import SECONDS
-
-_MARK = b'"format": "sosmith chain certificate '
 
 
 @dataclass(frozen=True)
@@ -182,4 +180,4 @@ def certificate_in(path: str | PathLike[str]) -> Certificate | ChainCertificate:
         If the file cannot be read, or is neither.
     """
     content = read_bytes(Path(fspath(path)), what="the certificate", max_bytes=MAX_JSON)
-    return ChainCertificate.load(path) if _MARK in content[:100] else Certificate.load(path)
+    return ChainCertificate.load(path) if is_chain_certificate(content) else Certificate.load(path)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from os import PathLike, fspath
@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.gen.chain.design import ChainDesign
+from sosmith.gen.chain.design import ChainDesign, Folding
 from sosmith.gen.chain.design import design_chain as design_stages
 from sosmith.gen.chain.facts import chain_tables
 from sosmith.gen.chain.generate import chain_certificate, chain_manifest, generate_chain
 from sosmith.gen.chain.golden import chain_gain, golden_chain
 from sosmith.gen.facts.table import Table, View
-from sosmith.gen.fpga.boards import find_board
+from sosmith.gen.fpga.boards import BUILDABLE, PROJECTS, RATE, find_board
 from sosmith.interface.arrays import real_numbers
 from sosmith.interface.chain.specification import ChainSpecification
 from sosmith.interface.design import Codes, Design, Floats
@@ -28,6 +28,7 @@ from sosmith.model.arrays import side_by_side
 from sosmith.model.errors import SpecificationError, falling_short
 
 if TYPE_CHECKING:
+    from sosmith.interface.build import Build
     from sosmith.interface.certificate import Progress
     from sosmith.interface.chain.certificate import ChainCertificate
     from sosmith.interface.chain.reload import ChainReload
@@ -39,7 +40,8 @@ class Chain(View):
     """A chain of proven stages, with one end-to-end bound, as returned by `design_chain`.
 
     Values are in physical units. Arrays hold one sample per row, shape (samples,) for one channel and (samples,
-    channels) for several; there is one result for every `factor` samples, at the first of them.
+    channels) for several; there is one result for every `factor` samples, at the first of them. With stages that
+    interpolate, `rise` results come with `factor` samples, the first with the first.
 
     Examples
     --------
@@ -76,13 +78,18 @@ class Chain(View):
 
     @property
     def stages(self) -> tuple[Design, ...]:
-        """The stages in order, each a design of its own."""
-        return tuple(Design(stage.design) for stage in self.core.stages)
+        """The stages in order, each a design of its own; of one that interpolates, those of its results in turn."""
+        return tuple(Design(core) for stage in self.core.stages for core in stage.cores)
 
     @property
     def factor(self) -> int:
-        """Input samples of a channel for each result."""
+        """By how much the stages decimate: input samples of a channel for each result, if none interpolates."""
         return self.core.factor
+
+    @property
+    def rise(self) -> int:
+        """By how much the stages interpolate: results for each input sample, if none decimates."""
+        return self.core.rise
 
     @property
     def bound(self) -> Quantity:
@@ -101,14 +108,31 @@ class Chain(View):
 
     @property
     def folding(self) -> dict[str, tuple[float, float]]:
-        """Largest gains of aliases, and the frequencies in Hz at the input where they are reached.
+        """Largest gains of aliases, and the frequencies in Hz where they are reached, before anything decimates.
 
         "anywhere" is for all aliases, "passband" for those that land in the pass band, if a stage states one. Both are
-        proven. Empty for a chain that does not decimate.
+        proven. They are of the stages up to the first one that interpolates; empty if none of these decimates.
         """
-        rate = self.core.spec.base.sample_rate
-        peaks = {"anywhere": self.core.folding, "passband": self.core.passing}
-        return {name: (float(peak.gain), float(peak.at * rate)) for name, peak in peaks.items() if peak is not None}
+        return self._peaks([each for each in self.core.foldings if each.segment.rise == 1])
+
+    @property
+    def images(self) -> dict[str, tuple[float, float]]:
+        """Largest gains of images, and the frequencies in Hz where they are reached, once all stages have interpolated.
+
+        "anywhere" is for all images, and aliases where stages behind decimate; "passband" for images of the pass band,
+        and aliases in it. Both are proven; empty for a chain that does not interpolate.
+        """
+        return self._peaks([each for each in self.core.foldings if each.segment.rise > 1])
+
+    def _peaks(self, foldings: Sequence[Folding]) -> dict[str, tuple[float, float]]:
+        """Return the largest gains of several parts of the chain."""
+        found: dict[str, tuple[float, float]] = {}
+        for each in foldings:
+            highest = each.segment.highest * self.core.spec.base.sample_rate
+            for name, peak in (("anywhere", each.anywhere), ("passband", each.passing)):
+                if peak is not None and float(peak.gain) > found.get(name, (-1.0, 0.0))[0]:
+                    found[name] = float(peak.gain), float(peak.at * highest)
+        return found
 
     @cached_property
     def manifest(self) -> dict[str, Any]:
@@ -124,6 +148,9 @@ class Chain(View):
 
     def frequency_response(self, f: npt.ArrayLike) -> npt.NDArray[np.complex128]:
         """Return the complex gain from sines at the input to the sines at the output, aliased or not.
+
+        With stages that interpolate, that of sines at the highest rate: of up to half the input's as they are, and of
+        images of these.
 
         Parameters
         ----------
@@ -188,6 +215,56 @@ class Chain(View):
 
         named = None if vlnv is None else Vlnv.read(vlnv)
         return package_chain(self.core, Path(fspath(folder)), lambda step: progress(step, 0, 0), vlnv=named)
+
+    def build(
+        self,
+        board: str,
+        *,
+        folder: str | PathLike[str] | None = None,
+        rate: int = RATE,
+        progress: Progress = lambda step, done, total: None,
+    ) -> Build:
+        """Make a bitstream for a board, with the chain behind the serial link, which gets a result for each sample.
+
+        Parameters and errors are those of `Design.build`; a chain must not decimate several channels, and have at most
+        one stage with `reload`.
+        """
+        from sosmith.gen.chain.board import chain_item
+        from sosmith.gen.output.board_build import build_board
+        from sosmith.interface.build import Build
+
+        target = find_board(board, BUILDABLE)
+        place = Path("build") / self.name / target.name if folder is None else Path(fspath(folder))
+        built = build_board(chain_item(self.core), target, rate=rate, progress=lambda step: progress(step, 0, 0))
+        return Build.written(built, place)
+
+    def project(
+        self,
+        board: str,
+        *,
+        folder: str | PathLike[str] | None = None,
+        rate: int = RATE,
+        progress: Progress = lambda step, done, total: None,
+    ) -> dict[str, Any]:
+        """Write a project for the vendor's tools of a board; parameters and errors are those of `Design.project`."""
+        from sosmith.gen.chain.board import chain_item
+        from sosmith.gen.output.board_project import board_project
+
+        target = find_board(board, PROJECTS)
+        place = Path("build") / self.name / target.name if folder is None else Path(fspath(folder))
+        project = board_project(chain_item(self.core), target, rate=rate, progress=lambda step: progress(step, 0, 0))
+        project.write(place)
+        return project.summary
+
+    def cost_on(self, board: str, progress: Progress = lambda step, done, total: None) -> dict[str, Any]:
+        """Return what the chain takes of a board's FPGA, with the serial link: as `Design.cost_on`."""
+        from sosmith.gen.chain.board import chain_item
+        from sosmith.gen.output.board_build import board_cost
+        from sosmith.sim.build_cache import cache_folder
+
+        target, cache = find_board(board, BUILDABLE), cache_folder()
+        place = None if cache is None else cache.parent / "boards"
+        return board_cost(chain_item(self.core), target, place, lambda step: progress(step, 0, 0))
 
     def reload(
         self,
@@ -285,9 +362,10 @@ class Chain(View):
         return tables
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the `manifest`, and `folding`."""
+        """Return the `manifest`, `folding` and `images`."""
+        peaks = {"folding": self.folding, "images": self.images}
         return self.manifest | {
-            "folding": {name: {"gain": gain, "at": at} for name, (gain, at) in self.folding.items()}
+            key: {name: {"gain": gain, "at": at} for name, (gain, at) in found.items()} for key, found in peaks.items()
         }
 
     @property

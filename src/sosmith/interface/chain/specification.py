@@ -66,8 +66,13 @@ class ChainSpecification(View):
 
     @property
     def factor(self) -> int:
-        """Input samples of a channel for each result."""
+        """By how much the stages decimate: input samples of a channel for each result, if none interpolates."""
         return self.checked.factor
+
+    @property
+    def rise(self) -> int:
+        """By how much the stages interpolate: results for each input sample, if none decimates."""
+        return self.checked.rise
 
     @property
     def sample_rate(self) -> float:
@@ -100,7 +105,11 @@ class ChainSpecification(View):
     def tables(self) -> list[Table]:
         """Return the stages: name, kind, rate and factor."""
         rows = [
-            (stage.name, f"{stage.kind}, {float(stage.rate):g} Hz, 1 of {stage.factor}")
+            (
+                stage.name,
+                f"{stage.kind}, {float(stage.rate):g} Hz, "
+                + (f"{stage.rise} of 1" if stage.rise > 1 else f"1 of {stage.factor}"),
+            )
             for stage in self.checked.stages
         ]
         return [Table(f"Chain {self.name}", rows, ("stage", "what it is"))]
@@ -109,7 +118,7 @@ class ChainSpecification(View):
         rate = self.sample_rate
         return (
             f"<sosmith.ChainSpecification {self.name}: {' -> '.join(self.stages)}, "
-            f"{rate:g} Hz to {rate / self.factor:g} Hz>"
+            f"{rate:g} Hz to {float(self.checked.last_rate):g} Hz>"
         )
 
 

@@ -1,0 +1,105 @@
+"""A chain on a board: what its link has to know of it, and the modules that go into the FPGA."""
+
+from __future__ import annotations
+
+import math
+
+from sosmith.gen.chain.design import ChainDesign, StageDesign
+from sosmith.gen.chain.top import chain_interface, registers_port, top_text
+from sosmith.gen.output.identity import BoardItem
+from sosmith.gen.output.verilog import core_verilog
+from sosmith.gen.reload.register_writes import bank_size
+from sosmith.hdl.boards.chain_core import ChainCore
+from sosmith.model.dataflow.status import Flag
+from sosmith.model.errors import SpecificationError
+from sosmith.model.reload.registers import ADDRESS_BITS
+
+
+def chain_item(design: ChainDesign) -> BoardItem:
+    """Return what a board has to know of a chain.
+
+    Raises
+    ------
+    SpecificationError
+        If it interpolates, it decimates several channels, or more than one stage has registers.
+    """
+    spec, loaded = design.spec.base, _loaded(design)
+    channels, factor = spec.channels, design.factor
+    if design.rise > 1:
+        raise SpecificationError(
+            f"{spec.path}: interpolate must be left out on a board, whose link returns one result for each sample"
+        )
+    if factor > 1 and channels > 1:
+        raise SpecificationError(
+            f"{spec.path}: not yet available: channels must be 1 with stages that decimate on a board, not {channels}"
+        )
+    first, last = design.stages[0].design.datapath, design.stages[-1].design.datapath
+    face = chain_interface(design)
+    fingerprint = None if loaded is None else loaded.design.architecture.fingerprint
+
+    def component() -> ChainCore:
+        return ChainCore(
+            design.name,
+            first.inputs,
+            last.output,
+            channels=channels,
+            factor=factor,
+            registers="" if loaded is None else registers_port(loaded),
+            address_bits=ADDRESS_BITS,
+            lock=loaded is not None and bool(loaded.design.spec.hardware.reload_lock),
+        )
+
+    return BoardItem(
+        name=design.name,
+        kind="chain",
+        architecture="_".join(dict.fromkeys(stage.design.architecture.name for stage in design.stages)),
+        spec=spec,
+        inputs=tuple(first.inputs),
+        output=last.output,
+        flags=dict(face.outputs.flags),
+        possible=_possible(design, loaded),
+        cycles_per_sample=_cycles(design),
+        latency_cycles=face.latency_cycles,
+        fingerprint=fingerprint,
+        words=0 if loaded is None else bank_size(loaded.design.architecture)[0],
+        component=component,
+        make_verilog=lambda: top_text(design),
+        make_modules=lambda: modules(design),
+    )
+
+
+def modules(design: ChainDesign) -> str:
+    """SystemVerilog of the chain: its cores and its top, as `generate_chain` writes them."""
+    return "\n".join([*(core_verilog(core) for stage in design.stages for core in stage.cores), top_text(design)])
+
+
+def _loaded(design: ChainDesign) -> StageDesign | None:
+    """Return the stage with registers."""
+    stages = [stage for stage in design.stages if stage.design.architecture.fingerprint is not None]
+    if len(stages) > 1:
+        names = ", ".join(stage.spec.name for stage in stages)
+        raise SpecificationError(
+            f"{design.spec.base.path}: reload must be true of at most one stage on a board, whose link reaches the "
+            f"registers of one core, not of {names}"
+        )
+    return stages[0] if stages else None
+
+
+def _cycles(design: ChainDesign) -> int:
+    """Clocks between samples at the highest rate: those of the slowest stage, rounded up."""
+    slowest, factor = 1, 1
+    for stage in design.stages:
+        slowest = max(slowest, math.ceil(stage.design.architecture.clocks_per_sample / factor))
+        factor *= stage.design.datapath.samples_per_result
+    return slowest
+
+
+def _possible(design: ChainDesign, loaded: StageDesign | None) -> tuple[int, ...]:
+    """Bits of the flags that a result can have; of a core with registers, any."""
+    if loaded is not None:
+        return tuple(int(flag) for flag in Flag)
+    can = {Flag.INPUT_AT_RAIL, Flag.OUTPUT_SATURATED}
+    can |= {Flag.OUTSIDE_CALIBRATION} if design.carried_flags > 1 else set()
+    can |= {Flag.SETTLING} if design.settling else set()
+    can |= {Flag.FAULT} if any(stage.design.spec.hardware.protect != "none" for stage in design.stages) else set()
+    return tuple(sorted(int(flag) for flag in can))

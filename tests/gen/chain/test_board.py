@@ -1,0 +1,121 @@
+"""Chains on boards: what the link is told, what goes into the FPGA, and a result for each sample."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.gen.chain.chains import GUARDED, PLAIN, stimulus
+from tests.gen.fpga.stubs import REPORT, Stub
+
+import sosmith
+from sosmith.gen.chain.board import chain_item, modules
+from sosmith.gen.chain.generate import chain_texts
+from sosmith.gen.chain.top import chain_interface, top_text
+from sosmith.gen.fpga import bitstream
+from sosmith.gen.output.board_top import board_verilog
+from sosmith.gen.output.identity import identity
+from sosmith.gen.output.vectors import whole_beats
+from sosmith.gen.output.verilog import to_rtlil, to_verilog
+from sosmith.model.errors import SpecificationError
+from sosmith.sim.cosimulate import cosimulate
+from sosmith.sim.simulator_bench import SimulatorBench
+
+CLOCK = Fraction(12_000_000)
+
+
+@pytest.fixture(scope="module")
+def chain() -> sosmith.Chain:
+    return sosmith.design_chain(PLAIN)
+
+
+@pytest.fixture(scope="module")
+def guarded() -> sosmith.Chain:
+    return sosmith.design_chain(GUARDED | {"channels": 1})
+
+
+def test_the_identity_is_that_of_the_whole(chain: sosmith.Chain) -> None:
+    item = chain_item(chain.core)
+    told = identity(item, item.verilog, baud=1_000_000, clock=12e6)
+    assert (told.name, told.core, told.architecture) == ("rx", "chain", "folded_parallel")
+    assert (told.sample_rate, told.channels, told.reload) == (8000.0, 1, None)
+    assert [port.name for port in told.input_ports] == ["x"]
+    assert told.output_port == chain.core.stages[-1].output
+    assert item.verilog == top_text(chain.core)
+
+
+def test_flags_that_a_result_can_have(chain: sosmith.Chain, guarded: sosmith.Chain) -> None:
+    assert chain_item(chain.core).possible == (0, 2)
+    assert chain_item(guarded.core).possible == tuple(range(7))
+    unloaded = replace(guarded.core, stages=guarded.core.stages[:2])
+    assert chain_item(unloaded).possible == (0, 2, 5, 6)
+
+
+def test_a_board_reaches_the_registers_of_one_stage(guarded: sosmith.Chain) -> None:
+    item = chain_item(guarded.core)
+    told = identity(item, "", baud=1_000_000, clock=12e6)
+    assert told.reload is not None
+    assert told.reload.design == guarded.core.stages[2].design.architecture.fingerprint
+    assert re.search(r"^ +\.s_axil_out_awaddr\(\w+\),$", board_verilog(item, clock=CLOCK), re.MULTILINE)
+    twice = replace(guarded.core, stages=(*guarded.core.stages, guarded.core.stages[2]))
+    with pytest.raises(SpecificationError) as refused:
+        chain_item(twice)
+    assert str(refused.value) == (
+        "specification: reload must be true of at most one stage on a board, whose link reaches the registers of one "
+        "core, not of out, out"
+    )
+
+
+def test_several_channels_that_are_decimated_are_refused(guarded: sosmith.Chain) -> None:
+    spec = replace(guarded.core.spec, base=replace(guarded.core.spec.base, channels=2))
+    with pytest.raises(SpecificationError) as refused:
+        chain_item(replace(guarded.core, spec=spec))
+    assert str(refused.value) == (
+        "specification: not yet available: channels must be 1 with stages that decimate on a board, not 2"
+    )
+
+
+def test_the_cores_go_into_the_fpga_as_they_are_generated(chain: sosmith.Chain) -> None:
+    texts = chain_texts(chain.core)
+    top = board_verilog(chain_item(chain.core), clock=CLOCK)
+    assert top.endswith(modules(chain.core))
+    for name in ("rx_slow", "rx_double", "rx_out", "rx"):
+        assert texts[f"{name}.sv"] in top
+    assert re.search(r"^module rx_board\(", top, re.MULTILINE)
+
+
+def test_every_sample_has_a_result(chain: sosmith.Chain, tmp_path: Path) -> None:
+    """What stands in the board, with random handshakes; the bench compares all copies of a result."""
+    item, factor = chain_item(chain.core), chain.factor
+    text = to_verilog(to_rtlil(item.component(), "whole")) + item.make_modules()
+    source = tmp_path / "whole.sv"
+    source.write_text(text, encoding="ascii")
+    face = chain_interface(chain.core)
+    interface = replace(face, name="whole", latency_cycles=face.latency_cycles + 1, copies_per_result=factor)
+    codes = stimulus(chain, 300, 1)
+    bench = SimulatorBench(
+        source=source, interface=interface, build_dir=tmp_path, simulator="icarus", seed=1, idle=0.3, stall=0.3
+    )
+    sent = whole_beats(codes[:, :, None], interface.inputs)
+    got = cosimulate(bench, interface, sent, seed=1)
+    results, status = chain.core.compute_with_status(codes[:, :, None])
+    assert np.array_equal(got.codes[:, :, 0], results)
+    assert np.array_equal(got.status, status)
+
+
+def test_a_build_says_what_the_chain_takes(
+    chain: sosmith.Chain, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(bitstream, "find_tool", lambda name: Stub(name, [], REPORT, None))
+    made = chain.build("icestick", folder=tmp_path)
+    assert made.bitstream.name == "rx_board_icestick.bin"
+    assert (made.summary["name"], made.summary["architecture"]) == ("rx", "folded_parallel")
+    assert made.summary["samples_per_second"] == 12e6 / chain_item(chain.core).cycles_per_sample
+    assert (tmp_path / "rx_board.sv").read_text(encoding="ascii") == board_verilog(chain_item(chain.core), clock=CLOCK)
+    project = chain.project("arty_a7", folder=tmp_path / "project")
+    assert project["bitstream"] is None
+    assert {Path(name).suffix for name in project["project"]["files"]} >= {".tcl", ".xdc"}

@@ -1,0 +1,53 @@
+"""The board of a chain in Verilator: a result for each sample, and coefficients of a stage that are loaded."""
+
+import copy
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.gen.chain.chains import GUARDED
+
+import sosmith
+from sosmith.gen.chain.board import chain_item
+from sosmith.host.board import Board
+from sosmith.host.identity_check import check_files, folder_of
+from sosmith.model.errors import ShortfallError
+from sosmith.sim.virtual_board.netlist import build
+from sosmith.sim.virtual_board.terminal import Terminal
+
+
+def tree() -> dict[str, Any]:
+    table = copy.deepcopy(GUARDED) | {"channels": 1}
+    table["output"] = table["output"] | {"max_error": 0.01}
+    return table
+
+
+@pytest.mark.slow
+def test_a_board_with_a_chain_gives_a_result_for_each_sample_and_takes_coefficients(tmp_path: Path) -> None:
+    chain = sosmith.design_chain(tree())
+    other = tree()
+    other["stage"][2]["taps"] = [0.25, 0.25, 0.25]
+    chain.generate(tmp_path / "files")
+    codes = np.random.default_rng(1).integers(-128, 128, (1000, 1))
+    netlist = build(chain_item(chain.core), tmp_path, clock=Fraction(4_000_000), baud=1_000_000)
+    proven = chain.reload(other, reset=True)
+    with Terminal() as terminal, netlist.at(terminal.end):
+        with Board(terminal.path) as board:
+            assert check_files(board.identity, tmp_path / "files")["core"] == "chain"
+            assert folder_of(board.identity, tmp_path) == tmp_path / "files"
+            before = board.run_codes(codes)
+            assert set(board.counters().values()) == {0}
+            board.load(proven.writes)
+        with Board(terminal.path) as board:
+            after = board.run_codes(codes)
+            sosmith.design_chain(other | {"sample_rate": 16000.0}).generate(tmp_path / "others")
+            with pytest.raises(ShortfallError, match=r"^the board's design must be "):
+                check_files(board.identity, tmp_path / "others")
+    results, status = chain.core.compute_with_status(codes[:, None, :])
+    assert np.array_equal(before.codes, np.repeat(results[:, 0], chain.factor))
+    assert np.array_equal(before.status, np.repeat(status[:, 0], chain.factor))
+    exact = sosmith.design_chain(other).run_exact(x=codes[:, 0] / 128)
+    error = np.abs(after.codes[:: chain.factor] * float(chain.core.stages[-1].output.lsb) - exact).max()
+    assert error <= proven.bound < np.abs(after.codes - before.codes).max() * float(chain.core.stages[-1].output.lsb)

@@ -1,0 +1,148 @@
+"""The proof of a chain that interpolates: what it accepts, and that it refuses each claim, wire and word changed."""
+
+from __future__ import annotations
+
+import copy
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tests.gen.chain.rising import UP
+from tests.verify.chain.sealing import CERTIFICATE, sealed_again
+from tests.verify.chain.test_chain import _stages_are_judged_once, changed, less, more
+
+import sosmith
+from sosmith.model.errors import ShortfallError
+
+__all__ = ["_stages_are_judged_once"]
+TREE = UP | {"hardware": {"start": "zero"}}
+
+
+def proven(folder: Path, *, spec: bool = True) -> sosmith.ChainProof:
+    return sosmith.ChainCertificate.load(folder / CERTIFICATE).verify(
+        files=folder, spec=folder / "rx.toml" if spec else None
+    )
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("rising")
+    chain = sosmith.design_chain(TREE)
+    chain.generate(folder)
+    (folder / "rx.toml").write_text(chain.specification.toml(), encoding="utf-8")
+    return folder
+
+
+@pytest.fixture
+def folder(written: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(written, tmp_path / "copy"))
+
+
+def test_all_of_a_chain_that_interpolates_is_proven(folder: Path) -> None:
+    proof = proven(folder)
+    assert not proof.missing
+    assert {"chain", "stages", "top", "c_model"} <= {n for n, p in proof.scope.items() if p.state.value == "proven"}
+    assert proof.files == 4 + 5 * 7
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "stages",
+    [
+        [UP["stage"][0] | {"family": "equiripple", "taps": None, "passband_edge": 3000.0, "stopband_edge": 5000.0}],
+        [UP["stage"][0] | {"taps": [0.1, 0.2, 0.3, 0.4, 0.3, 0.2, 0.1], "interpolate": 3}],
+        [{"name": "half", "kind": "halfband", "interpolate": 2, "passband_edge": 3000.0}],
+        [{"name": "down", "kind": "cic", "order": 3, "decimate": 4}, UP["stage"][2]],
+    ],
+    ids=["equiripple", "decimals", "halfband", "down first"],
+)
+def test_filters_of_all_kinds_are_proven(stages: list[dict[str, Any]], tmp_path: Path) -> None:
+    tree = copy.deepcopy(TREE | {"stage": stages})
+    losses = {"passband_loss": 0.1, "stopband_loss": 40.0}
+    full = [stage | (losses if "passband_edge" in stage else {}) for stage in tree["stage"]]
+    tree["stage"] = [{key: value for key, value in stage.items() if value is not None} for stage in full]
+    chain = sosmith.design_chain(tree)
+    chain.generate(tmp_path)
+    (tmp_path / "rx.toml").write_text(chain.specification.toml(), encoding="utf-8")
+    assert not proven(tmp_path).missing
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "sentence"),
+    [
+        ("stages.0.gain", less, r"^the gain behind stage fill must be .*, not .*$"),
+        ("stages.0.error", more, r"^the error of stage fill must be .*, not .*$"),
+        ("folding.0.rise", lambda _: 4, r"^the rise of what folds must be 8, not 4$"),
+        ("folding.0.anywhere.gain", less, r"^the largest gain of what folds must be at least .*, not .*$"),
+        ("folding.0.passing.gain", less, r"^the largest gain into the pass band must be at least .*, not .*$"),
+        ("folding", lambda _: [], r"^what folds must be claimed of each of 1 parts of the chain .*, not of 0$"),
+        ("settling", lambda old: old + 1, r"^settling of the chain must be \d+ results, not \d+$"),
+        ("stages.0.kind", lambda _: "iir", r"^the cores of stage fill must be one for the kind iir, not 2$"),
+        ("stages.0.certificates", lambda old: old[:1], r"^the certificate of stage fill must be rx_fill\.certificate"),
+        ("stages.0.certificates", lambda old: old[::-1], r"^the certificate of stage fill_p0 must be rx_fill_p0\."),
+    ],
+)
+def test_a_claim_that_does_not_follow_is_refused(
+    path: str, value: Callable[[Any], Any], sentence: str, folder: Path
+) -> None:
+    sealed_again(folder, changed(path, value))
+    with pytest.raises(ShortfallError, match=sentence):
+        proven(folder, spec=False)
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "sentence"),
+    [
+        (
+            "rx.sv",
+            ".s_axis_tvalid(stage_fill_p1_given)",
+            ".s_axis_tvalid(stage_fill_p0_given)",
+            r"^s_axis_tvalid of rx_fill_p1 must be the net stage_fill_p1_given, not stage_fill_p0_given$",
+        ),
+        ("rx.sv", ".i1_tdata(stage_fill_p1_tdata)", ".i1_tdata(stage_fill_p0_tdata)", r"^i1_tdata of rx_fill_turns "),
+        ("rx.sv", "  rx_fill_p1 stage_fill_p1 (", "  rx_fill_p0 stage_fill_p1 (", r"."),
+        ("rx.sv", "assign stays = ~all1;", "assign stays = all1;", r"^rx_fill_turns must assign "),
+        (
+            "rx.c",
+            "rx_fill_p1_step(&state->stage_fill_p1",
+            "rx_fill_p1_step(&state->stage_fill_p0",
+            r"^rx\.c must have ",
+        ),
+        ("rx.c", "return total;", "return i;", r"^rx\.c must have total after "),
+        ("rx.h", "#define RX_RESULTS 8", "#define RX_RESULTS 7", r"^rx\.h must have #define RX_RESULTS 8 after "),
+        ("rx.json", '"interpolate": 8', '"interpolate": 4', r"^interpolate of the manifest must be 8, not 4$"),
+    ],
+)
+def test_another_file_is_refused(file: str, old: str, new: str, sentence: str, folder: Path) -> None:
+    path = folder / file
+    text = path.read_text(encoding="utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new, 1), encoding="utf-8")
+    sealed_again(folder)
+    with pytest.raises(ShortfallError, match=sentence):
+        proven(folder, spec=False)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        (
+            "taps = [0.25, 0.5,",
+            "taps = [0.5, 0.5,",
+            r"^the taps of stage fill, phase 0, must be as the specification of ",
+        ),
+        ("order = 2", "order = 3", r"^the taps of stage out, phase 0, must be as the specification of the chain says"),
+        ("cutoff = 2000.0", "cutoff = 2001.0", r"^the filter of stage low must be as the specification of the chain"),
+        ("interpolate = 4", "decimate = 4", r"^the number of cores of stage out must be as .* says, 1, not 4$"),
+    ],
+)
+def test_other_words_are_refused(old: str, new: str, sentence: str, folder: Path) -> None:
+    path = folder / "rx.toml"
+    text = path.read_text(encoding="utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new), encoding="utf-8")
+    sealed_again(folder, lambda tree: tree.update(specification=path.read_text(encoding="utf-8")))
+    with pytest.raises(ShortfallError, match=sentence):
+        sosmith.ChainCertificate.load(folder / CERTIFICATE).verify(spec=path)
