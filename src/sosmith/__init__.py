@@ -7,7 +7,6 @@ that importing the package itself is fast. The rooms behind it, each importing o
 
 from __future__ import annotations
 
-import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -141,11 +140,3 @@ def __getattr__(name: str) -> Any:
 def __dir__() -> list[str]:
     """List the public names, loaded or not."""
     return sorted({*globals(), *__all__})
-
-
-def main() -> None:
-    """Run the `sosmith` command; an interrupt during the import of its modules also ends it cleanly."""
-    try:
-        import_module("sosmith.cli").main()
-    except KeyboardInterrupt:
-        sys.exit(130)

@@ -39,7 +39,13 @@ def loaded(statement: str, *arguments: str, **environment: str) -> list[str]:
 
 
 def run(*arguments: str, **environment: str) -> list[str]:
-    return loaded("import sosmith; sosmith.main()", *arguments, **environment)
+    return loaded("from sosmith.__main__ import main; main()", *arguments, **environment)
+
+
+def test_the_command_is_also_the_package() -> None:
+    command = [sys.executable, "-m", "sosmith", "--version"]
+    ended = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert ended.stdout == f"sosmith, version {sosmith.__version__}\n"
 
 
 def test_the_import_loads_none_of_them() -> None:
@@ -62,7 +68,7 @@ def test_a_design_loads_nothing_that_it_does_not_need() -> None:
 
 @pytest.mark.parametrize("words", [("design",), ("design", "--json"), ("combinations",)])
 def test_commands_do_without_statistics(words: tuple[str, ...], tmp_path: Path) -> None:
-    script = "import sys, sosmith\ntry:\n    sosmith.main()\nexcept SystemExit:\n    pass\n"
+    script = "import sys\nfrom sosmith.__main__ import main\ntry:\n    main()\nexcept SystemExit:\n    pass\n"
     found = "print(*sorted({'scipy.stats', 'matplotlib'} & sys.modules.keys()), file=sys.stderr)"
     (tmp_path / "plain.toml").write_text(QUICK, encoding="utf-8")
     spec = [str(tmp_path / "plain.toml")] if words[0] == "design" else []
@@ -107,7 +113,7 @@ def test_the_list_of_commands_tells_what_their_help_does() -> None:
 
 def test_completion_loads_none_of_them() -> None:
     words = {"_SOSMITH_COMPLETE": "bash_complete", "COMP_WORDS": "sosmith sim", "COMP_CWORD": "1"}
-    assert loaded("sys.argv[0] = 'sosmith'; import sosmith; sosmith.main()", **words) == []
+    assert loaded("sys.argv[0] = 'sosmith'; from sosmith.__main__ import main; main()", **words) == []
 
 
 CHECKED = {
