@@ -212,7 +212,7 @@ class _Folding:
         """Return the shortest of some programs: each with one sum elsewhere in the order of the shortest one so far."""
         rng = random.Random(_SEED)
         order, ways = list(self._order), (True, False)
-        for trial in range(trials):
+        for trial in range(trials if order else 0):
             kept = list(order)
             if trial:
                 kept.insert(rng.randrange(len(order)), kept.pop(rng.randrange(len(order))))

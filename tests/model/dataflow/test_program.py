@@ -10,7 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.formal.small import limiter
 from tests.gen.designs import ALL, example_design
+from tests.gen.word_lengths.filters import fir_spec, plain
 
+from sosmith.gen.filter.design import design
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.folding import fold
 from sosmith.model.dataflow.folding.fold import columns_of, program
@@ -104,6 +106,11 @@ def test_two_products_a_clock_compute_the_same_in_fewer_clocks(example: str, dig
     assert len(tried.instructions) <= len(two.instructions) < 0.9 * len(one.instructions)
     assert any(i.second_constant for i in two.instructions)
     assert tried == program(datapath, digit_bits, products=2, trials=24)
+
+
+def test_one_sum_has_one_order() -> None:
+    datapath = plain(design(fir_spec(("0.25", "0.5", "0.25")), 1.0), "fir_direct").datapath
+    assert program(datapath, 15, products=2, trials=6) == program(datapath, 15, products=2)
 
 
 def test_a_wrong_second_constant_is_noticed() -> None:

@@ -127,7 +127,7 @@ def other_flag(tree: Any) -> None:
 
 def growing(tree: Any) -> None:
     """Let a section be unstable."""
-    node(tree, "product_A1")["parameter"] *= 2
+    node(tree, "product_A1")["parameter"] *= 4
 
 
 def passing(tree: Any) -> None:
