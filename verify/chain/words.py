@@ -63,7 +63,7 @@ def _check(chain: ChainCertificate, tree: Mapping[str, Any], groups: Groups) -> 
     inputs = tuple(stated_port(name, tree["input"][name], of) for name, of in names.items())
     _same("the inputs", chain.inputs, inputs)
     output = stated_port("clearance" if calibrated else "y", tree["output"], unit)
-    _same("the output", chain.output.model_copy(update={"name": output.name}), output)
+    _same("the output", chain.output, output)
     allowed = tree["output"].get("max_error", "faithful")
     _same("max_error", chain.max_error, output.lsb if allowed == "faithful" else stated_number(allowed))
     rate = first = stated_number(tree["sample_rate"])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -21,3 +22,25 @@ def sealed_again(folder: Path, change: Callable[[dict[str, Any]], None] = lambda
         entry["sha256"] = hashlib.sha256((folder / entry["name"]).read_bytes()).hexdigest()
     certificate = sealed_chain(ChainCertificate.model_validate(tree))
     (folder / CERTIFICATE).write_text(entries_text(certificate), encoding="utf-8")
+
+
+def changed(path: str, value: Callable[[str], str]) -> Callable[[dict[str, Any]], None]:
+    """Return a change of one claim, by keys and indices with dots."""
+
+    def change(tree: Any) -> None:
+        *way, last = path.split(".")
+        for key in way:
+            tree = tree[int(key) if key.isdigit() else key]
+        tree[last] = value(tree[last])
+
+    return change
+
+
+def less(text: str) -> str:
+    """Return a rational that is 1 % less."""
+    return str(Fraction(text) * Fraction(99, 100))
+
+
+def more(text: str) -> str:
+    """Return a rational that is 1 % more."""
+    return str(Fraction(text) * Fraction(101, 100))

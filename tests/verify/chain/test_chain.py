@@ -11,17 +11,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.verify.chain.sealing import CERTIFICATE, sealed_again
+from tests.verify.chain.sealing import CERTIFICATE, changed, less, more, sealed_again
 
 import sosmith
 from sosmith.gen.chain import design as chain_design
 from sosmith.gen.chain.response import Segment, gain_into_passband
 from sosmith.model.errors import ShortfallError, SpecificationError
-from sosmith.verify.certificate_file import Certificate, SectionEntry, on_grid
-from sosmith.verify.chain import check
+from sosmith.verify.certificate_file import SectionEntry, on_grid
 from sosmith.verify.chain.responses import Part, peak_gain
-from sosmith.verify.verdict.door import Judgement, judge
-from sosmith.verify.verification import Progress
 
 TREE: dict[str, Any] = {
     "name": "rx",
@@ -49,25 +46,6 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def folder(written: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(written, tmp_path / "copy"))
-
-
-_JUDGED: dict[tuple[object, ...], Judgement] = {}
-
-
-@pytest.fixture(autouse=True)
-def _stages_are_judged_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Judge a stage once as long as its files are the same: most tests change what is around them."""
-
-    def once(core: Certificate, progress: Progress, *, folder: Path | None, **options: Any) -> Judgement:
-        own = [] if folder is None else sorted(folder.glob(f"{core.name}*"))
-        stated = options["stated"]
-        words = None if stated is None else replace(stated, folder=Path())  # a stage without measurements
-        key = (*((path.name, path.is_symlink(), path.read_bytes()) for path in own), options["content"], words)
-        if key not in _JUDGED:
-            _JUDGED[key] = judge(core, progress, folder=folder, **options)
-        return _JUDGED[key]
-
-    monkeypatch.setattr(check, "judge", once)
 
 
 def proven(folder: Path, *, spec: bool = True) -> sosmith.ChainProof:
@@ -117,28 +95,6 @@ def test_sealing_again_changes_nothing(folder: Path) -> None:
     before = (folder / CERTIFICATE).read_bytes()
     sealed_again(folder)
     assert (folder / CERTIFICATE).read_bytes() == before
-
-
-def changed(path: str, value: Callable[[str], str]) -> Callable[[dict[str, Any]], None]:
-    """Return a change of one claim, by keys and indices with dots."""
-
-    def change(tree: Any) -> None:
-        *way, last = path.split(".")
-        for key in way:
-            tree = tree[int(key) if key.isdigit() else key]
-        tree[last] = value(tree[last])
-
-    return change
-
-
-def less(text: str) -> str:
-    """Return a rational that is 1 % less."""
-    return str(Fraction(text) * Fraction(99, 100))
-
-
-def more(text: str) -> str:
-    """Return a rational that is 1 % more."""
-    return str(Fraction(text) * Fraction(101, 100))
 
 
 @pytest.mark.parametrize(
@@ -336,6 +292,13 @@ def tight_passing(folder: Path, edge: Fraction) -> dict[str, str]:
     parts = sosmith.design_chain(folder / "rx.toml").core.parts
     peak = gain_into_passband(Segment(parts), edge)
     return {"gain": str(on_grid(peak.gain)), "at": str(peak.at)}
+
+
+def test_another_name_of_the_output_than_that_of_the_words_is_refused(folder: Path) -> None:
+    sealed_again(folder, changed("output.name", lambda _: "z"))
+    proven(folder, spec=False)
+    with pytest.raises(ShortfallError, match=r"^the output must be as the specification of the chain says, "):
+        proven(folder)
 
 
 def test_a_manifest_in_another_encoding_is_refused(folder: Path) -> None:

@@ -10,13 +10,11 @@ from typing import Any
 
 import pytest
 from tests.gen.chain.rising import UP
-from tests.verify.chain.sealing import CERTIFICATE, sealed_again
-from tests.verify.chain.test_chain import _stages_are_judged_once, changed, less, more
+from tests.verify.chain.sealing import CERTIFICATE, changed, less, more, sealed_again
 
 import sosmith
 from sosmith.model.errors import ShortfallError
 
-__all__ = ["_stages_are_judged_once"]
 TREE = UP | {"hardware": {"start": "zero"}}
 
 
