@@ -10,6 +10,7 @@ from os import PathLike, fspath
 from pathlib import Path
 
 from sosmith.gen.calibration.acceptance import REQUIRED_R
+from sosmith.gen.estimate.silicon.libraries import LIBRARIES
 from sosmith.gen.fpga.boards import BOARDS, BUILDABLE, MODELLED, PROJECTS, SYNTHESIZED
 from sosmith.gen.fpga.boards import find_board as _find_board
 from sosmith.gen.picture import format_of as picture_format
@@ -35,6 +36,7 @@ __all__ = [
     "ERROR_FEEDBACK",
     "FIT_METHODS",
     "LEVELS",
+    "LIBRARIES",
     "MODELLED",
     "MODELS",
     "PASSBAND_LOSS",
