@@ -43,20 +43,32 @@ class CellLibrary:
     load: float = 0.05
 
     @property
+    def path(self) -> Path:
+        """Where its Liberty file is."""
+        return _PLACE / self.name / f"{self.name}_stdcells.lib"
+
+    def check_installed(self) -> None:
+        """Refuse it if it is not installed.
+
+        Raises
+        ------
+        ToolError
+            Says how to install it.
+        """
+        if not self.path.is_file():
+            raise ToolError(f"the cells of {self.name} are needed, and were not found: apt-get install {self.package}")
+
+    @property
     def liberty(self) -> bytes:
         """Its Liberty file.
 
         Raises
         ------
         ToolError
-            If it is not installed; says how to install it.
+            As `check_installed`.
         """
-        try:
-            return (_PLACE / self.name / f"{self.name}_stdcells.lib").read_bytes()
-        except OSError:
-            raise ToolError(
-                f"the cells of {self.name} are needed, and were not found: apt-get install {self.package}"
-            ) from None
+        self.check_installed()
+        return self.path.read_bytes()
 
 
 # Areas are those of NAND2X1 in the Liberty files, which are in um^2: the cells are 2.4 by 10 and 4.8 by 20 um.

@@ -9,7 +9,7 @@ import click
 
 from sosmith.commands.chain import refuse, show_chain, write_chain
 from sosmith.commands.options import BOARD, CORE, REALIZATION, SPEC, WIDTHS_OF, OneOf, print_tables
-from sosmith.interface.choices import BUILDABLE, LIBRARIES, picture_format
+from sosmith.interface.choices import BUILDABLE, LIBRARIES, check_library, picture_format
 from sosmith.interface.files import DEFAULT, contents, default_folder, titles, write_contents
 from sosmith.model.errors import SpecificationError
 from sosmith.output_paths import folder_option, plot_option
@@ -103,6 +103,8 @@ def design_command(
 
     if plot is not None:
         picture_format(plot)
+    if silicon is not None:
+        check_library(silicon)
     asked = specification_in(spec)
     if isinstance(asked, ChainSpecification):
         refuse(core=core, realization=realization, widths_of=widths_of, silicon=silicon)

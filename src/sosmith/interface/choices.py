@@ -52,6 +52,7 @@ __all__ = [
     "WINDOWS",
     "board_named",
     "check_date",
+    "check_library",
     "check_scenario",
     "check_simulator",
     "check_vectors",
@@ -101,6 +102,11 @@ def check_date(text: str) -> None:
     from sosmith.instrument.calibration.store.measurement_files import parse_date
 
     parse_date(text)
+
+
+def check_library(name: str) -> None:
+    """Refuse standard cells that are not installed, with a ToolError that says how to install them."""
+    LIBRARIES[name].check_installed()
 
 
 def check_vlnv(text: str) -> None:

@@ -6,6 +6,7 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
+from tests.gen.estimate.silicon.small_library import liberty
 from tests.interface.small import filter_design
 
 from sosmith.gen.estimate.silicon import libraries, timing
@@ -35,35 +36,6 @@ CORE = """module tiny(input aclk, aresetn, a, b, output reg [1:0] y);
   always_ff @(posedge aclk) y <= aresetn ? {y[0] ^ a, a & ~b} : 0;
 endmodule
 """
-
-
-def _pin(name: str, direction: str, rest: str = "") -> str:
-    return f"pin({name}) {{ direction : {direction}; capacitance : 0.01; {rest} }}\n"
-
-
-def _arc(of: str, kind: str = "combinational") -> str:
-    table = '(table) { index_1 ("0, 1"); index_2 ("0, 1"); values ("0.5, 0.5", "0.5, 0.5"); }'
-    tables = " ".join(f"{name} {table}" for name in ("cell_rise", "cell_fall", "rise_transition", "fall_transition"))
-    return f'timing() {{ related_pin : "{of}"; timing_type : {kind}; timing_sense : negative_unate; {tables} }}'
-
-
-def _liberty() -> str:
-    """Write a library of an inverter, three gates and a flip-flop, in which everything takes 0.5 ns."""
-    gates = {"NAND2X1": (24, "!(A B)"), "NOR2X1": (24, "!(A+B)"), "XNOR2X1": (56, "!(A^B)")}
-    inputs = _pin("A", "input") + _pin("B", "input")
-    inverter = _pin("A", "input") + _pin("Y", "output", f'function : "(!A)"; {_arc("A")}')
-    register = 'ff(IQ, IQN) { clocked_on : "CLK"; next_state : "D"; }' + _pin("D", "input")
-    register += _pin("CLK", "input", "clock : true;")
-    register += _pin("Q", "output", f'function : "IQ"; {_arc("CLK", "rising_edge")}')
-    buffer = inverter.replace("!A", "A").replace("negative", "positive")
-    cells = {"INVX4": (16, inverter), "BUFX2": (24, buffer), "DFFPOSX1": (96, register)}
-    for name, (area, function) in gates.items():
-        cells[name] = area, inputs + _pin("Y", "output", f'function : "({function})"; {_arc("A")} {_arc("B")}')
-    text = "".join(f"cell ({name}) {{ area : {area}; {pins} }}\n" for name, (area, pins) in cells.items())
-    units = 'time_unit : "1ns"; capacitive_load_unit (1,pf);'
-    axes = 'variable_1 : total_output_net_capacitance; variable_2 : input_net_transition; index_1 ("0, 1");'
-    template = f'lu_table_template(table) {{ {axes} index_2 ("0, 1"); }}'
-    return f"library(small) {{\ndelay_model : table_lookup;\n{units}\n{template}\n{text} }}\n"
 
 
 def test_the_period_is_what_is_left_of_the_one_asked_for() -> None:
@@ -124,7 +96,7 @@ def test_what_is_missing_is_named_with_its_package(tmp_path: Path, monkeypatch: 
 def test_a_core_is_mapped_onto_a_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     place = tmp_path / "osu018" / "osu018_stdcells.lib"
     place.parent.mkdir()
-    place.write_text(_liberty(), encoding="utf-8")
+    place.write_text(liberty(), encoding="utf-8")
     monkeypatch.setattr(libraries, "_PLACE", tmp_path)
     monkeypatch.setattr(timing, "_PROGRAM", "no such program")
     found = mapped(CORE, "tiny", CELLS, Fraction(10**8))
