@@ -41,7 +41,7 @@ DESIGNS = (
 )
 """Examples and their numbers of channels."""
 
-MEASURED = ("icebreaker", "icestick", "ice40_hx8k_b_evn", "ulx3s_25f", "tang_nano_9k")
+MEASURED = ("icebreaker", "icestick", "ice40_hx8k_b_evn", "ulx3s_25f", "tang_nano_9k", "olimex_gatemate")
 """Boards to build for; the other ones have FPGAs of the same families, which are as large or larger."""
 
 AUDIO = ("recipes/live", 2)
@@ -57,6 +57,7 @@ _CELLS = {
     "ice40": ("ICESTORM_LC", "ICESTORM_DSP", "ICESTORM_RAM"),
     "ecp5": ("TRELLIS_COMB", "MULT18X18D", "DP16KD"),
     "gowin": ("LUT4", None, "BSRAM"),
+    "gatemate": ("CPE_LT", None, "RAM_HALF"),
 }
 """Kinds of logic, multipliers and block RAM in the placer's words, by family."""
 

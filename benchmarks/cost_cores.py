@@ -33,6 +33,9 @@ GROWTH = 1.05
 _ORDINARY = ("up5k", "hx8k", "hx1k", "ecp5")
 """Targets on which cores of every architecture are measured."""
 
+_ALONE = "audio_lowpass"
+"""Example that is measured on a GateMate too, for one channel, parallel and folded: placing takes minutes."""
+
 _SMALLEST = "hx1k"
 """Target on which only the serial architecture is measured."""
 Figures = dict[str, Any]
@@ -119,7 +122,8 @@ class Core:
             return ["hx8k", "ecp5"]
         wanted = [key for key in _ORDINARY if key != _SMALLEST or self.architecture == combinations.SERIAL.name]
         if self.protect == "none":
-            return wanted
+            alone = (self.example, self.channels) == (_ALONE, 1) and self.architecture != combinations.SERIAL.name
+            return [*wanted, "gatemate"] if alone else wanted
         return [
             key
             for key in wanted

@@ -38,6 +38,7 @@ from benchmarks.cost_goals import (
 )
 from benchmarks.firmware import recorded as firmware
 from benchmarks.peers import PEERS, PUBLISHED
+from benchmarks.silicon import table as silicon_table
 from benchmarks.synthesis import GOAL, TARGETS, title
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
@@ -216,7 +217,10 @@ def online_table(record: Figures) -> str:
 def table(record: Figures, keys: tuple[str, ...]) -> str:
     """Return a Markdown table of all cores on some targets of one family."""
     ecp5 = keys == ("ecp5",)
-    cells = "LUT4 alone | all LUT4 | TRELLIS_COMB | FF | MULT18X18D | DP16KD" if ecp5 else "LC | FF | MAC16 | RAM"
+    cells = {
+        ("ecp5",): "LUT4 alone | all LUT4 | TRELLIS_COMB | FF | MULT18X18D | DP16KD",
+        ("gatemate",): "CPE_LT | FF | CC_MULT | CC_BRAM_20K",
+    }.get(keys, "LC | FF | MAC16 | RAM")
     lines = [
         f"| core | architecture | channels | target | {cells} | fmax, MHz (lowest to highest) | clocks per sample "
         "| samples per second |",
@@ -378,6 +382,8 @@ How cells are counted:
   only the UP5K has; on the others, multipliers are built from logic cells.
 - LUT4 alone: the LUT4 cells of Yosys on an ECP5. All LUT4: also each carry cell, CCU2C, as two, and each LUT RAM cell,
   TRELLIS_DPR16X4, as four. TRELLIS_COMB: LUT4 as placed, including those that only pass a signal through.
+- CPE_LT: halves of programmable elements of a GateMate, as placed, each a LUT4 or a bit of a sum. CC_MULT is made of
+  two for each 2 x 2 bits, and no block of its own.
 - Multipliers, flip-flops (FF) and block RAMs (RAM of 4 kbit, DP16KD of 16 kbit) after synthesis.
 - Clocks per sample: an upper limit in the serial architecture, where the number depends on the data.
 
@@ -396,6 +402,15 @@ The slowest path between registers, for the median seed; registers have the name
 
 In the parallel architecture a section closes its recursion within one clock: sums, multiplication and state follow one
 another without a register. With several channels the loop is pipelined across them.
+
+## GateMate
+
+audio_lowpass, one channel:
+
+{table(record, ("gatemate",))}
+
+Products by constants are sums here, with the same graph as on the HX8K. A signal waits for all rows of a CC_MULT, and
+wires take most of the time: the placer asks for 200 MHz, and for none of these cores finds half of that.
 
 ## Two products a clock
 
@@ -475,6 +490,17 @@ What these and another project publish of three sections, each in its own way of
 FPGAs; nothing is said of their errors:
 
 {published_table()}
+
+## Standard cells
+
+The same cores mapped onto the standard cells OSU018, 180 nm, as `sosmith design --silicon osu018` does, by
+`python -m benchmarks.silicon`: area in NANDs of two inputs and in mm2, and the clock of the slowest path between
+registers, by OpenSTA for the typical corner. **This is before layout**: wires take no area and no time, and there is no
+clock tree and no pad. Memories are made of flip-flops, programs of gates.
+
+{silicon_table()}
+
+`hardware.multipliers = 0` makes sums of products by constants.
 
 ## The same without an FPGA
 

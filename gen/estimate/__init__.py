@@ -1,1 +1,1 @@
-"""What a core takes on an FPGA, estimated before synthesis."""
+"""What a core takes: on an FPGA, estimated before synthesis, and of standard cells, before layout."""

@@ -19,17 +19,18 @@ from sosmith.gen.fpga.tools import Tool, find_tool
 from sosmith.gen.fpga.wiring import PLAIN, Wiring
 from sosmith.model.errors import ShortfallError, ToolError
 
-_SUFFIX = {"ice40": "bin", "ecp5": "bit", "gowin": "fs"}
+_SUFFIX = {"ice40": "bin", "ecp5": "bit", "gowin": "fs", "gatemate": "bit"}
 """Suffix of a bitstream's file, by family."""
 
 _PROGRAMS = {
     "ice40": ("yosys", "nextpnr-ice40", "icepack"),
     "ecp5": ("yosys", "nextpnr-ecp5", "ecppack"),
     "gowin": ("yosys", "nextpnr-himbaechel-gowin", "gowin_pack"),
+    "gatemate": ("yosys", "nextpnr-himbaechel-gatemate", "gmpack"),
 }
 """What makes a bitstream, by family."""
 
-_STEPS = {"yosys": "synthesis", "icepack": "packing", "ecppack": "packing", "gowin_pack": "packing"}
+_STEPS = {"yosys": "synthesis", **dict.fromkeys(("icepack", "ecppack", "gowin_pack", "gmpack"), "packing")}
 _LOG = "build.log"
 _LOG_TAIL = 12  # lines of a program's output shown in an error
 _ERROR = re.compile(r"^ERROR: (.*)$", re.MULTILINE)

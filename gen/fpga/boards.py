@@ -15,8 +15,12 @@ _LUTS = {
     "SB_LUT4": 1,
     **dict.fromkeys(("LUT1", "LUT2", "LUT3", "LUT4", "ALU"), 1),
     **{"CCU2C": 2, "TRELLIS_DPR16X4": 4, "RAM16SDP4": 4},
+    **dict.fromkeys(("CC_LUT1", "CC_LUT2", "CC_LUT3", "CC_LUT4", "CC_L2T4", "CC_MX2", "CC_ADDF"), 1),
+    **{"CC_L2T5": 2, "CC_MX4": 2},
 }
-"""Number of LUT4 that a cell uses; on a Gowin FPGA smaller LUTs are cells of their own, and so is one with a carry."""
+"""Number of LUT4 that a cell uses; on a Gowin FPGA smaller LUTs are cells of their own, and so is one with a carry. On
+a GateMate a LUT4 is half of a programmable element, as nextpnr counts them: CPE_LT. Its multipliers are made of these
+as well, and not counted."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,7 +30,7 @@ class Device:
     Attributes
     ----------
     family : str
-        ``"ice40"``, ``"ecp5"``, ``"gowin"`` or ``"xilinx"``: the name of the cell library.
+        ``"ice40"``, ``"ecp5"``, ``"gowin"``, ``"gatemate"`` or ``"xilinx"``: the name of the cell library.
     title : str
         Name for display.
     synthesis : str
@@ -42,7 +46,8 @@ class Device:
     multipliers : int
         Number of multiplier blocks.
     block_ram : str
-        Cell type of the block RAM: SB_RAM40_4K holds 4,096 bits, DP16KD 18,432, SDPB 16,384.
+        Cell type of the block RAM: SB_RAM40_4K holds 4,096 bits, DP16KD 18,432, SDPB 16,384,
+        CC_BRAM_20K 20,480.
     block_rams : int
         Number of block RAMs.
     pll_limit : int
@@ -194,6 +199,21 @@ _GW2AR_18C = replace(
     block_rams=46,
 )
 
+# A multiplier is an array of programmable elements, one for each 2 x 2 bits, and a signal passes all rows of it. Yosys
+# makes one where both factors vary; products by constants take less room as adders, and are faster.
+_CCGM1A1 = Device(
+    family="gatemate",
+    title="GateMate CCGM1A1",
+    synthesis="synth_gatemate -luttree -nomx8",
+    placer="CCGM1A1",
+    logic_cells=40960,
+    multiplier=None,
+    factor_bits=0,
+    multipliers=0,
+    block_ram="CC_BRAM_20K",
+    block_rams=64,
+)
+
 
 # Numbers of cells are those of Xilinx DS180, 7 Series FPGAs Overview: LUT6, DSP48E1, RAMB36E1.
 _XC7A35T = Device(
@@ -334,6 +354,16 @@ _ALL = (
         audio=_pins("30 31 42 41 48 72 71 29"),
     ),
     Board(
+        name="olimex_gatemate",
+        title="GateMateA1-EVB",
+        device=_CCGM1A1,
+        package="",
+        speed="",
+        clock=10_000_000,
+        platform="sosmith.gen.fpga.gatemate:OlimexGateMateA1Platform",
+        loader="olimex_gatemateevb",
+    ),
+    Board(
         name="arty_a7",
         title="Arty A7-35T",
         device=_XC7A35T,
@@ -372,7 +402,7 @@ PROJECTS = tuple(name for name, board in BOARDS.items() if board.device.family =
 SYNTHESIZED = tuple(name for name in BOARDS if name not in PROJECTS)
 """Names of the boards whose cells are counted after synthesis."""
 
-MODELLED = tuple(name for name, board in BOARDS.items() if board.device.family in {"ice40", "ecp5"})
+MODELLED = tuple(name for name, board in BOARDS.items() if board.device.family in {"ice40", "ecp5", "gatemate"})
 """Names of the boards whose netlists can be simulated: there are models of all cells."""
 
 

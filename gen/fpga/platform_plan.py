@@ -21,6 +21,7 @@ _PIN_ATTRIBUTES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "ice40": ({"IO_STANDARD": "SB_LVCMOS"}, {"PULLUP": 1}),
     "ecp5": ({"IO_TYPE": "LVCMOS33"}, {"PULLMODE": "UP"}),
     "gowin": ({"IO_TYPE": "LVCMOS33"}, {"PULL_MODE": "UP"}),
+    "gatemate": ({}, {"PULLUP": "true"}),
     "xilinx": ({"IOSTANDARD": "LVCMOS33"}, {"PULLUP": "TRUE"}),
 }
 """Attributes of a pin of 3.3 V, by family, and those of its pull-up."""

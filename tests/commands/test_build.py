@@ -1,17 +1,19 @@
-"""`sosmith build`: what it prints, and its exit status; the programs are stubs here."""
+"""`sosmith build`: what it prints, and its exit status; the programs are stubs here. And `design --silicon`."""
 
 import json
 from pathlib import Path
 
 import pytest
 from tests.commands.invocation import Invocation
+from tests.gen.estimate.silicon.small_library import liberty
 from tests.gen.fpga.stubs import REPORT, Stub
 
+from sosmith.gen.estimate.silicon import libraries, timing
 from sosmith.gen.fpga import bitstream
 from sosmith.gen.fpga.boards import BUILDABLE, PROJECTS
-from sosmith.model.errors import ShortfallError
+from sosmith.model.errors import ShortfallError, ToolError
 
-BUILD = Invocation("build")
+BUILD, DESIGN = Invocation("build"), Invocation("design")
 SPEC = """\
 name = "plain"
 sample_rate = {rate}
@@ -133,3 +135,24 @@ def test_a_project_for_a_vendors_tools_says_that_nothing_was_built(programs: dic
     assert {path.suffix for path in Path("build/plain/cmod_s7").glob("plain_board*")} == {".sv", ".v", ".xdc", ".tcl"}
     message = "--program must be left out for cmod_s7: no bitstream is made for it"
     BUILD.refused(message, "plain.toml", "--board", "cmod_s7", "--program")
+
+
+def test_silicon_shows_area_and_clock_before_layout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(libraries, "_PLACE", tmp_path)
+    monkeypatch.setattr(timing, "_PROGRAM", "no such program")
+    spec, cells = tmp_path / "plain.toml", libraries.LIBRARIES["osu018"].path
+    cells.parent.mkdir()
+    cells.write_text(liberty(), encoding="utf-8")
+    spec.write_text(SPEC.format(rate=1000.0), encoding="utf-8")
+    found = json.loads(DESIGN.good(str(spec), "--silicon", "osu018", "--json").stdout)["silicon"]
+    assert found["nand2_equivalents"] == round(found["area_um2"] / 24)
+    assert (found["stage"], found["clock_hz"]) == ("before layout", None)
+    shown = DESIGN.good(str(spec), "--silicon", "osu018").stdout
+    assert f"{found['nand2_equivalents']:,} NAND2 equivalents" in shown
+    assert "this is before layout" in shown
+
+
+def test_missing_cells_are_told_before_anything_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(libraries, "_PLACE", tmp_path)
+    message = "the cells of osu035 are needed, and were not found: apt-get install qflow-tech-osu035"
+    DESIGN.refused(message, "no such file", "--silicon", "osu035", kind=ToolError)

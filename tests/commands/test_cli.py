@@ -16,7 +16,7 @@ NEEDED = {
     "init": ("[FILE]", "flange_wear.toml", "--example NAME", "--list", "--force"),
     "import": ("FILE", "--sample-rate", "--signs", "--range", "disagree on the signs"),
     "combinations": ("go together", "--markdown", "--json"),
-    "design": ("SPEC", "--core", "--realization", "--widths-of", "--plot", "--json"),
+    "design": ("SPEC", "--core", "--realization", "--widths-of", "--silicon", "--plot", "--json"),
     "generate": ("SPEC", "SystemVerilog", "-o, --output", "build/<name>"),
     "package": (
         "SPEC",

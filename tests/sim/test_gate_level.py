@@ -55,6 +55,7 @@ def run(made: CoreDesign, board: str, folder: Path, *, samples: int, simulator: 
         pytest.param(
             "ulx3s_25f", "parallel", "verilator", {"LUT4", "CCU2C", "TRELLIS_FF", "MULT18X18D"}, marks=pytest.mark.slow
         ),
+        ("olimex_gatemate", "folded", "verilator", {"CC_L2T4", "CC_ADDF", "CC_DFF", "CC_MULT", "CC_BRAM_20K"}),
     ],
 )
 def test_a_netlist_computes_what_the_integer_model_does(
@@ -78,7 +79,7 @@ EXAMPLES_IN = [
     (f"{example}.toml", architecture, board)
     for example in ("audio_lowpass", "flange_wear_bench", "flange_wear_locomotive")
     for architecture in ("parallel", "folded", "serial")
-    for board in ("icebreaker", "ice40_hx8k_b_evn", "ulx3s_25f")
+    for board in ("icebreaker", "ice40_hx8k_b_evn", "ulx3s_25f", "olimex_gatemate")
 ]
 
 

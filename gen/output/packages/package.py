@@ -12,6 +12,7 @@ from sosmith.gen.output.packages.driver import driver_files
 from sosmith.gen.output.packages.facts import package_facts
 from sosmith.gen.output.packages.fusesoc import fusesoc_files
 from sosmith.gen.output.packages.ip_xact import ip_xact_files
+from sosmith.gen.output.packages.librelane import librelane_files
 from sosmith.gen.output.packages.python_wrappers import wrapper_files
 from sosmith.gen.output.packages.readme import readme_files
 from sosmith.gen.output.packages.timing_diagram import timing_files
@@ -74,6 +75,7 @@ def packed(
         **bench,
         **ip_xact_files(facts),
         **vendor_files(facts),
+        **librelane_files(facts),
         **vhdl_files(facts),
         **wrapper_files(facts),
         **driver_files(facts),

@@ -8,8 +8,8 @@ from pathlib import Path
 import click
 
 from sosmith.commands.chain import refuse, show_chain, write_chain
-from sosmith.commands.options import BOARD, CORE, REALIZATION, SPEC, WIDTHS_OF, print_tables
-from sosmith.interface.choices import BUILDABLE, picture_format
+from sosmith.commands.options import BOARD, CORE, REALIZATION, SPEC, WIDTHS_OF, OneOf, print_tables
+from sosmith.interface.choices import BUILDABLE, LIBRARIES, check_library, picture_format
 from sosmith.interface.files import DEFAULT, contents, default_folder, titles, write_contents
 from sosmith.model.errors import SpecificationError
 from sosmith.output_paths import folder_option, plot_option
@@ -64,6 +64,11 @@ def init(file: Path | None, named: str, listed: bool, force: bool) -> None:
 @REALIZATION
 @WIDTHS_OF
 @BOARD
+@click.option(
+    "--silicon",
+    type=OneOf(tuple(LIBRARIES)),
+    help="Also map it onto standard cells, and show area and clock before layout.",
+)
 @click.option("--details", is_flag=True, help="Also show the uncertainty budget, sections, limit cycles and schedule.")
 @plot_option("SVG or PNG file for a plot of gain, delay and calibration.")
 @JSON_OPTION
@@ -73,6 +78,7 @@ def design_command(
     realization: str | None,
     widths_of: str | None,
     board: str | None,
+    silicon: str | None,
     details: bool,
     plot: Path | None,
     as_json: bool,
@@ -82,18 +88,25 @@ def design_command(
     With --board, it is built for that board as `sosmith build` does, which takes some tens of seconds the first time,
     and the cells are those that it takes there, with the serial link.
 
+    With --silicon, Yosys maps it onto standard cells, which takes some seconds. The area is also told in NANDs of two
+    inputs, the clock is that of the slowest path by OpenSTA. This is before layout: wires take no area and no time. The
+    cells are in Debian's packages qflow-tech-osu018 and qflow-tech-osu035, OpenSTA in opensta.
+
     \b
         sosmith design my.toml
         sosmith design my.toml --details --plot my.svg
         sosmith design my.toml --board icebreaker --json
+        sosmith design my.toml --silicon osu018
     """
     from sosmith.interface.chain.specification import ChainSpecification, specification_in
 
     if plot is not None:
         picture_format(plot)
+    if silicon is not None:
+        check_library(silicon)
     asked = specification_in(spec)
     if isinstance(asked, ChainSpecification):
-        refuse(core=core, realization=realization, widths_of=widths_of)
+        refuse(core=core, realization=realization, widths_of=widths_of, silicon=silicon)
         show_chain(asked, board, plot, details=details, as_json=as_json)
         return
     if asked.checked.filter.origin:
@@ -103,19 +116,22 @@ def design_command(
 
         designed = design(asked, core=core, realization=realization, widths_of=widths_of, board=board, progress=step)
         cost = None if board not in BUILDABLE else designed.cost_on(board, step)
+        cells = None if silicon is None else designed.silicon(silicon, step)
         if plot is not None:
             step("drawing")
             designed.plot(plot)
     if plot is not None:
         note(f"wrote {plot}")
     if as_json:
-        print_json(designed.as_dict() if cost is None else designed.as_dict() | {"board": cost})
+        more = {"board": cost, "silicon": cells}
+        print_json(designed.as_dict() | {name: each for name, each in more.items() if each is not None})
         return
     tables = designed.tables(details=details)
-    if cost is not None:
-        from sosmith.interface.build import build_table
+    if cost is not None or cells is not None:
+        from sosmith.interface.build import build_table, silicon_table
 
-        tables.append(build_table(cost))
+        tables += [] if cost is None else [build_table(cost)]
+        tables += [] if cells is None else [silicon_table(asked.name, cells)]
     print_tables(tables)
 
 

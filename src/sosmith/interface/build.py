@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from sosmith.gen.estimate.silicon.timing import PACKAGE as STA
 from sosmith.gen.facts.table import Table, View
 from sosmith.gen.fpga.boards import find_board
 from sosmith.gen.output.board_build import BoardBuild
@@ -118,3 +119,17 @@ def build_table(summary: Mapping[str, Any]) -> Table:
         rows.append(("sample rate", f"{rate['hz']:,.2f} Hz: {rate['ppm']:+,.0f} ppm; MCLK {rate['mclk_hz']:,.0f} Hz"))
     rows.append(("serial line", f"{summary['line_rate_baud']:,} baud"))
     return Table(f"{summary['name']} on {summary['title']}", rows)
+
+
+def silicon_table(name: str, found: Mapping[str, Any]) -> Table:
+    """Say what a core takes of silicon; `found` is what `Design.silicon` returns."""
+    area, registers = found["area_um2"], found["area_of_registers_um2"]
+    clock = f"apt-get install {STA}" if found["clock_hz"] is None else f"{found['clock_hz'] / 1e6:.1f} MHz"
+    rows = [
+        ("cells", f"{found['title']}; {found['corner']}"),
+        ("area", f"{area / 1e6:.4f} mm2, {100 * registers / area:.0f} % of it flip-flops"),
+        ("gates", f"{found['nand2_equivalents']:,} NAND2 equivalents"),
+        ("clock", f"{'not known: ' * (found['clock_hz'] is None)}{clock}"),
+        ("not in it", "wires, clock tree, pads: this is before layout; memories are flip-flops"),
+    ]
+    return Table(f"{name} on {found['library']}", rows)

@@ -10,6 +10,7 @@ from os import PathLike, fspath
 from pathlib import Path
 
 from sosmith.gen.calibration.acceptance import REQUIRED_R
+from sosmith.gen.estimate.silicon.libraries import LIBRARIES
 from sosmith.gen.fpga.boards import BOARDS, BUILDABLE, MODELLED, PROJECTS, SYNTHESIZED
 from sosmith.gen.fpga.boards import find_board as _find_board
 from sosmith.gen.picture import format_of as picture_format
@@ -35,6 +36,7 @@ __all__ = [
     "ERROR_FEEDBACK",
     "FIT_METHODS",
     "LEVELS",
+    "LIBRARIES",
     "MODELLED",
     "MODELS",
     "PASSBAND_LOSS",
@@ -50,6 +52,7 @@ __all__ = [
     "WINDOWS",
     "board_named",
     "check_date",
+    "check_library",
     "check_scenario",
     "check_simulator",
     "check_vectors",
@@ -99,6 +102,11 @@ def check_date(text: str) -> None:
     from sosmith.instrument.calibration.store.measurement_files import parse_date
 
     parse_date(text)
+
+
+def check_library(name: str) -> None:
+    """Refuse standard cells that are not installed, with a ToolError that says how to install them."""
+    LIBRARIES[name].check_installed()
 
 
 def check_vlnv(text: str) -> None:

@@ -626,6 +626,42 @@ class Design:
         place = None if cache is None else cache.parent / "boards"
         return board_cost(self.core, target, place, lambda step: progress(step, 0, 0))
 
+    def silicon(self, library: str = "osu018", progress: Progress = lambda step, done, total: None) -> dict[str, Any]:
+        """Return what the core takes of silicon in standard cells, before layout: wires take no area and no time.
+
+        Memories are made of flip-flops. Products by constants take less as sums: `hardware.multipliers = 0`.
+
+        Parameters
+        ----------
+        library : str
+            Standard cells: ``"osu018"`` or ``"osu035"``.
+        progress : callable
+            Called with the name of each step, and two numbers that are 0.
+
+        Returns
+        -------
+        dict
+            `library`, `title` and `corner`; `area_um2`, of it `area_of_registers_um2`; `nand2_equivalents`; `cells`
+            by kind; `clock_hz`, the highest clock, None without OpenSTA; `stage` and the version of `yosys`.
+
+        Raises
+        ------
+        SpecificationError
+            If there is no such library.
+        ToolError
+            If a program or the Debian package of the library is missing, or a program fails.
+        """
+        from sosmith.gen.estimate.silicon.libraries import find_library
+        from sosmith.gen.estimate.silicon.synthesis import mapped
+        from sosmith.gen.output.verilog import core_verilog
+
+        cells = find_library(library)
+        progress("SystemVerilog", 0, 0)
+        verilog = core_verilog(self.core)
+        progress(f"synthesis for {cells.name}", 0, 0)
+        spec = self.core.spec
+        return mapped(verilog, spec.name, cells, spec.hardware.clock).as_dict()
+
     def simulate(
         self,
         trace: str | PathLike[str] | Mapping[str, npt.ArrayLike] | None = None,

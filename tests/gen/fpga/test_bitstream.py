@@ -59,6 +59,9 @@ def test_every_board_has_its_clock_and_pins_from_its_platform(name: str, install
             {"tang_nano_9k": "family=GW1N-9C", "tang_nano_20k": "family=GW2A-18C"}[name],
             f"cst=tiny_{name}.cst",
         )
+    if board.device.family == "gatemate":
+        assert placed[placed.index("--device") + 1] == "CCGM1A1"
+        assert calls[-1] == ["gmpack", f"tiny_{name}.txt", f"tiny_{name}.bit"]
 
 
 def test_what_is_read_off_the_report(install: Install) -> None:
@@ -181,7 +184,7 @@ def test_what_a_program_says_goes_to_the_log(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["icestick", "ulx3s_12f", "tang_nano_9k", "tang_nano_20k"])
+@pytest.mark.parametrize("name", ["icestick", "ulx3s_12f", "tang_nano_9k", "tang_nano_20k", "olimex_gatemate"])
 def test_a_bitstream_closes_timing_and_is_the_same_again(name: str) -> None:
     design = sosmith.design("examples/flange_wear_bench.toml", board=name).core
     board = find_board(name)

@@ -12,7 +12,7 @@ from sosmith.model.errors import SpecificationError
 def test_boards_are_found_by_name() -> None:
     assert all(find_board(name).name == name for name in BOARDS)
     families = {board.device.family for board in BOARDS.values()}
-    assert families == {"ice40", "ecp5", "gowin", "xilinx"}
+    assert families == {"ice40", "ecp5", "gowin", "gatemate", "xilinx"}
 
 
 def test_hyphens_and_capitals_do_not_matter() -> None:

@@ -3,18 +3,22 @@
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 from tests.commands.invocation import Invocation
-from tests.gen.output.packages.made import SPECIFICATIONS, design_of, package_of
+from tests.gen.output.packages.made import SPECIFICATIONS, design_of, package_of, unpacked
 from tests.suite.extras import needed
 
 import sosmith
+from sosmith.gen.estimate.silicon.libraries import LIBRARIES
+from sosmith.gen.fpga.yosys import run_yosys
 from sosmith.gen.output.generate import generated
 from sosmith.gen.output.packages.facts import package_facts
+from sosmith.model.errors import ToolError
 
 PACKAGE = Invocation("package")
 
@@ -79,6 +83,56 @@ def test_scripts_for_vendors_tools_name_files_that_exist(tool: str, name: str) -
     assert "sosmith has not run this script" in script
     period = "1000.000" if name == "tunable" else "83.333"
     assert f"-period {period} [get_ports aclk]" in texts[f"{tool}/{name}.{suffix}"]
+
+
+@pytest.mark.parametrize("name", SPECIFICATIONS)
+def test_files_for_librelane_name_what_there_is(name: str) -> None:
+    texts = package_of(name)
+    told = json.loads(texts["librelane/config.json"])
+    assert told.pop("meta") == {"version": 2, "flow": "Classic"}
+    period = 1000.0 if name == "tunable" else 83.333
+    assert told == {
+        "DESIGN_NAME": name,
+        "VERILOG_FILES": [f"dir::../core/{name}.sv"],
+        "CLOCK_PORT": "aclk",
+        "CLOCK_PERIOD": period,
+        "PNR_SDC_FILE": f"dir::{name}.sdc",
+        "SIGNOFF_SDC_FILE": f"dir::{name}.sdc",
+    }
+    constraints = texts[f"librelane/{name}.sdc"]
+    assert f"-period {period:.3f} [get_ports aclk]" in constraints
+    assert f"set_input_delay {0.2 * period:.3f} " in constraints
+
+
+def test_yosys_finds_what_librelane_is_told(tmp_path: Path) -> None:
+    folder = unpacked("gauge", tmp_path) / "librelane"
+    told = json.loads((folder / "config.json").read_text(encoding="utf-8"))
+    (source,) = (path.replace("dir::../", "") for path in told["VERILOG_FILES"])
+    script = f"read_verilog -sv {source}; hierarchy -check -top {told['DESIGN_NAME']}; "
+    run_yosys(script + f"select -assert-count 1 i:{told['CLOCK_PORT']}", tmp_path)
+
+
+@pytest.mark.slow
+def test_opensta_takes_the_constraints_for_librelane(tmp_path: Path) -> None:
+    program = shutil.which("sta")
+    try:
+        (tmp_path / "cells.lib").write_bytes(LIBRARIES["osu018"].liberty)
+    except ToolError:
+        program = None
+    if program is None:
+        pytest.skip("opensta or qflow-tech-osu018 is not installed")
+    unpacked("gauge", tmp_path)
+    synthesis = "synth -flatten -noabc; dfflibmap -liberty cells.lib; abc -liberty cells.lib; clean -purge; "
+    writing = "splitnets -ports; clean -purge; write_verilog -noattr -noexpr netlist.v"
+    run_yosys(f"read_verilog -sv core/gauge.sv; hierarchy -top gauge; {synthesis}{writing}", tmp_path)
+    lines = ("read_liberty cells.lib", "read_verilog netlist.v", "link_design gauge", "read_sdc librelane/gauge.sdc")
+    (tmp_path / "read.tcl").write_text(
+        "\n".join((*lines, "check_setup -verbose -no_clock -no_input_delay -no_output_delay", "exit")), encoding="utf-8"
+    )
+    done = subprocess.run(
+        [program, "-no_splash", "-exit", "read.tcl"], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.stdout + done.stderr == ""
 
 
 SINGLE = "its sample", ["sample 0", "sample 1", "result 0", "result 1"]

@@ -1,0 +1,1 @@
+"""Standard cells: what a core takes of silicon, before layout."""
