@@ -77,18 +77,20 @@ is high at edge 9 + 5 = 14.
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import NamedTuple
 
 from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, signed
 from amaranth.lib.memory import Memory
 
 from sosmith.hdl.axi_stream import extended
 from sosmith.hdl.check_bits import CheckBits
+from sosmith.hdl.cores.folded_state import NO_COLLISIONS, Control, Position, Reload, fault_nets
+from sosmith.hdl.cores.multiply_accumulate import MultiplyAccumulate
+from sosmith.hdl.cores.program_memory import ProgramMemory
 from sosmith.hdl.instruction import PipelinedInstruction
 from sosmith.hdl.memory_ports import read_port, write_port
 from sosmith.hdl.pipelined_logic import limits
-from sosmith.hdl.plan.folded_clocks import memory_depth, overlaps, pipeline_depth, word_slices
-from sosmith.hdl.plan.instructions import address_bits, encoded, instruction_bits
+from sosmith.hdl.plan.folded_clocks import memory_depth, overlaps, word_slices
+from sosmith.hdl.plan.instructions import address_bits, instruction_bits
 from sosmith.hdl.plan.streams import channel_bits
 from sosmith.hdl.reload import ReloadPort
 from sosmith.hdl.shell.fault_guard import FaultGuard
@@ -97,12 +99,9 @@ from sosmith.hdl.status import OF_INPUT, at_rail, status_of_result, with_fault
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.graph import Op
 from sosmith.model.dataflow.program import (
-    CARRIES,
-    CLEARS,
     EARLY_WRITES,
     FINISHES,
     LATE_WRITES,
-    PRODUCTS,
     Judged,
     Location,
     Opcode,
@@ -114,75 +113,6 @@ FUNCTIONS = ("sequencer", "program_memory", "word_memory", "multiply_accumulate"
 
 _WORDS_READ = ("read", "second_read")
 """The words that an instruction reads."""
-
-_NO_COLLISIONS = {"no_rw_check": 1}
-"""Attribute of memories: no word is used that is read at the clock at which it is written.
-
-`STORED` and `MOVED` keep the program from doing so, and a bank of the program is not written while it is read. At such
-a clock a simulator reads the old word and a block RAM anything; without the attribute, Yosys adds registers and a
-comparator to make both equal.
-"""
-
-_IN_BLOCKS = {"ram_style": "block"}
-"""Attribute of a memory that is wide and short: as logic it would take several times the LUT4 of all the rest."""
-
-_STAYS_APART = {"keep": 1}
-"""Attribute of a register that Yosys 0.70 (`ice40_dsp`) would take into both of the MAC16 that it lies between.
-
-One of them then misses in its netlist.
-"""
-
-
-class _Control:
-    """What a core is doing.
-
-    Attributes
-    ----------
-    advance : Signal
-        Whether the pipeline moves at this clock.
-    clearing : Signal
-        Whether words are cleared.
-    start : Signal
-        Whether a sample has been found.
-    busy : Signal
-        Whether one is in work.
-    channel : Signal
-        Channel of the sample in work, or of the word that is cleared.
-    dropped : Signal
-        Whether a sample of a channel that does not exist is accepted.
-    leaves : Signal
-        Whether the result leaves.
-    """
-
-    def __init__(self, channel_bits: int) -> None:
-        self.advance = Signal(name="advance")
-        self.clearing = Signal(name="clearing", init=1)
-        self.start = Signal(name="start")
-        self.busy = Signal(name="busy")
-        self.channel = Signal(channel_bits, name="channel")
-        self.dropped = Signal(name="dropped")
-        self.leaves = Signal(name="leaves")
-
-
-class _Position(NamedTuple):
-    """Where the core is in its program: the address of an instruction, and whether it is read for a sample."""
-
-    counter: Signal
-    fetches: Signal
-
-
-def _fault_nets(m: Module, memory: str, corrected: Value, failed: Value) -> tuple[Value, Value]:
-    """Return whether a wrong bit was corrected, and whether one could not be, as nets that say in which memory."""
-    nets = Signal(name=f"{memory}_corrected"), Signal(name=f"{memory}_failed")
-    m.d.comb += [net.eq(value) for net, value in zip(nets, (corrected, failed), strict=True)]
-    return nets
-
-
-class _Reload(NamedTuple):
-    """The reload port, and the bank that the sample in work uses."""
-
-    port: ReloadPort
-    bank: Signal
 
 
 class FoldedCore(Shell):
@@ -258,14 +188,17 @@ class FoldedCore(Shell):
         functions = {name: Module() for name in FUNCTIONS}
         for name, function in functions.items():
             m.submodules[name] = function
-        control = _Control(channel_bits(self.channels))
+        control = Control(channel_bits(self.channels))
         guard = self._guard(m, control)
         reload = self._reload(m, functions["sequencer"], control)
         position = self._sequence(functions["sequencer"], control, guard, reload)
-        pipeline, fetched = self._fetch(functions["program_memory"], control, position, reload, guard)
+        memory = ProgramMemory(self.program, self.serial, self.protect)
+        pipeline, fetched = memory.fetch(functions["program_memory"], control, position, reload, guard)
         read = [Signal(signed(self._word), name=name) for name in _WORDS_READ[: self.program.products]]
         added = Signal(signed(self.program.accumulator_bits))
-        self._accumulate(functions["multiply_accumulate"], control.advance, pipeline, (read, added))
+        unit = MultiplyAccumulate(self.program, self.serial, self.fingerprint is not None)
+        stages = self._reading(pipeline), pipeline[-1]
+        unit.fill(functions["multiply_accumulate"], control.advance, stages, (read, added))
         remembered = self._remember(functions["word_memory"], control, (added, read), pipeline, guard)
         ends = self._ends(functions["program_memory"], control.advance, pipeline)
         begins = self._accepts(functions["sequencer"], control, pipeline, None if guard is None else ends)
@@ -275,7 +208,7 @@ class FoldedCore(Shell):
             corrected, failed = (Cat(nets).any() for nets in zip(*memories, strict=True))
             self.report(m, guard, None if reload is None else reload.port, corrected, failed)
 
-    def _sequence(self, m: Module, control: _Control, guard: FaultGuard | None, reload: _Reload | None) -> _Position:
+    def _sequence(self, m: Module, control: Control, guard: FaultGuard | None, reload: Reload | None) -> Position:
         """Find samples, and count through the program for each."""
         clearing, busy = control.clearing, control.busy
         m.d.comb += control.leaves.eq(self.m_axis_tvalid & self.m_axis_tready)
@@ -302,7 +235,7 @@ class FoldedCore(Shell):
         return ends
 
     def _accepts(
-        self, m: Module, control: _Control, pipeline: list[PipelinedInstruction], ends: Signal | None
+        self, m: Module, control: Control, pipeline: list[PipelinedInstruction], ends: Signal | None
     ) -> Signal:
         """Accept a sample, as it `ends` or once it has been read; return when its flags are to be taken."""
         taken = Signal()
@@ -315,7 +248,7 @@ class FoldedCore(Shell):
         m.d.comb += self.s_axis_tready.eq(taken | control.dropped)
         return taken if self._overlaps else control.start
 
-    def _guard(self, m: Module, control: _Control) -> FaultGuard | None:
+    def _guard(self, m: Module, control: Control) -> FaultGuard | None:
         """Return the guard of the memories; None without protection."""
         if not self.is_guarded:
             return None
@@ -325,7 +258,7 @@ class FoldedCore(Shell):
         return guard
 
     @staticmethod
-    def _restart(m: Module, control: _Control, cause: Value) -> None:
+    def _restart(m: Module, control: Control, cause: Value) -> None:
         """Clear what a damaged program or word, or another program, may have left: the words, as after a reset."""
         with m.If(cause):
             m.d.sync += [control.clearing.eq(1), control.channel.eq(0)]
@@ -346,7 +279,7 @@ class FoldedCore(Shell):
         """Width of a word."""
         return self.program.digit_bits + 1
 
-    def _accept(self, m: Module, control: _Control, waits: Value) -> None:
+    def _accept(self, m: Module, control: Control, waits: Value) -> None:
         """Start on a sample if its channel exists, otherwise drop it."""
         if self.channels == 1:
             m.d.comb += control.start.eq(self.s_axis_tvalid & ~waits)
@@ -358,7 +291,7 @@ class FoldedCore(Shell):
         with m.If(control.start):
             m.d.sync += control.channel.eq(self.s_axis_tdest)
 
-    def _count(self, m: Module, control: _Control, *, early: bool) -> _Position:
+    def _count(self, m: Module, control: Control, *, early: bool) -> Position:
         """Count through all words after a reset, to clear them, and through the program for each sample.
 
         If an instruction is to be read `early`, the first one is at the clock that finds the sample.
@@ -395,9 +328,9 @@ class FoldedCore(Shell):
             m.d.sync += [control.busy.eq(1), fetching.eq(1)]
         with m.Elif(leaves):
             m.d.sync += control.busy.eq(0)
-        return _Position(counter, fetches)
+        return Position(counter, fetches)
 
-    def _reload(self, m: Module, sequencer: Module, control: _Control) -> _Reload | None:
+    def _reload(self, m: Module, sequencer: Module, control: Control) -> Reload | None:
         """Return the reload port, and the bank that the sample in work uses."""
         if self.fingerprint is None:
             return None
@@ -413,144 +346,7 @@ class FoldedCore(Shell):
             port.may_swap.eq(~control.busy & ~control.clearing if self.restarts else 1),
             port.shadow_free.eq(~control.busy | (kept == port.bank)),
         ]
-        return _Reload(port, bank)
-
-    def _fetch(
-        self,
-        m: Module,
-        control: _Control,
-        position: _Position,
-        reload: _Reload | None,
-        guard: FaultGuard | None,
-    ) -> tuple[list[PipelinedInstruction], tuple[Value, Value]]:
-        """Read the program; return the instructions in the pipeline stages, the one just read first.
-
-        While words are cleared, the last one's target is the address of the next.
-
-        Return besides whether a wrong bit was corrected at this clock, and whether one was found that could not be.
-        """
-        advance = control.advance
-        codes = [encoded(instruction, self.program) for instruction in self.program.instructions]
-        count = len(codes)
-        if reload is not None:
-            codes += [0] * ((1 << (len(codes) - 1).bit_length()) - len(codes))
-            codes += [0] * len(codes)
-        check = CheckBits(instruction_bits(self.program), self.protect)
-        attributes = _NO_COLLISIONS | ({} if self.program.products == 1 else _IN_BLOCKS)
-        m.submodules.instructions = program = Memory(
-            shape=check.width, depth=len(codes), init=[check.word(code) for code in codes], attrs=attributes
-        )
-        fetch = read_port(program, "instructions")
-        index, bank = self._program_address(m, position.counter, count, reload, guard)
-        m.d.comb += [fetch.addr.eq(Cat(index, bank)), fetch.en.eq(advance)]
-        word = check.read(m, fetch.data, "instruction1")
-        valid = Signal(name="valid1")
-        looks = valid & advance if guard is None else (valid & advance) | guard.read
-        fetched = Signal(len(fetch.addr), reset_less=True)
-        rewrites: Value = Const(0, 1)
-        if self.protect == "correct":
-            with m.If(advance):
-                m.d.sync += fetched.eq(fetch.addr)
-            # A word that is read while it is written would be undefined.
-            rewrites = looks & word.corrected & (fetched != fetch.addr)
-        self._write_program(m, program, check, reload, (rewrites, fetched, word.data))
-        pipeline = [PipelinedInstruction(m, "instruction1", word.data, valid, self.program)]
-        with m.If(advance):
-            m.d.sync += valid.eq(position.fetches)
-            for k in range(2, pipeline_depth(self.program, serial=self.serial) + 1):
-                code = Signal(len(word.data), name=f"instruction{k}", reset_less=True)
-                valid = Signal(name=f"valid{k}")
-                m.d.sync += [code.eq(pipeline[-1].code), valid.eq(pipeline[-1].valid)]
-                pipeline.append(PipelinedInstruction(m, f"instruction{k}", code, valid, self.program))
-            with m.If(control.clearing):  # in place of a target, the address of the word to clear
-                m.d.sync += pipeline[-1].fields.target.eq(position.counter[: address_bits(self.program)])
-        return pipeline, _fault_nets(m, "program", looks & word.corrected, looks & word.failed)
-
-    def _program_address(
-        self,
-        m: Module,
-        counter: Signal,
-        count: int,
-        reload: _Reload | None,
-        guard: FaultGuard | None,
-    ) -> tuple[Value, Value]:
-        """Return the instruction to read, and its bank: that of the sample in work, or one that is scrubbed."""
-        bits = (count - 1).bit_length()
-        index: Value = counter
-        bank: Value = Const(0, 0) if reload is None else reload.bank
-        if guard is not None:
-            index = Mux(guard.scrubs & (guard.address < count), guard.address[:bits], counter[:bits])
-            if reload is not None:
-                bank = Mux(guard.scrubs, reload.port.bank, bank)
-        if reload is not None:
-            index = Cat(index[:bits], Const(0, max(0, bits - len(index))))
-        return index, bank
-
-    def _write_program(
-        self,
-        m: Module,
-        program: Memory,
-        check: CheckBits,
-        reload: _Reload | None,
-        rewrite: tuple[Value, Value, Value],
-    ) -> None:
-        """Write the idle bank from the reload port, and otherwise what was corrected."""
-        rewrites, fetched, corrected = rewrite
-        if reload is None and self.protect != "correct":
-            return
-        write = write_port(program, "instructions")
-        enable, address, data = rewrites, fetched, check.written(corrected)
-        if reload is not None:
-            port = reload.port
-            index_bits = len(write.addr) - 1
-            loaded = Cat(port.write_address, Const(0, index_bits - len(port.write_address)), ~port.bank)
-            if self.protect == "correct":
-                enable = port.write_enable | rewrites
-                address = Mux(port.write_enable, loaded, fetched)
-                data = check.written(Mux(port.write_enable, port.write_data, corrected))
-            else:
-                enable, address, data = port.write_enable, loaded, check.written(port.write_data)
-        m.d.comb += [write.addr.eq(address), write.data.eq(data), write.en.eq(enable)]
-
-    def _accumulate(
-        self, m: Module, advance: Signal, pipeline: list[PipelinedInstruction], values: tuple[list[Signal], Signal]
-    ) -> None:
-        """Multiply in the last pipeline stage but one, add up in the last."""
-        reading, last = self._reading(pipeline), pipeline[-1]
-        (read, *second), added = values
-        chosen = Signal(signed(self._word))
-        total = self._total(m, added, advance, last)
-        m.d.comb += chosen.eq(reading.constant)
-        if self.fingerprint is not None or any(i.opcode is Opcode.OPERAND for i in self.program.instructions):
-            operand = Signal(signed(self._word), reset_less=True)
-            with m.If(reading.has(*PRODUCTS)):
-                m.d.comb += chosen.eq(operand)
-            with m.If(advance & reading.has(Opcode.OPERAND)):
-                m.d.sync += operand.eq(read)
-        if self.serial:
-            self._multiply_serially(m, (total, added), (read, chosen), (advance, last.valid))
-            return
-        product = self._product(m, "", read, chosen)
-        if second:
-            other = self._product(m, "second_", second[0], reading.second_constant)
-            products = Signal(signed(2 * self._word + 1), reset_less=True)
-            m.d.sync += products.eq(product + other)
-            product = products
-        m.d.comb += [advance.eq(1), added.eq(total + product)]
-
-    def _product(self, m: Module, prefix: str, word: Value, factor_read: Value) -> Value:
-        """Return the product of a word that has been read and a factor, two clocks later.
-
-        Nothing else reads these registers, so that they can be those inside a multiplier block.
-        """
-        data, factor = (
-            Signal(signed(self._word), name=f"{prefix}{name}", reset_less=True) for name in ("data", "factor")
-        )
-        product = Signal(
-            signed(2 * self._word), name=f"{prefix}product", reset_less=True, attrs=_STAYS_APART if prefix else {}
-        )
-        m.d.sync += [data.eq(word), factor.eq(factor_read), product.eq(data * factor)]
-        return product
+        return Reload(port, bank)
 
     def _moved(self, m: Module, instruction: PipelinedInstruction, read: Value) -> Value:
         """Return the word that MOVE and TAKE write, and 0 for all others."""
@@ -566,31 +362,10 @@ class FoldedCore(Shell):
             m.d.sync += [later.eq(earlier) for earlier, later in pairwise(passed)]
         return moved
 
-    def _total(self, m: Module, added: Signal, advance: Signal, last: PipelinedInstruction) -> Value:
-        """Return what is left of the sum before the last instruction.
-
-        Its upper bits are kept as they were added up, and shifted by a digit a clock later: they are the last that the
-        carry chain reaches, and the sign would have far to go from there. Its lower bits are shifted at once, since
-        the carry chain begins with them.
-        """
-        bits = self.program.digit_bits
-        split = (bits + 1) // 2
-        low = Signal(split, name="total_low")
-        high = Signal(signed(len(added) - split), name="total_high")
-        carries = Signal()
-        carried = Signal(reset_less=True)
-        m.d.comb += carries.eq(advance & last.has(*CARRIES))
-        m.d.sync += [low.eq(Mux(carries, added >> bits, added)), high.eq(added >> split), carried.eq(carries)]
-        with m.If(~last.valid | (advance & last.has(*CLEARS))):
-            m.d.sync += [low.eq(0), high.eq(0)]
-        total = Signal(signed(len(added)))
-        m.d.comb += total.eq(Cat(low, Mux(carried, high >> bits, high)))
-        return total
-
     def _remember(
         self,
         m: Module,
-        control: _Control,
+        control: Control,
         values: tuple[Signal, list[Signal]],
         pipeline: list[PipelinedInstruction],
         guard: FaultGuard | None,
@@ -643,7 +418,7 @@ class FoldedCore(Shell):
         m.d.comb += [word.eq(content) for word, content in zip(words, contents, strict=True)]
         if guard is not None:
             m.d.comb += [read.eq(word.data) for read, word in zip(reads, words_read, strict=True)]
-        return _fault_nets(m, "words", looks & corrected, looks & failed)
+        return fault_nets(m, "words", looks & corrected, looks & failed)
 
     def _is_word(self, address: Value) -> Value:
         """Whether there is a word at an address to scrub."""
@@ -662,7 +437,7 @@ class FoldedCore(Shell):
         for low, high in word_slices(depth, check.width):
             one = check.word(1) >> low & ((1 << (high - low)) - 1)
             init = [one if address % words == self.program.one else 0 for address in range(depth)]
-            m.submodules[f"words{low}"] = ram = Memory(shape=high - low, depth=depth, init=init, attrs=_NO_COLLISIONS)
+            m.submodules[f"words{low}"] = ram = Memory(shape=high - low, depth=depth, init=init, attrs=NO_COLLISIONS)
             for name, address, parts in zip(_WORDS_READ, read[0], slices, strict=False):
                 reader = read_port(ram, f"{name.removesuffix('read')}words{low}")
                 m.d.comb += [reader.addr.eq(address), reader.en.eq(read[1])]
@@ -678,7 +453,7 @@ class FoldedCore(Shell):
     def _give(
         self,
         m: Module,
-        control: _Control,
+        control: Control,
         sample: tuple[Value, Value],
         added: Signal,
         pipeline: list[PipelinedInstruction],
@@ -738,7 +513,7 @@ class FoldedCore(Shell):
             self.m_axis_tdata.eq(extended(code, len(self.m_axis_tdata))),
             self.m_axis_tuser.eq(flags if guard is None else with_fault(flags, guard.fault | status.failed)),
         ]
-        return _fault_nets(m, "limits", control.leaves & status.corrected, control.leaves & status.failed)
+        return fault_nets(m, "limits", control.leaves & status.corrected, control.leaves & status.failed)
 
     def _settling(self, m: Module, advance: Signal, last: PipelinedInstruction, added: Signal) -> Value:
         """Return whether the program has judged that the sample comes before the filter has settled."""
@@ -753,33 +528,6 @@ class FoldedCore(Shell):
         """Whether the last pipeline stage has the last part of a result."""
         parts = self.program.output.parts
         return pipeline[-1].has(Opcode.GIVE) & (pipeline[-1].gives(parts - 1) if parts > 1 else Const(1))
-
-    def _multiply_serially(
-        self,
-        m: Module,
-        sums: tuple[Value, Signal],
-        factors: tuple[Value, Value],
-        control: tuple[Signal, Value],
-    ) -> None:
-        """Add a product to `total`, one clock for each bit of the second factor, the lowest first, until none is left.
-
-        What is left of a negative factor ends as -1, which takes one subtraction. The first factor is shifted up at
-        each clock.
-        """
-        (total, added), (advance, multiplies) = sums, control
-        shifted = Signal(signed(2 * self._word), reset_less=True)
-        left = Signal(signed(self._word), reset_less=True)
-        done = Signal()
-        multiple = Signal(signed(2 * self._word))
-        m.d.comb += [
-            multiple.eq(Mux(left[0], shifted, 0)),
-            done.eq((left == -1) | ~left[1:].any()),
-            advance.eq(~multiplies | done),
-            added.eq(Mux(left == -1, total - multiple, total + multiple)),
-        ]
-        m.d.sync += [shifted.eq(shifted << 1), left.eq(left >> 1)]
-        with m.If(advance):
-            m.d.sync += [shifted.eq(factors[0]), left.eq(factors[1])]
 
     def _input_digit(self, instruction: PipelinedInstruction) -> Value:
         """Return the digit of the input sample that a TAKE asks for; digits are numbered through all ports."""
