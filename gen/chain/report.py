@@ -69,7 +69,7 @@ def chain_summary(design: ChainDesign, run: ChainRun) -> dict[str, Any]:
             {
                 "name": stage.spec.name,
                 "kind": stage.spec.kind,
-                "architecture": stage.design.architecture.name,
+                "architectures": [core.architecture.name for core in stage.cores],
                 "interpolate": stage.rate.rise,
                 "decimate": stage.rate.factor,
                 "output_bits": stage.output.bits,
