@@ -28,7 +28,7 @@ def tree() -> dict[str, Any]:
 def test_a_board_with_a_chain_gives_a_result_for_each_sample_and_takes_coefficients(tmp_path: Path) -> None:
     chain = sosmith.design_chain(tree())
     other = tree()
-    other["stage"][2]["taps"] = [0.25, 0.25, 0.25]
+    other["stage"][2]["taps"] = [-0.25, 0.5, -0.25]
     chain.generate(tmp_path / "files")
     codes = np.random.default_rng(1).integers(-128, 128, (1000, 1))
     netlist = build(chain_item(chain.core), tmp_path, clock=Fraction(4_000_000), baud=1_000_000)
