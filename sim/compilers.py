@@ -71,7 +71,7 @@ class Compilers:
         except BaseException:
             with self._lock:
                 self._ended = True
-                for process in self._running:
+                for process in [*self._running]:  # other threads take out of it what has ended
                     self._kill(process)
             raise
 

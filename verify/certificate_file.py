@@ -31,8 +31,16 @@ _RATIONAL = re.compile(r"(-?[0-9]{1,1200})(?:/([0-9]{1,1200}))?")
 
 
 def on_grid(value: Fraction) -> Fraction:
-    """Smallest multiple of ``2**-64`` that is greater than `value`."""
-    return Fraction(math.floor(value * 2**_GRID_BITS) + 1, 2**_GRID_BITS)
+    """Smallest multiple of ``2**-64`` that is greater than `value` by more than ``2**-128``.
+
+    What that adds is room for another filter: the exact one is stated in rationals that are rounded to ``2**-192``. With
+    decimal taps and a range of some multiple of five LSB, the errors of these often lie on the grid themselves, or a
+    rounding below it.
+
+    >>> on_grid(Fraction(1, 2) - Fraction(1, 2**190)) == on_grid(Fraction(1, 2)) == Fraction(1, 2) + Fraction(1, 2**64)
+    True
+    """
+    return Fraction(math.floor(value * 2**_GRID_BITS + Fraction(1, 2**_GRID_BITS)) + 1, 2**_GRID_BITS)
 
 
 def _rational(value: object) -> object:

@@ -175,3 +175,21 @@ def test_given_sections_are_taken_as_they_are_written() -> None:
     assert 0 < found < Fraction(1, 2**180)
     with pytest.raises(RejectedError, match=r"^the filter must be the specified one within"):
         check_specification(made, head + words.replace("-1.1", "-1.1000000000000001") + rest, margin)
+
+
+@pytest.mark.parametrize("taps", [[0.1, 0.4, 0.1], [0.2, 0.3, 0.1]])
+def test_decimal_taps_over_a_range_of_a_multiple_of_five_lsb(taps: list[float]) -> None:
+    """Errors are then multiples of the grid of the claims, but for the rounding of the taps to rationals."""
+    text = f"""
+name = "smooth"
+sample_rate = 1000.0
+input.x = {{ bits = 8, range = [-1.0, 1.0], signed = true }}
+filter = {{ taps = {taps} }}
+output = {{ bits = 12, range = [-2.0, 2.0], signed = true }}
+hardware = {{ architecture = "parallel" }}
+"""
+    made = design_core(from_text(text, Path("smooth.toml")))
+    read = certificate(made.quantized, made.spec.max_error)
+    agreement = check_specification(read, text, verify(read).margin)
+    assert agreement.distance is not None
+    assert 0 < agreement.distance < Fraction(1, 2**128)

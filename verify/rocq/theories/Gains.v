@@ -52,8 +52,10 @@ Definition gain_holds (D : list Z) (N : list (list Z)) (w : witness) (p q : Z) :
   let (value, left) := gain_figures D N w in
   (0 <=? bits w) && (0 <? times w) && (0 <? share w) && (0 <? left) && (0 <? q) && (value * q <=? p * left).
 
-(* A claim p / q is also refused if it is more than a unit of the certificate's grid, 2^-64, above value / unit. *)
-Definition close (value unit : Z) (a : ratio) : bool := (fst a * 2 ^ 64 - snd a) * unit <=? value * 2 ^ 64 * snd a.
+(* A claim p / q is also refused if it is more than a unit of the certificate's grid, 2^-64, and what it is at least above a
+   figure, 2^-128, above value / unit. *)
+Definition close (value unit : Z) (a : ratio) : bool :=
+  (fst a * 2 ^ 128 - snd a * (2 ^ 64 + 1)) * unit <=? value * 2 ^ 128 * snd a.
 Definition claimed_gain_holds (D : list Z) (N : list (list Z)) (w : witness) (p q : Z) : bool :=
   let (value, left) := gain_figures D N w in
   (0 <=? bits w) && (0 <? times w) && (0 <? share w) && (0 <? left) && (0 <? q) && (value * q <=? p * left)
