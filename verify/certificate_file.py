@@ -33,9 +33,8 @@ _RATIONAL = re.compile(r"(-?[0-9]{1,1200})(?:/([0-9]{1,1200}))?")
 def on_grid(value: Fraction) -> Fraction:
     """Smallest multiple of ``2**-64`` that is greater than `value` by more than ``2**-128``.
 
-    What that adds is room for another filter: the exact one is stated in rationals that are rounded to ``2**-192``. With
-    decimal taps and a range of some multiple of five LSB, the errors of these often lie on the grid themselves, or a
-    rounding below it.
+    What that adds is room for the filter asked for: the one that is proven has rationals rounded to ``2**-192``. Where
+    taps are decimal and a range is a multiple of five LSB, errors often lie on the grid but for that rounding.
 
     >>> on_grid(Fraction(1, 2) - Fraction(1, 2**190)) == on_grid(Fraction(1, 2)) == Fraction(1, 2) + Fraction(1, 2**64)
     True
