@@ -62,6 +62,7 @@ def cases() -> list[dict[str, Any]]:
                 "latency_cycles": patience,
                 "reset_cycles": 0,
                 "samples_per_result": 1,
+                "rates": (),
                 "copies_per_result": 1,
                 "tdata_bits": 64,
                 "tuser_bits": 64,
