@@ -6,6 +6,7 @@ import pytest
 from benchmarks import rates
 
 
+@pytest.mark.slow
 def test_the_choices_are_those_that_are_made() -> None:
     text = rates.DOCUMENT.read_text(encoding="utf-8")
     assert rates.with_choices(text) == text

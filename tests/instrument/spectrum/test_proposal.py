@@ -245,6 +245,7 @@ def test_the_pass_loss_must_be_below_the_stop_loss() -> None:
         propose([one], Wish(tolerance=0.004, passband_loss=60.0), BENCH_RATE)
 
 
+@pytest.mark.slow
 def test_what_is_slower_than_the_spectra_is_part_of_the_error() -> None:
     one = content(*paper_bench(), BENCH_RATE)
     wish = Wish(tolerance=0.004)

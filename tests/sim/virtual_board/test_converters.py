@@ -150,6 +150,7 @@ def test_without_converters_every_result_is_flagged(made: sosmith.Design, netlis
     }
 
 
+@pytest.mark.slow
 def test_results_that_nobody_fetches_are_missed_from_the_oldest_on(made: sosmith.Design, netlist: Netlist) -> None:
     codes = measured(made.core)
     with running(netlist, codes) as board:
@@ -167,6 +168,7 @@ def test_results_that_nobody_fetches_are_missed_from_the_oldest_on(made: sosmith
     assert found[1].codes.tolist() == expected[6 + missed :][: len(found[1].codes)].tolist()
 
 
+@pytest.mark.slow
 def test_a_monitor_numbers_whole_samples(made: sosmith.Design, netlist: Netlist) -> None:
     codes = measured(made.core)
     assert netlist.schedule is not None

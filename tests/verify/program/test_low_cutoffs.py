@@ -9,7 +9,7 @@ from sosmith.gen.core import design_core
 AUDIO = (EXAMPLES / "audio_lowpass.toml").read_text(encoding="utf-8")
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("architecture", "order", "cutoff"),
     [
