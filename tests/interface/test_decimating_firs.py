@@ -58,7 +58,7 @@ def test_certificate_and_files_are_proven(seed: int, tmp_path: Path) -> None:
     assert float(proof.budget["filter rounding"]) * 2**40 < float(proof.lsb)  # nothing is rounded but the output
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("simulator", ["verilator", "icarus"])
 @pytest.mark.parametrize("seed", CASES)
 def test_hardware_equals_the_model(seed: int, simulator: str, tmp_path: Path) -> None:

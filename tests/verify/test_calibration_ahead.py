@@ -29,6 +29,7 @@ def rejected(sentence: str) -> pytest.RaisesExc[RejectedError]:
     return pytest.raises(RejectedError, match=f"^{re.escape(sentence)}$")
 
 
+@pytest.mark.slow
 def test_the_locomotive_is_proven_again() -> None:
     made = locomotive(core="instrument")
     certificate = read(tree_of(locomotive(core="instrument")))

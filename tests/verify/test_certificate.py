@@ -99,6 +99,7 @@ def test_any_input_and_output_range(inputs: Port, output: Port) -> None:
     proven(plain(butterworth(3, 0.05), inputs=inputs, output=output))
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize("kind", ["lowpass", "highpass", "bandpass", "bandstop"])
 @pytest.mark.parametrize(("order", "cutoff"), [(1, 0.25), (3, 0.2), pytest.param(4, 0.01, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(

@@ -125,7 +125,7 @@ def _is_searched(seed: int) -> bool:
     return 'realization = "auto"' in draw(seed).toml
 
 
-@pytest.mark.sweep(10)
+@pytest.mark.sweep(4)
 @pytest.mark.parametrize("row", with_every_quantity(), ids=lambda row: f"draw{row['seed']}")
 def test_estimates_are_the_recorded_quantities_times_the_factors(row: Recorded) -> None:
     board = find_board(row["board"])

@@ -62,7 +62,7 @@ def cases() -> list[tuple[str, str, int, tuple[str, ...]]]:
     return found
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("family", FAMILIES)
 def test_poles_are_scipys(family: str) -> None:
     """Symmetric functions of all poles, which do not depend on how they are paired."""

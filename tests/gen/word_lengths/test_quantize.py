@@ -146,7 +146,7 @@ INTEGER_ROWS = {
 }
 
 
-@pytest.mark.sweep(8)
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize("realization", CASCADES)
 @pytest.mark.parametrize("name", INTEGER_ROWS)
 def test_a_section_of_whole_numbers_rounds_nothing(name: str, realization: str) -> None:

@@ -220,6 +220,7 @@ def test_no_further_step_is_left_where_a_calibration_comes_first(name: str) -> N
     ] == []
 
 
+@pytest.mark.sweep(5)
 @pytest.mark.parametrize("realization", CASCADES)
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_coefficients_are_neighbours_of_the_ideal(name: str, realization: str) -> None:
@@ -257,6 +258,7 @@ def test_long_operands_are_cut_to_fit_a_multiplier() -> None:
 UNITY = "df1", "df1_ef1", "df1_ef2", "delta"
 
 
+@pytest.mark.sweep(4)
 @pytest.mark.parametrize("realization", UNITY)
 @pytest.mark.parametrize(("order", "cutoff"), [(1, 0.1), (5, 0.02), (6, 0.003)])
 def test_the_gain_at_zero_frequency_stays_exactly_one(order: int, cutoff: float, realization: str) -> None:
@@ -375,6 +377,7 @@ def unstable(choice: Choice) -> Choice:
     )
 
 
+@pytest.mark.sweep(4)
 @pytest.mark.parametrize("realization", CASCADES)
 @pytest.mark.parametrize("spoilt", [too_short, unstable])
 def test_a_search_that_finds_no_good_words_is_done_without(

@@ -54,6 +54,7 @@ def settling_of(made: CoreDesign) -> float:
     return float((outside[-1] + 1) * decimator.factor / made.spec.sample_rate)
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(1)
 @without_pictures
 @pytest.mark.parametrize(

@@ -138,6 +138,7 @@ def test_a_coefficient_that_is_no_binary_fraction_is_refused() -> None:
         Pieces(fmpq_poly([1, fmpq(-1, 3)]))
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("name", ["one pole", "a pair", "the same pair three times", "slow and fast"])
 def test_what_one_response_exceeds_the_rest_of_another(name: str) -> None:
     made, over = Pieces(DENOMINATORS[name]), inverse(DENOMINATORS[name])
@@ -175,6 +176,7 @@ LONG = fmpq_poly([1, fmpq(-2045, 1024), fmpq(1023 * 1023, 1 << 20)])
 """Poles at an angle of about 0.04, which decay by a thousandth a sample."""
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(
     ("constant", "low", "summed_up"),
     [

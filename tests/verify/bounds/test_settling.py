@@ -43,6 +43,7 @@ def with_node(whole: Certificate, name: str, **changes: object) -> Certificate:
     return whole.model_copy(update={"stages": (*whole.stages[:-1], last.model_copy(update={"nodes": tuple(nodes)}))})
 
 
+@pytest.mark.sweep(4)
 @pytest.mark.parametrize("order", [1, 3])
 @pytest.mark.parametrize("realization", ["df1", "df1_ef2", "df2t", "delta", "state_space", "lattice_wdf"])
 def test_is_enough_and_hardly_more(realization: str, order: int) -> None:

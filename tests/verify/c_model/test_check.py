@@ -83,6 +83,7 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Model]:
     return made
 
 
+@pytest.mark.sweep(5)
 @pytest.mark.parametrize("name", [*TEXTS, "decimated"])
 def test_what_is_written_is_proven(name: str, model: Callable[[str], Model]) -> None:
     found = model(name).check()

@@ -97,6 +97,7 @@ def test_an_error_that_is_a_part_of_a_net_with_another_name() -> None:
     assert core.check().states == 6
 
 
+@pytest.mark.slow
 def test_an_error_that_is_a_part_of_a_register() -> None:
     core = made(design_core(specified(NOTCH)))
     assert "valid1 ? taps_b0_exact_passed1[7:0] : error_b0;" in core.text

@@ -16,6 +16,7 @@ from sosmith.verify.graph import RejectedError
 # What the generator writes is accepted.
 
 
+@pytest.mark.sweep(4)
 @pytest.mark.parametrize(
     ("spec", "architecture", "channels", "products"),
     [
