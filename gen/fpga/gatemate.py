@@ -21,7 +21,7 @@ Where they do, nextpnr 0.11.1 dies of some placements. Without, clocks were 3 to
 """
 
 
-class GateMatePlatform(TemplatedPlatform):  # type: ignore[misc] # Amaranth has no types
+class GateMatePlatform(TemplatedPlatform):
     """Files and commands for Yosys, nextpnr and gmpack; `device` is the FPGA's name in nextpnr."""
 
     toolchain = "Peppercorn"

@@ -8,6 +8,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+import sosmith
 from sosmith.verify.certificate_file import entries_text
 from sosmith.verify.chain.chain_file import ChainCertificate, read_chain, sealed_chain
 
@@ -44,3 +45,18 @@ def less(text: str) -> str:
 def more(text: str) -> str:
     """Return a rational that is 1 % more."""
     return str(Fraction(text) * Fraction(101, 100))
+
+
+def replace_sealed(path: Path, old: str, new: str) -> None:
+    """Put `new` in place of the first `old` in a file, and seal the certificate beside it again."""
+    text = path.read_text(encoding="utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new, 1), encoding="utf-8")
+    sealed_again(path.parent)
+
+
+def proven(folder: Path, *, spec: bool = True) -> sosmith.ChainProof:
+    """Prove the chain in a folder with its files, and from its specification if `spec`."""
+    return sosmith.ChainCertificate.load(folder / CERTIFICATE).verify(
+        files=folder, spec=folder / "rx.toml" if spec else None
+    )

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.verify.chain.sealing import CERTIFICATE, changed, less, more, sealed_again
+from tests.verify.chain.sealing import CERTIFICATE, changed, less, more, proven, replace_sealed, sealed_again
 
 import sosmith
 from sosmith.gen.chain import design as chain_design
@@ -46,12 +46,6 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def folder(written: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(written, tmp_path / "copy"))
-
-
-def proven(folder: Path, *, spec: bool = True) -> sosmith.ChainProof:
-    return sosmith.ChainCertificate.load(folder / CERTIFICATE).verify(
-        files=folder, spec=folder / "rx.toml" if spec else None
-    )
 
 
 def test_all_of_a_chain_is_proven(folder: Path) -> None:
@@ -218,11 +212,7 @@ def test_another_wire_is_refused(old: str, new: str, sentence: str, folder: Path
     ],
 )
 def test_another_model_or_manifest_is_refused(file: str, old: str, new: str, sentence: str, folder: Path) -> None:
-    path = folder / file
-    text = path.read_text(encoding="utf-8")
-    assert old in text
-    path.write_text(text.replace(old, new, 1), encoding="utf-8")
-    sealed_again(folder)
+    replace_sealed(folder / file, old, new)
     with pytest.raises(ShortfallError, match=sentence):
         proven(folder, spec=False)
 
