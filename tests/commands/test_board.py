@@ -24,6 +24,7 @@ CONVERTED = FILTER + "[converter.x]\ndevice = 'mcp3202'\nrange = [-1.0, 1.0]\n"
 SMALL = FILTER + '[hardware]\nrealization = "df1_ef1"\narchitecture = "parallel"\n'
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "options",
     [

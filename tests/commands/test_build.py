@@ -137,6 +137,7 @@ def test_a_project_for_a_vendors_tools_says_that_nothing_was_built(programs: dic
     BUILD.refused(message, "plain.toml", "--board", "cmod_s7", "--program")
 
 
+@pytest.mark.slow
 def test_silicon_shows_area_and_clock_before_layout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(libraries, "_PLACE", tmp_path)
     monkeypatch.setattr(timing, "_PROGRAM", "no such program")

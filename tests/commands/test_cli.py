@@ -262,6 +262,7 @@ def test_a_scenario_by_way_of_a_file_gives_the_same_result(spec: str, scenario: 
     assert Path("else where/report.html").exists()
 
 
+@pytest.mark.slow
 @unpainted
 def test_reports_side_by_side(sosmith: Command) -> None:
     """The unit ``[/x]`` would end a style of the tables that never began: texts of the user are no markup."""

@@ -17,6 +17,7 @@ def path(tmp_path: Path) -> str:
     return str(target)
 
 
+@pytest.mark.slow
 def test_the_design_tells_of_the_calibration(path: str) -> None:
     made = small()
     ahead, behind = made.architecture.calibration, made.architecture.program

@@ -300,7 +300,7 @@ def test_a_name_that_is_no_text(subject: Subject, folder: Path) -> None:
         assert outcome.status == expected(command), (command, outcome)
 
 
-@pytest.mark.sweep(8)
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize("subject", SUBJECTS, ids=NAMES)
 def test_spoilt_files(subject: Subject, folder: Path) -> None:
     try_spoilt(subject, folder, range(0, subject.share, 3))

@@ -252,6 +252,7 @@ def test_a_message_escapes_what_a_terminal_would_obey(sosmith: Command) -> None:
     ]
 
 
+@pytest.mark.slow
 def test_the_reader_of_the_output_may_leave(process: Start, tmp_path: Path) -> None:
     (tmp_path / "plain.toml").write_text(QUICK, encoding="utf-8")
     for arguments in (["design", "plain.toml"], ["emulate", "plain.toml", "noise"]):
@@ -264,6 +265,7 @@ def test_the_reader_of_the_output_may_leave(process: Start, tmp_path: Path) -> N
         assert [line for line in errors.splitlines() if not PROGRESS.search(line)] == []
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_one_sentence(process: Start, tmp_path: Path) -> None:
     (tmp_path / "plain.toml").write_text(QUICK, encoding="utf-8")
     with Path("/dev/full").open("w") as full:
@@ -409,6 +411,7 @@ def test_two_runs_in_one_folder_at_once(process: Start, tmp_path: Path) -> None:
 SIMULATED = ("simulate", "--simulator", "icarus", "--seconds", "0.1", "--waves")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("command", "shown", "written"),
     [

@@ -84,7 +84,7 @@ def test_against_everything(folder: Path) -> None:
     assert found["program_instructions"] > 50
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("channels", "key"),
     [
@@ -112,7 +112,7 @@ def test_a_parallel_core(channels: int, key: dict[str, Any], tmp_path: Path) -> 
     assert found["program_instructions"] is None
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("architecture", "key"),
     [
@@ -153,6 +153,7 @@ def test_disagreement_is_a_sentence(folder: Path, tmp_path: Path) -> None:
     assert str(result.exception).startswith(f"{path}: {folder / f'{NAME}.h'} must have the SHA-256 ")
 
 
+@pytest.mark.slow
 def test_a_certificate_without_a_subject_cannot_be_held_against_one(folder: Path) -> None:
     path = folder / f"{NAME}.certificate.json"
     tree = json.loads(path.read_text(encoding="utf-8"))
@@ -169,7 +170,6 @@ def test_a_certificate_without_a_subject_cannot_be_held_against_one(folder: Path
 
 
 @pytest.mark.slow
-@pytest.mark.sweep(1)
 @pytest.mark.parametrize("core", ["filter", "instrument"])
 def test_the_decimator_of_several_channels_is_read(core: str, tmp_path: Path) -> None:
     generate(small("channels = 3\n", core), tmp_path)
@@ -177,6 +177,7 @@ def test_the_decimator_of_several_channels_is_read(core: str, tmp_path: Path) ->
     assert found["program_instructions"] > 10
 
 
+@pytest.mark.slow
 def test_a_decimated_instrument_in_parallel_is_proven_whole(tmp_path: Path) -> None:
     case = Instrument("parallel")
     generate(design_core(specified(case.text), core=case.core), tmp_path)

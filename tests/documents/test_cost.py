@@ -143,6 +143,7 @@ def test_every_example_is_measured_in_every_architecture() -> None:
     assert {core for core, _ in listed[: len(cost_cores.FAST)]} == set(cost_cores.FAST)
 
 
+@pytest.mark.slow
 def test_what_goals_are_about_is_recorded_and_what_is_not_is_told() -> None:
     record = json.loads(cost_cores.RECORD.read_text(encoding="utf-8"))
     assert all(goal.value(record) is not None for goal in cost_goals.GOALS)
@@ -170,6 +171,7 @@ def test_figures_of_an_earlier_version_are_told() -> None:
         assert (line in told) is earlier
 
 
+@pytest.mark.slow
 def test_what_was_not_placed_with_every_seed_is_named() -> None:
     record = json.loads(cost_cores.RECORD.read_text(encoding="utf-8"))
     figures, line = record["cores"]["audio_lowpass folded 1"]["targets"]["ecp5"], "audio_lowpass folded on ECP5"
@@ -190,6 +192,7 @@ def test_a_goal_can_be_missed() -> None:
     assert f"{row}| 100.0 | **missed** |" in text
 
 
+@pytest.mark.slow
 def test_only_what_has_changed_is_synthesized_again(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """One core, recorded once as it is, once from another text with fewer cells."""
     core, cells = cost_cores.CORES[0], {"LUT4": 110, "TRELLIS_FF": 50}

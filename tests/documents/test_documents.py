@@ -164,6 +164,7 @@ def field_table() -> str:
     )
 
 
+@pytest.mark.slow
 def test_the_names_of_the_fields_are_those_of_the_manifest() -> None:
     assert _FIELDS.findall(HARDWARE.read_text(encoding="utf-8")) == [field_table()]
 

@@ -25,6 +25,7 @@ def files() -> dict[str, str]:
     return paper_files(read_paper_figures())
 
 
+@pytest.mark.slow
 def test_the_document_is_what_the_command_writes(files: dict[str, str]) -> None:
     assert (DOCS / "paper.md").read_text(encoding="utf-8") == files["paper.md"]
 

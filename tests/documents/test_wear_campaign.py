@@ -125,6 +125,7 @@ def test_methods_give_the_recorded_figures_again(number: int, tmp_path: Path) ->
             assert values == pytest.approx(recorded["methods"][method][figure][:2], abs=2e-4), (method, figure)
 
 
+@pytest.mark.slow
 def test_intervals_are_held_against_every_day(tmp_path: Path) -> None:
     settings = tomllib.loads((HERE / "campaign.toml").read_text(encoding="utf-8"))
     stated = hardware.uncertainty_table(settings["bench"]["uncertainty"])

@@ -122,6 +122,7 @@ def write(path: Path, content: bytes | Callable[[], bytes]) -> None:
         os.truncate(path, 1 << 30)
 
 
+@pytest.mark.sweep(6)
 @pytest.mark.parametrize("name", [pytest.param(name, marks=SLOW if name in LARGE else ()) for name in FILTERS])
 def test_filters(name: str, tmp_path: Path) -> None:
     path = tmp_path / name
@@ -156,6 +157,7 @@ READERS: dict[str, Callable[[Path], Any]] = {
 }
 
 
+@pytest.mark.sweep(8)
 @pytest.mark.parametrize("reader", READERS)
 @pytest.mark.parametrize("name", TABLES)
 def test_tables(name: str, reader: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -247,6 +249,7 @@ DOCUMENTS: dict[str, Callable[[Path], Any]] = {
 }
 
 
+@pytest.mark.sweep(6)
 @pytest.mark.parametrize("reader", DOCUMENTS)
 @pytest.mark.parametrize("name", [pytest.param(name, marks=SLOW if name in LARGE else ()) for name in TREES])
 def test_json(name: str, reader: str, tmp_path: Path) -> None:

@@ -151,6 +151,7 @@ def let_stores_grow(monkeypatch: pytest.MonkeyPatch, pages: int) -> None:
     monkeypatch.setattr(sqlite3, "connect", connect)
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("pages", [1, 5, 20])
 def test_a_new_store_on_a_full_disk_is_no_store(
     pages: int, disk: Disk, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

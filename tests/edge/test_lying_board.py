@@ -13,7 +13,7 @@ from tests.edge.lying_board import false_identity, with_memory
 from tests.host.lines import plain_device
 from tests.host.ports import plugged
 
-FAST, SLOW = range(16), range(16, 500)
+FAST, SLOW = range(6), range(6, 500)
 
 
 def run(seeds: range, folder: Path) -> Counter[int]:

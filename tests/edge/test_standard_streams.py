@@ -30,7 +30,7 @@ def shell(line: str, folder: Path, **environment: str) -> subprocess.CompletedPr
     )
 
 
-@pytest.mark.sweep(4)
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("closed", ["", "<&-", ">&-", "2>&-", "<&- >&-", "<&- 2>&-", ">&- 2>&-", "<&- >&- 2>&-"])
 def test_closed_streams(closed: str, tmp_path: Path) -> None:
     made = shell(f"sosmith init a.toml {closed}", tmp_path)
@@ -50,6 +50,7 @@ def test_closed_streams(closed: str, tmp_path: Path) -> None:
     assert "Traceback" not in refused.stderr
 
 
+@pytest.mark.slow
 def test_files_are_written_without_any_stream(tmp_path: Path) -> None:
     (tmp_path / "plain.toml").write_text(FILTER)
     assert shell("sosmith generate plain.toml -o out <&- >&- 2>&-", tmp_path).returncode == 3
@@ -61,6 +62,7 @@ def test_a_stdout_that_is_full(tmp_path: Path) -> None:
     assert (made.returncode, made.stderr) == (3, FULL)
 
 
+@pytest.mark.slow
 def test_files_that_are_written_after_a_stdout_that_is_full(tmp_path: Path) -> None:
     record = "time_s,clearance_mm\n" + "".join(f"{86400 * day},{1 + 0.01 * day}\n" for day in range(40))
     (tmp_path / "wheel.csv").write_text(record)
@@ -69,6 +71,7 @@ def test_files_that_are_written_after_a_stdout_that_is_full(tmp_path: Path) -> N
     assert (tmp_path / "a.svg").read_text().endswith("</svg>\n")
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("to", ["/dev/full", ">(true)"])
 def test_a_stderr_that_takes_nothing(to: str, tmp_path: Path) -> None:
     made = shell(f"sosmith init a.toml 2> {to}", tmp_path)
@@ -82,7 +85,7 @@ def test_a_reader_that_leaves(tmp_path: Path) -> None:
     assert (made.returncode, made.stderr, len(made.stdout.splitlines())) == (0, "", 1)
 
 
-@pytest.mark.sweep(4)
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("locale", ["C", "POSIX", "xx_YY.none", "en_US.ISO-8859-1"])
 @pytest.mark.parametrize("encoding", ["", "ascii", "ascii:strict"])
 def test_locales(locale: str, encoding: str, tmp_path: Path) -> None:

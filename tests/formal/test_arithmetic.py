@@ -79,7 +79,6 @@ CASES = [
 
 
 @pytest.mark.slow
-@pytest.mark.sweep(1)
 @pytest.mark.parametrize(("low", "high", "drop", "limits"), CASES)
 def test_quantizers_are_what_they_are_called(
     low: int, high: int, drop: int, limits: tuple[int, int], tmp_path: Path
@@ -94,7 +93,7 @@ def on_broken_logic(right: str, wrong: str) -> ModuleType:
     return module
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [

@@ -39,7 +39,6 @@ def rules(
 
 
 @pytest.mark.slow
-@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("datapath", "lanes", "ahead"),
     [
@@ -60,7 +59,6 @@ def test_longer_turns_keep_the_rules_and_every_sample(turns: int, lanes: int, tm
 
 
 @pytest.mark.slow
-@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [
@@ -75,7 +73,7 @@ def test_a_broken_core_is_found_out(right: str, wrong: str, tmp_path: Path) -> N
     assert prove(rules(leaky(), 2, ahead=False, module=wrong_core), tmp_path, timeout=600) == "FAIL"
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [

@@ -108,14 +108,12 @@ def small(factor: int = 2, stages: int = 1, dropped: int = 1) -> Decimator:
 
 
 @pytest.mark.slow
-@pytest.mark.sweep(1)
 @pytest.mark.parametrize("dropped", [0, 1])
 def test_results_are_moving_sums(dropped: int, tmp_path: Path) -> None:
     assert prove(MovingSums(small(dropped=dropped), hardware, values=True), tmp_path) == "PASS"
 
 
 @pytest.mark.slow
-@pytest.mark.sweep(1)
 @pytest.mark.parametrize(("factor", "stages"), [(2, 3), (4, 2)])
 def test_no_result_is_lost_or_changed_on_its_way(factor: int, stages: int, tmp_path: Path) -> None:
     assert prove(MovingSums(small(factor, stages), hardware, values=False), tmp_path) == "PASS"
@@ -127,7 +125,6 @@ def test_flags_that_come_with_samples_are_gathered(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [
@@ -139,7 +136,7 @@ def test_flags_lost_are_found_out(right: str, wrong: str, tmp_path: Path) -> Non
     assert prove(MovingSums(small(), broken(hardware, right, wrong), values=True, flags=2), tmp_path) == "FAIL"
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [
@@ -194,7 +191,7 @@ def test_each_result_is_handed_out_as_often_as_it_has_samples(tmp_path: Path) ->
     assert prove(Copies(hardware), tmp_path) == "PASS"
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [

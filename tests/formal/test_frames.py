@@ -31,7 +31,7 @@ def test_no_message_is_overwritten(tmp_path: Path) -> None:
     assert prove(Kept(frame_receiver.FrameReceiver()), tmp_path) == "PASS"
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [

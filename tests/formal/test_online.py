@@ -98,7 +98,6 @@ FAULTS = {
 
 
 @pytest.mark.slow
-@pytest.mark.sweep(1)
 @pytest.mark.parametrize("fault", FAULTS.values(), ids=FAULTS)
 def test_a_fault_is_found(fault: tuple[str, str], tmp_path: Path) -> None:
     assert prove(Invariant(ResidualAlone(broken(residual, *fault))), tmp_path, INDUCTION) != "PASS"
@@ -140,6 +139,7 @@ def core_rules(module: ModuleType = core, *, computes: bool = False) -> StreamRu
     return StreamRules(module.OnlineCore(datapath), held, patience=latency)
 
 
+@pytest.mark.slow
 def test_the_core_keeps_the_rules_of_the_streams(tmp_path: Path) -> None:
     assert prove(core_rules(), tmp_path) == "PASS"
 
@@ -166,7 +166,6 @@ def test_a_core_that_computes_something_else_is_found_out(
 
 
 @pytest.mark.slow
-@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [

@@ -73,6 +73,7 @@ def test_a_resonator_stays_in_its_range(tmp_path: Path) -> None:
     assert prove(StatedRanges(resonator(-7, 5).stages[0]), tmp_path) == "PASS"
 
 
+@pytest.mark.slow
 def test_a_section_stays_in_its_ranges(tmp_path: Path) -> None:
     assert prove(StatedRanges(proven_section(bits=2, y_frac=0)), tmp_path) == "PASS"
 

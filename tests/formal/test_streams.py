@@ -64,7 +64,6 @@ def test_a_core_of_three_pipeline_stages_computes_its_recursion(tmp_path: Path) 
 
 
 @pytest.mark.slow
-@pytest.mark.sweep(1)
 @pytest.mark.parametrize("serial", [False, True])
 def test_the_folded_core_keeps_the_rules(serial: bool, tmp_path: Path) -> None:
     assert prove(folded_rules(serial=serial, progress=not serial), tmp_path) == "PASS"
@@ -101,14 +100,12 @@ def channel_rules(module: ModuleType, serial: bool | None = None) -> StreamRules
 
 
 @pytest.mark.slow
-@pytest.mark.sweep(1)
 @pytest.mark.parametrize(("module", "serial"), [(core, None), (folded, False), (folded, True)])
 def test_channels_stay_with_their_samples(module: ModuleType, serial: bool | None, tmp_path: Path) -> None:
     assert prove(channel_rules(module, serial), tmp_path) == "PASS"
 
 
 @pytest.mark.slow
-@pytest.mark.sweep(1)
 @pytest.mark.parametrize(("module", "serial"), [(core, None), (folded, False)])
 def test_a_channel_too_many_is_found_out(module: ModuleType, serial: bool | None, tmp_path: Path) -> None:
     wrong = broken(module, "self.s_axis_tdest < self.channels", "self.s_axis_tdest <= self.channels")
@@ -122,7 +119,6 @@ def test_a_channel_that_is_lost_is_found_out(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.sweep(1)
 @pytest.mark.parametrize("serial", [False, True])
 def test_the_folded_core_computes_a_limited_sum(serial: bool, tmp_path: Path) -> None:
     assert prove(folded_rules(serial=serial, datapath=limiter()), tmp_path) == "PASS"
@@ -134,7 +130,7 @@ def test_the_folded_core_computes_a_recursion(serial: bool, tmp_path: Path) -> N
     assert prove(folded_rules(serial=serial, datapath=leaky()), tmp_path, timeout=1200) == "PASS"
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [
@@ -162,7 +158,7 @@ def test_a_broken_core_is_found_out(right: str, wrong: str, tmp_path: Path) -> N
     assert prove(core_rules(broken(core, right, wrong)), tmp_path) == "FAIL"
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("serial", [False, True])
 @pytest.mark.parametrize(
     ("right", "wrong"),
@@ -176,7 +172,7 @@ def test_a_broken_folded_core_is_found_out(right: str, wrong: str, serial: bool,
     assert prove(folded_rules(broken(folded, right, wrong), serial=serial), tmp_path) == "FAIL"
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("make", [core_rules, partial(folded_rules, progress=True)], ids=["parallel", "folded"])
 def test_a_latency_that_is_too_short_is_found_out(make: Callable[[], StreamRules], tmp_path: Path) -> None:
     rules = make()
@@ -199,6 +195,7 @@ DESIGNS = {
 }
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("name", DESIGNS)
 def test_no_output_depends_on_an_input_within_a_clock(name: str, tmp_path: Path) -> None:
     assert combinational_outputs(DESIGNS[name](), tmp_path) == []

@@ -80,7 +80,7 @@ def test_an_unstable_section_is_refused() -> None:
         build([0.0, 0.0, 0.0, 1.0, -0.5, 0.0], SectionFormat(coefficient_bits=12), "section0")
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("clock", "order", "distance"), [("48.0e6", 5, 4), ("150.0e6", 5, 8), ("400.0e6", 2, 8)])
 def test_the_shortest_look_ahead_that_reaches_the_clock_is_chosen(clock: str, order: int, distance: int) -> None:
     made = designed(clock=clock, order=order)
@@ -117,6 +117,7 @@ def test_a_realization_cannot_be_asked_for_with_look_ahead() -> None:
         design_core(spec, widths_of="df1")
 
 
+@pytest.mark.slow
 def test_auto_keeps_plain_loops_where_look_ahead_is_no_faster() -> None:
     """16 samples a clock are more than look-ahead has: what was proven without it stays."""
     wide = text(16, pipeline="auto", clock="100e6").replace("sample_rate = 48000.0", "sample_rate = 1600e6")
@@ -207,7 +208,7 @@ def test_a_core_gives_the_codes_and_flags_of_the_model(lanes: int, pipeline: str
     assert {beat.status & 1 for beat in found} == {0, 1}
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("lanes", [2, 4])
 def test_an_instrument_takes_several_samples_a_clock(lanes: int) -> None:
     bench = (EXAMPLES / "flange_wear_bench.toml").read_text(encoding="utf-8")

@@ -38,6 +38,7 @@ def within(spec: Specification, beyond_half: Fraction) -> Specification:
     return replace(spec, max_error=spec.output.lsb * (Fraction(1, 2) + beyond_half))
 
 
+@pytest.mark.slow
 def test_the_cheapest_is_taken_and_the_rest_are_told(spec: Specification) -> None:
     made = design_core(spec)
     areas = {name: cost_of(design_core(spec, realization=name).datapath).area for name in SECTIONS}
@@ -111,6 +112,7 @@ def test_programs_have_an_objective_of_their_own(spec: Specification, architectu
     assert made.quantized.bound < small.quantized.bound
 
 
+@pytest.mark.slow
 def test_each_architecture_tried_is_designed_for_itself(spec: Specification) -> None:
     fast = replace(spec, sample_rate=spec.hardware.clock, filter=replace(spec.filter, cutoff=(Fraction(48_000),)))
     tried = design_core(in_architecture("auto", fast))

@@ -27,6 +27,7 @@ def taken(made: Core | FoldedCore) -> set[int]:
     return {result.clocks for result in run(made, [(k % made.channels, sample) for k, sample in enumerate(codes)])}
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize(
     ("make", "channels"),
     [(limiter, 1), (limiter, 3), (resonator, 1), (resonator, 2), (resonator, 8), (resonator, 17), (worn, 3)],
@@ -36,12 +37,14 @@ def test_parallel(make: Callable[[], Datapath], channels: int) -> None:
     assert taken(Core(datapath, channels)) == {parallel_clocks.latency_cycles(datapath, channels)}
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("realization", ["df1_ef2", "df2t", "lattice_wdf"])
 def test_parallel_filters(realization: str) -> None:
     datapath = example_design("audio_lowpass.toml", realization=realization).datapath
     assert taken(Core(datapath)) == {parallel_clocks.latency_cycles(datapath)}
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(("make", "channels"), [(limiter, 1), (resonator, 1), (resonator, 3), (worn, 3)])
 def test_folded(make: Callable[[], Datapath], channels: int) -> None:
     made = program(make(), 3)
@@ -50,6 +53,7 @@ def test_folded(make: Callable[[], Datapath], channels: int) -> None:
     }
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("make", [limiter, resonator, worn])
 def test_serial_takes_no_longer_than_it_states(make: Callable[[], Datapath]) -> None:
     """Small factors take fewer clocks than the bound allows for, but not many."""

@@ -133,6 +133,7 @@ def codes_of(built: Built, beats: Beats) -> list[int]:
     return found
 
 
+@pytest.mark.sweep(1)
 def test_without_an_upset_it_is_the_model(built: Built) -> None:
     (beats,) = beats_of(built, [Hit(built.target.places[0], 0, 0, -1, -1)])
     assert codes_of(built, beats) == from_reset(built, 0)

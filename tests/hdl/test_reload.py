@@ -217,7 +217,7 @@ SCENARIOS: tuple[Scenario, ...] = (
 )
 
 
-@pytest.mark.sweep(5)
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda scenario: scenario.__name__)
 def test_the_port(scenario: Scenario) -> None:
     assert len(REGISTERS) < 1 << (ADDRESS_BITS - 2)  # there is an address behind the last register
@@ -343,7 +343,7 @@ USED_BY = {"bus/serial_crc": (reload, "SerialCrc"), "bus/axi_lite": (reload, "Se
 """Where the components of a module are looked up; the port itself here."""
 
 
-@pytest.mark.sweep(8)
+@pytest.mark.sweep(4)
 @pytest.mark.parametrize("mutant", MUTANTS.values(), ids=list(MUTANTS))
 def test_a_broken_port_is_noticed(mutant: tuple[Scenario, str, str, str], monkeypatch: pytest.MonkeyPatch) -> None:
     scenario, name, old, new = mutant
@@ -372,7 +372,7 @@ def test_constants_tell_what_the_core_is() -> None:
     benched(scenario, design=0x89ABCDEF)
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(2))
 def test_loads_of_all_kinds_at_any_pace(seed: int) -> None:
     async def scenario(bench: Bench) -> None:
@@ -546,6 +546,7 @@ async def without_a_lock_status_is_not_written(bench: Bench) -> None:
     assert set(await bench.load(4, bench.words())) == {OKAY}
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("protected", [False, True])
 @pytest.mark.parametrize(
     "scenario",

@@ -11,7 +11,7 @@ from sosmith.gen.realizations.registry import SECTIONS
 from sosmith.hdl.stages import pipelined as stage_module
 
 
-@pytest.mark.sweep(5)
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("realization", list(SECTIONS))
 @pytest.mark.parametrize("name", ALL)
 def test_stages_equal_their_graphs(name: str, realization: str) -> None:

@@ -35,7 +35,7 @@ def test_a_value_passes_beside_every_pipeline_stage(realization: str) -> None:
         samples = expected
 
 
-@pytest.mark.sweep(4)
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(
     ("architecture", "channels", "reload", "protect"),
     [

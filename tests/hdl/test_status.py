@@ -52,7 +52,7 @@ def test_the_software_at_the_ends_of_every_range(calibrated: tuple[Ends, Ends]) 
     assert outside == [bool(status(datapath, 0, sample) >> Flag.OUTSIDE_CALIBRATION & 1) for sample in codes]
 
 
-@pytest.mark.sweep(4)
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("architecture", ["parallel", "folded", "serial"])
 @pytest.mark.parametrize("calibrated", RANGES[:3])
 def test_the_hardware_at_the_ends_of_every_range(calibrated: tuple[Ends, Ends], architecture: str) -> None:

@@ -189,6 +189,7 @@ def test_an_identity_that_does_not_fit(change: dict[str, Any], message: str, fol
         check_files(made_identity(folder).model_copy(update=change), folder)
 
 
+@pytest.mark.slow
 def test_the_files_of_a_board_are_found_among_those_of_several(folder: Path, tmp_path: Path) -> None:
     """As `sosmith generate` and `sosmith build` for two boards leave them."""
     about = made_identity(folder)

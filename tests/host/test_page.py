@@ -123,6 +123,7 @@ def test_what_the_board_says_is_text_and_no_markup() -> None:
     assert text.count("</script>") == 2
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.skipif(BROWSER is None, reason="there is no Chromium on this machine")
 @needs("axe_core_python")
 @pytest.mark.parametrize(("width", "dark"), [(1280, False), (390, True)])

@@ -21,6 +21,7 @@ SAMPLES = 260
 CASES = [pytest.param(seed, marks=[] if seed in FEW else pytest.mark.slow) for seed in SEEDS]
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("seed", CASES)
 def test_no_error_exceeds_the_bound(seed: int) -> None:
     drawn = draw(seed)
@@ -42,7 +43,7 @@ def test_no_error_exceeds_the_bound(seed: int) -> None:
     assert one == results[:, 0].tolist()
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("seed", CASES)
 def test_certificate_and_files_are_proven(seed: int, tmp_path: Path) -> None:
     drawn = draw(seed)
@@ -58,7 +59,7 @@ def test_certificate_and_files_are_proven(seed: int, tmp_path: Path) -> None:
     assert float(proof.budget["filter rounding"]) * 2**40 < float(proof.lsb)  # nothing is rounded but the output
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("simulator", ["verilator", "icarus"])
 @pytest.mark.parametrize("seed", CASES)
 def test_hardware_equals_the_model(seed: int, simulator: str, tmp_path: Path) -> None:

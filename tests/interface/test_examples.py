@@ -24,6 +24,7 @@ def test_examples_in_docstrings(name: str) -> None:
     assert result.failed == 0
 
 
+@pytest.mark.slow
 @unpainted
 def test_the_page_runs_from_top_to_bottom() -> None:
     result = doctest.testfile(str(PAGE), module_relative=False, optionflags=doctest.ELLIPSIS)

@@ -66,6 +66,7 @@ def test_a_design_loads_nothing_that_it_does_not_need() -> None:
     assert ended.stdout.split() == []
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("words", [("design",), ("design", "--json"), ("combinations",)])
 def test_commands_do_without_statistics(words: tuple[str, ...], tmp_path: Path) -> None:
     script = "import sys\nfrom sosmith.__main__ import main\ntry:\n    main()\nexcept SystemExit:\n    pass\n"
@@ -92,6 +93,7 @@ NOTHING = {
 }
 
 
+@pytest.mark.sweep(4)
 @pytest.mark.parametrize("arguments", NOTHING.values(), ids=NOTHING)
 def test_what_loads_none_of_them(arguments: tuple[str, ...]) -> None:
     assert run(*arguments) == []
@@ -123,6 +125,7 @@ CHECKED = {
 }
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("arguments", CHECKED.values(), ids=CHECKED)
 def test_what_needs_the_specification_alone(arguments: tuple[str, ...]) -> None:
     assert set(run(*arguments)) <= {"pydantic", "rich"}

@@ -72,6 +72,7 @@ def test_a_stage_whose_results_are_in_another_order_is_seen(tmp_path: Path, monk
     assert not report.bit_exact
 
 
+@pytest.mark.slow
 def test_a_calibration_before_a_filter(tmp_path: Path) -> None:
     chain = sosmith.design_chain(instrument())
     volts, degrees = (
@@ -106,6 +107,7 @@ def instrument() -> dict[str, Any]:
     }
 
 
+@pytest.mark.slow
 def test_a_fault_of_an_early_stage_reaches_every_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A stage whose flags say so from one of its results on: so do those of the chain from the same sample on."""
     whole = simulation.whole_text

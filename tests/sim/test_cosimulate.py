@@ -53,7 +53,7 @@ def test_a_sound_core_passes(simulator: str, tmp_path: Path) -> None:
     assert seen[-1] == (300, 300)
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("idle_and_stall", [(0.0, 0.0), (0.9, 0.0), (0.0, 0.9), (0.6, 0.6)])
 def test_any_pace(idle_and_stall: tuple[float, float], tmp_path: Path) -> None:
     idle, stall = idle_and_stall
@@ -63,7 +63,7 @@ def test_any_pace(idle_and_stall: tuple[float, float], tmp_path: Path) -> None:
         assert result.cycles <= 303
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("what", BROKEN)
 def test_a_broken_core_is_found(what: str, tmp_path: Path) -> None:
     break_it, message = BROKEN[what]
@@ -97,6 +97,7 @@ def test_a_users_settings_do_not_count_and_nothing_is_compiled_anew(
     assert owned == {"COCOTB_REWRITE_ASSERTION_FILES": ""}
 
 
+@pytest.mark.slow
 def test_an_unchanged_core_is_not_built_again(tmp_path: Path) -> None:
     source = write(tmp_path)
     for _ in range(2):

@@ -91,7 +91,7 @@ def test_hardware_equals_the_integer_model(example: str, scenario: str, run_of: 
         assert abs(accuracy["hardware"] - accuracy["golden"]) < 0.01
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("example", ALL)
 def test_worst_cases_stay_within_the_proof(example: str, run_of: Callable[[str, str], Run]) -> None:
     """The inputs that drive the filter, and the way of every rounding error, furthest: hardware and exact graph."""
@@ -132,7 +132,7 @@ MEASURED = [
 ]
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("example", "scenario"), MEASURED)
 def test_accuracy_is_printed_for_every_run_of_the_instruments(
     example: str, scenario: str, run_of: Callable[[str, str], Run]
@@ -151,7 +151,6 @@ def test_enough_samples_under_different_handshakes(run_of: Callable[[str, str], 
 
 
 @pytest.mark.slow
-@pytest.mark.sweep(1)
 @pytest.mark.parametrize("example", ALL)
 def test_icarus_agrees(example: str, tmp_path: Path) -> None:
     made = parallel_design(example)
@@ -252,7 +251,7 @@ def spoil_emitted_file(spoil: Callable[[str], str], monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(simulation, "generate", spoiled)
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("example", "spoil"), WRONG.values(), ids=WRONG)
 def test_a_wrong_bit_in_the_hardware_is_found(
     example: str, spoil: Callable[[str], str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch

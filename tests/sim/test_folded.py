@@ -35,7 +35,7 @@ def made_in(example: str, architecture: str, realization: str, board: str | None
     return design_core(wanted, board=None if board is None else find_board(board))
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("example", "architecture", "realization", "simulator"), CASES)
 def test_hardware_equals_the_integer_model(
     example: str, architecture: str, realization: str, simulator: str, tmp_path: Path
@@ -63,7 +63,6 @@ def check(made: CoreDesign, simulator: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.sweep(1)
 @pytest.mark.parametrize("architecture", ["folded", "serial"])
 def test_samples_come_at_the_rate_that_is_stated(architecture: str, tmp_path: Path) -> None:
     made = design_in(architecture)

@@ -149,7 +149,6 @@ WRONG = {
 
 
 @pytest.mark.slow
-@pytest.mark.sweep(1)
 @pytest.mark.parametrize("break_it", WRONG.values(), ids=WRONG)
 def test_a_wrong_bit_in_the_netlist_is_found(break_it: Break, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     break_netlist(break_it, monkeypatch)
@@ -173,6 +172,7 @@ def test_a_flip_flop_without_its_reset_is_found(folder: Path, monkeypatch: pytes
         run(little("parallel", folder, "zero"), "ulx3s_25f", folder, samples=80)
 
 
+@pytest.mark.slow
 def test_a_use_of_a_cell_that_its_model_has_not_is_refused(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     break_netlist(
         lambda text: text.replace("\n  MULT18X18D ", '\n  MULT18X18D #(\n    .REG_PIPELINE_CLK("CLK0")\n  ) ', 1),

@@ -76,7 +76,7 @@ def yosys(sv: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run([program, "-q", "-p", script], cwd=sv.parent, capture_output=True, text=True, check=False)
 
 
-@pytest.mark.sweep(7)
+@pytest.mark.sweep(2)
 def test_verilator_has_no_warning_left(core: Path, tmp_path: Path) -> None:
     assert lint(core, core.stem, tmp_path) == []
 
@@ -86,7 +86,7 @@ def test_icarus_has_no_warning(core: Path) -> None:
     assert icarus_check(core, core.stem) == []
 
 
-@pytest.mark.sweep(7)
+@pytest.mark.sweep(2)
 def test_yosys_finds_no_fault(core: Path) -> None:
     result = yosys(core)
     assert result.returncode == 0, result.stderr
@@ -155,7 +155,7 @@ def test_a_wrong_top_is_refused(locomotive: Path, tmp_path: Path) -> None:
         icarus_check(locomotive, "elsewhere")
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("architecture", ["parallel", "folded", "serial"])
 def test_reload_leaves_nothing_for_a_linter(architecture: str, tmp_path: Path) -> None:
     spec = example_design("flange_wear_bench.toml").spec

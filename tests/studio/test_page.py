@@ -328,6 +328,7 @@ def test_it_is_printed_without_its_controls(tab: Tab, page: Session, tmp_path: P
     tab.call("Emulation.setEmulatedMedia", media="")
 
 
+@pytest.mark.slow
 def test_the_end_is_told(tab: Tab, tmp_path: Path) -> None:
     with session_in(tmp_path) as session, Studio(session) as studio:
         tab.open(studio.address)

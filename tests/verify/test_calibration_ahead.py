@@ -265,6 +265,7 @@ def test_what_is_wrong_is_rejected(change: Callable[[Any], object], sentence: Ca
         verify(read(tree))
 
 
+@pytest.mark.slow
 def test_a_polynomial_other_than_specified_is_rejected() -> None:
     text = locomotive_text().replace("0.3672", "0.3673")
     with rejected("coefficient [1][0] of the calibration must be 3673/10000 as specified, not 459/1250"):

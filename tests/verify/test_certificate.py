@@ -55,7 +55,7 @@ def test_the_file_has_a_name_for_every_operation() -> None:
     assert {operation.value for operation in Operation} == {op.value for op in Op}
 
 
-@pytest.mark.sweep(5)
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("realization", REALIZATIONS)
 @pytest.mark.parametrize(
     "name", [name if name != LOCOMOTIVE else pytest.param(name, marks=pytest.mark.slow) for name in ALL]
@@ -86,6 +86,7 @@ def test_parts_of_the_instrument(core: str) -> None:
     proven(example_design(BENCH, core=core).quantized)
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("inputs", "output"),
     [
@@ -109,6 +110,7 @@ def test_designs(kind: str, order: int, cutoff: float, realization: str) -> None
     proven(plain(butterworth(order, cutoff, kind), realization))
 
 
+@pytest.mark.slow
 def test_an_input_to_be_scaled_before_sections_in_another_order() -> None:
     """An error before the filter counts by the filter's gain, whose last digits depend on the order of the sections."""
     given = FilterSpec(
@@ -404,6 +406,7 @@ def test_a_lie_is_rejected_with_its_reason(lie: Callable[[Any], Any], message: s
     rejected(tree, message)
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("key", ["parameter", "parameter_frac"])
 def test_a_parameter_without_a_use_is_rejected_at_every_node(key: str) -> None:
     """It would change nothing, and so stand for nothing: two texts would certify one design."""
@@ -491,6 +494,7 @@ def test_the_error_of_an_inverse_goes_through_the_numerator() -> None:
     assert found.gain >= 5 + 5 * coarse.error
 
 
+@pytest.mark.slow
 def test_a_pole_on_the_circle_has_no_inverse() -> None:
     with pytest.raises(UndecidedError, match=r"^a response does not die away within 2097152 samples$"):
         inverse(fmpq_poly([1, 0, 1]))

@@ -30,6 +30,7 @@ def rejected(sentence: str) -> pytest.RaisesExc[RejectedError]:
     return pytest.raises(RejectedError, match=f"^{re.escape(sentence)}$")
 
 
+@pytest.mark.slow
 def test_the_locomotive_is_proven_again() -> None:
     made = locomotive()
     certificate = read(tree())
@@ -187,6 +188,7 @@ def test_what_is_wrong_is_rejected(change: Callable[[Any], None], sentence: str)
         verify(read(spoilt))
 
 
+@pytest.mark.slow
 def test_a_smaller_part_of_the_budget_is_rejected() -> None:
     changed = tree()
     claimed = Fraction(changed["claims"]["budget"]["decimation"])
@@ -195,7 +197,7 @@ def test_a_smaller_part_of_the_budget_is_rejected() -> None:
         verify(read(changed))
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [

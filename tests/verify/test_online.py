@@ -42,6 +42,7 @@ def check(found: Any) -> None:
     check_online(read, [section_alone(stage) for stage in read.stages if stage.role == "section"])
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("realization", REALIZATIONS)
 def test_what_is_claimed_is_proven(realization: str) -> None:
     found = tree(realization)

@@ -21,6 +21,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return generate(made, tmp_path_factory.mktemp("online"))[0].parent
 
 
+@pytest.mark.slow
 def test_it_is_proven_with_its_files(folder: Path) -> None:
     certificate = sosmith.Certificate.load(folder / "audio_lowpass.certificate.json")
     proof = certificate.verify(files=folder)

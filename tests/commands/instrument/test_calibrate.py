@@ -96,6 +96,7 @@ def test_add_tells_the_shift_and_a_step_of_the_voltage() -> None:
     assert "the offset stepped up" in as_json["warnings"][0]
 
 
+@pytest.mark.slow
 def test_a_shift_beyond_the_warning_limit_is_said_and_is_no_alarm() -> None:
     good("add", "a.csv", *DAY)
     write_csv(Path("b.csv"), [(d, round(V - 0.2, 4), T) for d, V, T in readings(60, seed=2) if V > 1.1])
@@ -131,6 +132,7 @@ def test_inches_are_refused_unless_they_are_said_to_be_right() -> None:
     assert "stored 60 measurements" in run("add", "a.csv", "--surprising", *DAY).stderr
 
 
+@pytest.mark.slow
 def test_a_day_far_from_the_measurements_is_warned_of() -> None:
     good("add", "a.csv", *DAY)
     assert "warning" not in good("fit", "--date", "2024-08-20").stderr
@@ -145,6 +147,7 @@ def test_a_day_far_from_the_measurements_is_warned_of() -> None:
     assert "sosmith: warning: 2024-02-01 is before the last measurement: the calibration is for 2024-03-01\n" in before
 
 
+@pytest.mark.slow
 def test_one_temperature_is_enough_for_a_sensor_of_a_known_type() -> None:
     write_csv(
         Path("a.csv"),
@@ -158,6 +161,7 @@ def test_one_temperature_is_enough_for_a_sensor_of_a_known_type() -> None:
     assert "1 of 1" in good("history", "--verify").stderr
 
 
+@pytest.mark.slow
 def test_reference_targets_by_hand_and_from_a_file() -> None:
     good("add", "a.csv", *DAY)
     by_hand = ("--reading", "2.2", "2", "25", "--reading", "4.6", "5", "25", "--reading", "8.1", "8", "25")
@@ -342,7 +346,6 @@ def test_an_older_version_can_be_exported() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.sweep(1)
 @pytest.mark.parametrize(("name", "start"), [("p.svg", b"<?xml"), ("p.png", b"\x89PNG")])
 def test_plots_are_the_same_bytes_twice(name: str, start: bytes) -> None:
     good("add", "a.csv", *DAY, *PAPER, "--robust")
@@ -358,6 +361,7 @@ def test_plots_are_the_same_bytes_twice(name: str, start: bytes) -> None:
             assert text in drawn[0].decode()
 
 
+@pytest.mark.slow
 def test_a_bayesian_calibration_says_what_it_is_worth() -> None:
     good("add", "a.csv", *DAY)
     shown = re.sub(r" {2,}", "  ", good("add", "b.csv", "--date", "2024-03-08").stdout)
@@ -418,6 +422,7 @@ def test_a_calibration_that_is_not_good_enough_in_millimetres_is_not_accepted(me
     )
 
 
+@pytest.mark.slow
 def test_the_type_of_a_sensor_is_kept() -> None:
     Path("own.toml").write_text('name = "own"\ncurve = [1.2, 0.37, -0.004, 0.0007, 0.058]\ngain = 0.1\n')
     first = json.loads(good("add", "a.csv", *DAY, "--type", "own.toml", "--json").stdout)["calibration"]
@@ -449,6 +454,7 @@ def test_advice_reaches_what_it_promises() -> None:
     assert "times" not in enough
 
 
+@pytest.mark.slow
 def test_a_sensor_mounted_anew_raises_an_alarm_until_it_is_accepted() -> None:
     generator = np.random.default_rng(1)
     rows = []

@@ -95,6 +95,7 @@ def put_when_asked(device: Any, monkeypatch: pytest.MonkeyPatch, *answers: str) 
     monkeypatch.setattr(click, "prompt", prompt)
 
 
+@pytest.mark.slow
 def test_targets_are_read_one_after_the_other(
     device: GaugingDevice, port: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -114,6 +115,7 @@ def test_targets_are_read_one_after_the_other(
     assert call("history", "--verify").exit_code == 0
 
 
+@pytest.mark.slow
 def test_a_target_may_be_left_out_or_read_again(
     device: GaugingDevice, port: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

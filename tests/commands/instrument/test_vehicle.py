@@ -89,6 +89,7 @@ def test_a_wheel_that_would_climb_is_told() -> None:
     )
 
 
+@pytest.mark.slow
 def test_json_holds_figures_limits_and_sources() -> None:
     printed = good("short.toml", "--json").stdout
     found = json.loads(printed)
@@ -110,6 +111,7 @@ def test_json_holds_figures_limits_and_sources() -> None:
     assert good("short.toml", "--json").stdout == printed
 
 
+@pytest.mark.slow
 def test_motion_goes_to_a_csv_file() -> None:
     options = ["--irregularities", "low", "--seed", "3", "--sample-rate", "50", "--model", "linear"]
     good("short.toml", "-o", "out/motion.csv", *options)
@@ -128,7 +130,6 @@ def test_motion_goes_to_a_csv_file() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.sweep(1)
 @pytest.mark.parametrize("name", ["motion.svg", pytest.param("motion.PNG", marks=pytest.mark.slow)])
 def test_a_plot_is_the_same_bytes_every_time(name: str) -> None:
     arguments = ("short.toml", "--plot", name, "--irregularities", "high", "--model", "linear")

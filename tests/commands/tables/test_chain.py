@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+import pytest
 from tests.commands.command_line import Command
 
 CHAIN = """\
@@ -56,6 +57,7 @@ def test_a_chain_from_the_specification_to_the_proof(sosmith: Command) -> None:
     assert "stage out: " in refused.messages[-1]
 
 
+@pytest.mark.slow
 def test_a_chain_in_a_package(sosmith: Command) -> None:
     Path("rx.toml").write_text(CHAIN, encoding="utf-8")
     paths = sosmith("package", "rx.toml", "-o", "packed").stdout.split()
@@ -79,6 +81,7 @@ def test_other_coefficients_for_a_stage(sosmith: Command) -> None:
     assert "nowhere" in refused.messages[-1]
 
 
+@pytest.mark.slow
 def test_a_chain_in_a_simulator(sosmith: Command) -> None:
     Path("rx.toml").write_text(CHAIN, encoding="utf-8")
     run = sosmith("simulate", "rx.toml", "--simulator", "icarus", "--seconds", "0.2", "-o", "run", "--json")

@@ -60,7 +60,7 @@ def test_sensors_that_hold_too_little_without_a_word_are_counted() -> None:
     assert (row["possible"], row["noticed"], row["beyond"]) == (1, 0, [1, 18])
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["gain +15 %", "gain -20 %", "error of a day an offset"])
 def test_intervals_hold_or_a_warning_is_told(name: str) -> None:
     (case,) = (one for one in calibration_coverage.CASES if one.name == name)

@@ -84,6 +84,7 @@ def test_the_tables_of_the_first_curve_are_those_of_the_record(record: dict[str,
         assert (table.reload_words, float(table.missed)) == (row["reload_words"], row["missed"])
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("degree", [1, 2])
 @pytest.mark.parametrize("allowed", [Fraction(1), Fraction(40)])
 def test_the_integers_keep_to_the_bound(degree: int, allowed: Fraction) -> None:
@@ -134,6 +135,7 @@ def test_a_table_takes_one_order_of_temperature() -> None:
         rows_of([[Fraction(1), Fraction(0), Fraction(1)]])
 
 
+@pytest.mark.slow
 def test_what_no_table_reaches_is_refused() -> None:
     with pytest.raises(
         ShortfallError,

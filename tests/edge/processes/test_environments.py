@@ -9,6 +9,7 @@ from tests.edge.processes.environments import COMMANDS, HARMFUL, tried
 QUICK = ("init", "list", "stream", "help", "combinations")
 
 
+@pytest.mark.slow
 def test_environments_of_quick_commands() -> None:
     found = [tried(seed, QUICK) for seed in range(30)]
     assert [one for each in found for one in each.findings] == []

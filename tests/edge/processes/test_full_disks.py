@@ -19,6 +19,7 @@ def test_every_path_that_a_command_writes_is_tried() -> None:
     assert missing() == []
 
 
+@pytest.mark.slow
 @alone
 def test_a_full_disk_for_the_output_is_told() -> None:
     ended = tried(("init", "file"), "out", 4)

@@ -13,6 +13,7 @@ FAST = 4
 SLOWER = {"recording in Parquet"}  # its package alone takes a second to import
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name in SLOWER)) for name in QUICK])
 def test_killed_at_any_moment(name: str) -> None:
     longest = duration(QUICK[name])

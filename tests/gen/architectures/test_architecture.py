@@ -53,6 +53,7 @@ def test_the_smallest_that_keeps_up_is_taken() -> None:
     )
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("board", "architecture", "there"),
     [
@@ -98,6 +99,7 @@ def test_an_instruction_that_can_be_loaded_fits_a_register() -> None:
     assert (fixed.digit_bits, instruction_bits(fixed)) == (17, 34)
 
 
+@pytest.mark.slow
 def test_what_folding_cannot_keep_up_with_is_parallel() -> None:
     spec = load(EXAMPLES / "audio_lowpass.toml")
     made = design_core(replace(spec, channels=64))
@@ -110,6 +112,7 @@ def test_what_folding_cannot_keep_up_with_is_parallel() -> None:
     assert (manifest(core_facts(made))["cycles_per_sample"], manifest(core_facts(made))["schedule"]) == (1, None)
 
 
+@pytest.mark.slow
 def test_a_clock_that_nothing_keeps_up_with_is_refused() -> None:
     spec = load(EXAMPLES / "audio_lowpass.toml")
     with pytest.raises(

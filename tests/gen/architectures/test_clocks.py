@@ -153,7 +153,7 @@ def measured(made: Architecture, results: int, *, alone: bool) -> Seen:
     return seen
 
 
-@pytest.mark.sweep(5)
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("combination", TABLE, ids=str)
 def test_the_clocks_stated_are_those_of_the_hardware(combination: Combination) -> None:
     made = combination.made()

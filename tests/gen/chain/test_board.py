@@ -48,6 +48,7 @@ def test_the_identity_is_that_of_the_whole(chain: sosmith.Chain) -> None:
     assert item.verilog == top_text(chain.core)
 
 
+@pytest.mark.slow
 def test_flags_that_a_result_can_have(chain: sosmith.Chain, guarded: sosmith.Chain) -> None:
     assert chain_item(chain.core).possible == (0, 2)
     assert chain_item(guarded.core).possible == tuple(range(7))
@@ -55,6 +56,7 @@ def test_flags_that_a_result_can_have(chain: sosmith.Chain, guarded: sosmith.Cha
     assert chain_item(unloaded).possible == (0, 2, 5, 6)
 
 
+@pytest.mark.slow
 def test_a_board_reaches_the_registers_of_one_stage(guarded: sosmith.Chain) -> None:
     item = chain_item(guarded.core)
     told = identity(item, "", baud=1_000_000, clock=12e6)
@@ -107,6 +109,7 @@ def test_every_sample_has_a_result(chain: sosmith.Chain, tmp_path: Path) -> None
     assert np.array_equal(got.status, status)
 
 
+@pytest.mark.slow
 def test_a_build_says_what_the_chain_takes(
     chain: sosmith.Chain, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -39,6 +39,7 @@ def chain() -> sosmith.Chain:
     return sosmith.design_chain(PLAIN)
 
 
+@pytest.mark.slow
 def test_two_runs_write_the_same_bytes(chain: sosmith.Chain, tmp_path: Path) -> None:
     first = {path.name: path.read_bytes() for path in chain.generate(tmp_path / "one")}
     again = {path.name: path.read_bytes() for path in sosmith.design_chain(PLAIN).generate(tmp_path / "two")}
@@ -50,6 +51,7 @@ def test_stages_have_the_architecture_that_each_asks_for(chain: sosmith.Chain) -
     assert [stage.architecture for stage in chain.stages] == ["folded", "parallel", "folded"]
 
 
+@pytest.mark.slow
 def test_names_of_nets_are_kept_in_all_stages(tmp_path: Path) -> None:
     sosmith.design_chain(PLAIN | {"hardware": {"keep": True}}).generate(tmp_path)
     for stage in PLAIN["stage"]:

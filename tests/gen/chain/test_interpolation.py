@@ -48,6 +48,7 @@ def up() -> sosmith.Chain:
     return sosmith.design_chain(UP | {"hardware": {"start": "zero"}})
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("seed", CASES)
 def test_results_are_those_of_the_definition(seed: int) -> None:
     chain = sosmith.design_chain(draw(seed))
@@ -80,6 +81,7 @@ def check_sines(chain: sosmith.Chain) -> None:
         assert 0.97 * claimed <= gains.max() <= claimed * (1 + 1e-9)
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("factor", [2, 5])
 def test_a_sine_has_the_images_that_are_claimed(factor: int) -> None:
     """The spectrum of what comes out, measured: no line but that of the sine is above the claim."""
@@ -108,6 +110,7 @@ def test_results_are_those_of_upfirdn() -> None:
     assert np.abs(chain.run(x=x) - upfirdn(taps, x, up=2)[:400]).max() <= chain.bound
 
 
+@pytest.mark.slow
 def test_the_gain_in_the_pass_band_is_that_of_the_filter(up: sosmith.Chain) -> None:
     """Taps of a half-band filter are times L, so that a constant passes as it is."""
     stage = {"name": "half", "kind": "halfband", "passband_edge": 2000.0, "passband_loss": 0.1, "stopband_loss": 40.0}
@@ -138,6 +141,7 @@ def test_the_c_model_computes_what_the_design_does(up: sosmith.Chain, tmp_path: 
     assert up.core.settling % 8 == 0
 
 
+@pytest.mark.slow
 def test_what_is_shown_of_a_chain_that_interpolates(up: sosmith.Chain, tmp_path: Path) -> None:
     tables = {table.title: table for table in up.tables()}
     assert "Images: largest end-to-end gain, proven" in tables

@@ -29,7 +29,7 @@ def unpacked(name: str, folder: Path) -> Path:
     return folder
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("way", ["c", "icarus", pytest.param("verilator", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", TREES)
 def test_the_bench_passes(name: str, way: str, tmp_path: Path) -> None:
@@ -65,6 +65,7 @@ def test_verilator_says_nothing_beyond_what_is_waived(tmp_path: Path) -> None:
     assert result.returncode == 0, result.stderr
 
 
+@pytest.mark.slow
 def test_the_core_file_has_the_modules_in_order() -> None:
     text = packed("plain")["rx.core"]
     assert re.findall(r"core/(\w+)\.sv", text) == ["rx_slow", "rx_double", "rx_out", "rx"]

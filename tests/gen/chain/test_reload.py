@@ -43,7 +43,7 @@ def stage(k: int, **keys: Any) -> Callable[[Any], object]:
     return lambda tree: tree["stage"][k].update(keys)
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("cutoff", [350.0, 390.0])
 def test_the_bound_holds_with_other_coefficients(cutoff: float, chain: sosmith.Chain) -> None:
     tree = other(stage(1, cutoff=cutoff))

@@ -202,7 +202,7 @@ def test_from_the_specification_to_the_manifest(tmp_path: Path) -> None:
     assert f"at most {deviation} % of the gain, {dc} % at zero frequency" in shown
 
 
-@pytest.mark.sweep(3)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("family", "order", "cutoff", "realization"),
     [

@@ -46,6 +46,7 @@ def check_intervals(found: Decimation, filter_: Filter, module: ModuleType = lar
                 assert gains_in(found, filter_, band * float(found.rate) - within).max() <= float(bound) * (1 + 1e-9)
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize("case", CASES)
 def test_a_whole_band_is_bounded_and_the_bound_is_reached(case: tuple[str, int, int, int, str]) -> None:
     found, filter_ = made(*case)

@@ -82,6 +82,7 @@ def multiplied(designed: Filter, part: int) -> list[Fraction]:
     return total
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("case", CASES, ids=NAMES)
 def test_the_gains_keep_to_the_mask(case: Case) -> None:
     designed = design(spec(case), 1)

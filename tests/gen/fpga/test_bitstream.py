@@ -112,6 +112,7 @@ def test_files_of_a_build_and_what_they_say(install: Install, tmp_path: Path) ->
     assert repr(made) == "<sosmith.Build plain on iCEstick: timing closes, 70.12 MHz>"
 
 
+@pytest.mark.slow
 def test_timing_that_does_not_close_leaves_no_bitstream_and_names_the_path(install: Install, tmp_path: Path) -> None:
     install()
     (old,) = {filter_design().build("icestick", folder=tmp_path).bitstream}

@@ -30,7 +30,7 @@ def header_of(design: CoreDesign) -> str:
     return "".join(line.removeprefix("//").removeprefix(" ") for line in comment.splitlines(keepends=True))
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 def test_the_header_tells_where_the_core_comes_from(design: CoreDesign) -> None:
     header, facts = header_of(design), core_facts(design)
     name = design.spec.name

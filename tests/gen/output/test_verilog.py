@@ -69,7 +69,7 @@ def test_names_need_no_escape_and_stay_apart(architecture: str, options: dict[st
     assert stay_apart(escaped, plain)
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("spec", [EXAMPLES / "audio_lowpass.toml", SPEC], ids=["link", "converters"])
 def test_nor_do_those_of_a_board(spec: Path | dict[str, Any]) -> None:
     text = to_rtlil(board_top(sosmith.design(spec).core, clock=Fraction(12_000_000), core="none"), "top")

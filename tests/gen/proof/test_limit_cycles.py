@@ -75,7 +75,7 @@ def test_plain_direct_form_is_stuck() -> None:
         assert 0 < amplitude <= limit_cycles(graph).largest
 
 
-@pytest.mark.sweep(3)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("realization", ["df1_ef1", "df1_ef2"])
 @pytest.mark.parametrize("level", [1000.3, -7.5, 0.7])
 def test_error_feedback_follows_a_constant(realization: str, level: float) -> None:
@@ -85,6 +85,7 @@ def test_error_feedback_follows_a_constant(realization: str, level: float) -> No
     assert max(abs(y - level) for y in settled) <= 0.7 + 1 / 1024
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("realization", ["df1_ef1", "df1_ef2"])
 def test_error_feedback_comes_to_rest_within_an_lsb(realization: str) -> None:
     graph = graph_of(realization, section_0(), 8)
@@ -95,7 +96,7 @@ def test_error_feedback_comes_to_rest_within_an_lsb(realization: str) -> None:
         assert set(output[-1000:]) <= {-1, 0, 1}
 
 
-@pytest.mark.sweep(6)
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("bits", [3, 5])
 @pytest.mark.parametrize("realization", CASCADES)
 def test_exhaustive_search_stays_within_the_bound(realization: str, bits: int) -> None:
@@ -279,6 +280,7 @@ def test_the_manifest_tells_them_in_the_outputs_unit() -> None:
     assert entries[1]["lyapunov"] is None
 
 
+@pytest.mark.slow
 def test_design_shows_them() -> None:
     shown = {}
     for realization in ("df1", "normal"):

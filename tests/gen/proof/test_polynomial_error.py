@@ -85,7 +85,7 @@ CASES = [
 ]
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES, ids=range(len(CASES)))
 def test_no_code_exceeds_the_bound_and_one_comes_near_it(case: Case) -> None:
     bound, worst = horner_error(case.rows, case.horner), case.worst()

@@ -125,7 +125,7 @@ def test_a_response_may_last_longer_for_sums_of_more_bits() -> None:
         assert (made.block * made.blocks > LONGEST) == (accuracy == 128)
 
 
-@pytest.mark.sweep(3)
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("name", DENOMINATORS)
 def test_totals_enclose_the_sum_of_magnitudes(name: str) -> None:
     made = Recursion([DENOMINATORS[name]], ACCURACY)
@@ -151,7 +151,7 @@ def test_the_uncertainty_of_a_sum_is_what_it_was(name: str, uncertainties: tuple
     assert [float(one.uncertainty) for one in found] == pytest.approx(list(uncertainties), rel=1e-9, abs=0)
 
 
-@pytest.mark.sweep(3)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("accuracy", [40, 128])
 @pytest.mark.parametrize("name", DENOMINATORS)
 def test_the_largest_sum_up_to_any_sample(name: str, accuracy: int) -> None:
@@ -220,7 +220,7 @@ def test_a_sum_does_not_depend_on_what_was_summed_with_it(name: str) -> None:
     assert together == alone
 
 
-@pytest.mark.sweep(3)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("name", DENOMINATORS)
 def test_in_doubles_a_sum_is_enclosed_as_well(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """As it is for long responses, here for short ones."""
@@ -231,7 +231,7 @@ def test_in_doubles_a_sum_is_enclosed_as_well(name: str, monkeypatch: pytest.Mon
         assert abs(found.magnitude - total) <= found.uncertainty < max(total, Fraction(1)) / 2**20
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("pair", [("one pole", "close to each other"), ("close to each other", "slow and fast")])
 @pytest.mark.parametrize("accuracy", [40, 128])
 def test_responses_over_different_denominators_are_added(pair: tuple[str, str], accuracy: int) -> None:

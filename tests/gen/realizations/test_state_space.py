@@ -162,7 +162,7 @@ def test_energy_is_that_of_the_impulse_response(name: str) -> None:
     assert companion(row).energy == pytest.approx(np.sum(response**2), rel=1e-6)
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("structure", JENSSEN)
 def test_published_noise_of_a_cascade(structure: str) -> None:
     """The published figures again: gain and estimate to the last printed digit, simulation within a tenth.
@@ -273,6 +273,7 @@ def test_energy_of_a_truncated_section_falls(name: str) -> None:
     assert first * second > mixed * mixed
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(("realization", "silent"), [("normal", True), ("df1", False), ("state_space", False)])
 def test_output_is_silent_after_the_input(realization: str, silent: bool) -> None:
     section, *_ = plain(butterworth(2, 0.01), realization).sections
@@ -311,7 +312,7 @@ CASES = [
 """All designs in both realizations; the fast tests take every other of the smaller ones, each realization in turn."""
 
 
-@pytest.mark.sweep(5)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(("realization", "kind", "order", "cutoff"), CASES)
 def test_designs_stay_within_their_bound(realization: str, kind: str, order: int, cutoff: float) -> None:
     quantized = plain(butterworth(order, cutoff, kind), realization)
@@ -321,7 +322,7 @@ def test_designs_stay_within_their_bound(realization: str, kind: str, order: int
     assert quantized.datapath.compute_exact(part) == quantized.datapath.compute(part).tolist()
 
 
-@pytest.mark.sweep(3)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("realization", ["state_space", "normal"])
 @pytest.mark.parametrize("name", ["low-pass", "two real poles", "two real poles on both sides", "delays only"])
 def test_hardware_equals_its_graph(name: str, realization: str) -> None:

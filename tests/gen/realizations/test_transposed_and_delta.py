@@ -161,6 +161,7 @@ def trimmed(values: Sequence[Fraction | int]) -> tuple[Fraction | int, ...]:
     return tuple(values[: 1 + max(k for k, value in enumerate(values) if value)])
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("realization", ["df2t", "delta"])
 def test_gain_at_zero_frequency_is_exactly_one(realization: str) -> None:
     quantized = plain(butterworth(5, 0.02), realization)
@@ -200,6 +201,7 @@ def test_delta_gives_both_states_the_same_scale(kind: str, cutoff: float, operat
     assert 0.5 < sizes["t1"] / sizes["t2"] < 2
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("realization", ["df2t", "delta"])
 @pytest.mark.parametrize("row", [(0.0, 0.02, 0.01, 1.0, -1.8, 0.83), (0.0, 0.05, 0.0, 1.0, -0.95, 0.0)])
 def test_output_without_the_newest_input(row: Row, realization: str) -> None:
@@ -214,7 +216,7 @@ def test_output_without_the_newest_input(row: Row, realization: str) -> None:
     quantized.datapath.compute_exact(codes[6000:9000])
 
 
-@pytest.mark.sweep(3)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("realization", ["df2t", "delta"])
 @pytest.mark.parametrize(
     "row",

@@ -48,7 +48,7 @@ def hardware_in(architecture: str, example: str = "audio_lowpass.toml", *, clock
     return design_core(replace(spec, hardware=hardware))
 
 
-@pytest.mark.sweep(5)
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("realization", EXACT)
 @pytest.mark.parametrize("example", ["audio_lowpass.toml", "flange_wear_bench.toml"])
 def test_the_same_constants_make_the_same_design(example: str, realization: str) -> None:
@@ -58,6 +58,7 @@ def test_the_same_constants_make_the_same_design(example: str, realization: str)
     assert again.budget == made.budget
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("ratio", ["0.5", "0.95", "1.3", "2"])
 def test_another_cutoff_is_loadable_within_the_same_bound(ratio: str) -> None:
     hardware = hardware_in("folded")
@@ -99,6 +100,7 @@ def sets_of(hardware: CoreDesign) -> list[OtherSet]:
     return [other_set(hardware, ideal=moved(hardware, "1.3")), other_set(hardware, polynomial=scaled)]
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("example", ["audio_lowpass.toml", "flange_wear_bench.toml"])
 def test_a_program_takes_over_at_any_sample(example: str) -> None:
     """The interpreter with programs exchanged over the same memory computes what the swapping model does."""
@@ -156,6 +158,7 @@ def test_another_structure_is_refused() -> None:
         other_set(bench, polynomial=steeper)
 
 
+@pytest.mark.slow
 def test_a_program_that_has_no_room_is_refused() -> None:
     spec = hardware_in("folded").spec
     tight = design_core(replace(spec, hardware=replace(spec.hardware, reload=False)))
@@ -195,7 +198,7 @@ def test_fingerprints_tell_hardware_apart_and_not_constants() -> None:
 # Swaps.
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("ratio", ["0.8", "1.2"])
 @pytest.mark.parametrize("example", ["audio_lowpass.toml", "flange_wear_bench.toml"])
 def test_a_cutoff_a_fifth_away_may_be_swapped_to(example: str, ratio: str) -> None:
@@ -332,6 +335,7 @@ def test_a_calibration_brings_its_range_along(tmp_path: Path) -> None:
     assert check_swap(hardware, own_set(hardware), made).samples > 0
 
 
+@pytest.mark.slow
 def test_the_parallel_architecture_judges_by_its_own_range(tmp_path: Path) -> None:
     hardware = hardware_in("parallel", "flange_wear_bench.toml")
     assert hardware.spec.calibration is not None

@@ -53,6 +53,7 @@ def during(made: CoreDesign, active: Quantized, other: Quantized) -> Datapath:
     return with_ranges(other.datapath, [*[{}] * before, held_codes(other, held), *found, {}])
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("example", ["audio_lowpass", "flange_wear_bench"])
 def test_nothing_leaves_its_range_whatever_is_held(example: str) -> None:
     """First samples, and all others, at the ends of the codes: before, during and after swaps there and back."""
@@ -109,6 +110,7 @@ def test_first_samples_stay_on_their_side_of_zero() -> None:
     assert first_samples(plain_filter) == samples_of(plain_filter)
 
 
+@pytest.mark.slow
 def test_the_error_of_a_set_counts_first_samples_of_others() -> None:
     """If its gain at zero frequency is off by a rounding, and they may lie further away than its own."""
     spec = load(EXAMPLES / "flange_wear_bench.toml")

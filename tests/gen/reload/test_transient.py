@@ -37,7 +37,7 @@ def swapped(active: Quantized, other: Quantized, during: Datapath) -> None:
         compute_swapping(active.datapath, [(swap, during)], way)
 
 
-@pytest.mark.sweep(5)
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("ratio", RATIOS)
 @pytest.mark.parametrize("realization", REALIZATIONS)
 def test_nothing_leaves_the_ranges_that_are_proven_for_a_swap(realization: str, ratio: str) -> None:
@@ -68,6 +68,7 @@ def test_a_swap_to_the_same_set_needs_hardly_more_than_the_set() -> None:
                 assert high - low <= 1.01 * (node.high - node.low) + 2 * 2.0**node.frac
 
 
+@pytest.mark.slow
 def test_a_transient_ends_when_it_is_said_to() -> None:
     """After it, the swapped run is within two rounding bounds of one that had the new set from the beginning."""
     active, other = sets("df1_ef2", "0.8")
@@ -83,7 +84,7 @@ def test_a_transient_ends_when_it_is_said_to() -> None:
     assert difference[: length // 8].max() > 100 * most
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("realization", ["df1_ef2", "df2t", "delta", "normal"])
 def test_a_transient_lasts_as_long_as_the_states_are_remembered(realization: str) -> None:
     """Until the old states have faded, and then for as many samples as a section has states; but hardly longer."""

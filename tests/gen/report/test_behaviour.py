@@ -177,6 +177,7 @@ def test_the_histogram_says_how_many_errors_rounding_the_output_explains() -> No
     assert " More than 99 % of the samples" in histogram_caption(changed(run, hardware=moved))
 
 
+@pytest.mark.slow
 def test_errors_have_one_unit(words: str) -> None:
     """A limit of 200 nm sets it for tile, legend and tables."""
     assert "122 nm" in words

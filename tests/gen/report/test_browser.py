@@ -63,6 +63,7 @@ def _accuracy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(("width", "dark"), [(390, False), (1200, False), (1200, True)])
 def test_comparison(tab: Tab, comparison: Path, width: int, dark: bool) -> None:
     tab.show(comparison, width, dark=dark)
@@ -70,6 +71,7 @@ def test_comparison(tab: Tab, comparison: Path, width: int, dark: bool) -> None:
     assert tab.is_quiet(comparison)
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(("width", "dark"), [(390, False), (1200, False), (1200, True)])
 def test_report(tab: Tab, accuracy: Path, width: int, dark: bool) -> None:
     tab.show(accuracy, width, dark=dark)
@@ -138,6 +140,7 @@ def move(tab: Tab, kind: str, x: float, y: float) -> None:
     tab.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1, clickCount=1)
 
 
+@pytest.mark.slow
 def test_on_paper_everything_is_unfolded_and_the_viewer_is_a_picture(tab: Tab, accuracy: Path) -> None:
     """With the script and without it."""
     for scripted in (True, False):

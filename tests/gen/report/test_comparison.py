@@ -266,7 +266,6 @@ def test_reports_of_earlier_versions_need_not_tell_their_architecture() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.sweep(1)
 @pytest.mark.parametrize("extreme", [5e-324, 1e-300, 1e300])
 def test_extreme_errors_are_drawn(extreme: float) -> None:
     """Nothing warns that the labels of an axis have no room; warnings are errors here."""
@@ -444,6 +443,7 @@ class Words(HTMLParser):
         self.words.append(data)
 
 
+@pytest.mark.slow
 def test_page() -> None:
     content = comparison_page([report(), report(**PLAIN)])
     assert content == comparison_page([report(), report(**PLAIN)])
@@ -476,6 +476,7 @@ def test_page_beside_a_baseline() -> None:
     assert "largest error: 130 nm instead of 120 nm (+8.33 %), 5% allowed." in content
 
 
+@pytest.mark.slow
 def test_a_filter_that_cannot_be_drawn_is_left_out() -> None:
     rows = {"ideal_sos": [[1e12, 0, 0, 1e-12, 0, 0]], "quantized_sos": [[0] * 6]}
     content = comparison_page([report(), report(**{"curves.filter": {"sample_rate": 100.0, **rows}})])

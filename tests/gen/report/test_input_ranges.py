@@ -31,7 +31,7 @@ def _report(design: sosmith.Design, trace: object, folder: Path) -> sosmith.Repo
     return design.simulate(trace, folder=folder, simulator="icarus", idle=0, stall=0)  # type: ignore[arg-type]
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["arrays", "file"])
 def test_a_trace_that_was_clipped_does_not_pass(design: sosmith.Design, tmp_path: Path, form: str) -> None:
     values, file = 5 * TONE, tmp_path / "loud.csv"

@@ -81,7 +81,7 @@ def build(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
 # the summary
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 def test_summary_has_the_keys_of_the_contract(built: tuple[str, Path, dict[str, Any]]) -> None:
     """CONTRACT.md, section "The report"."""
     _, directory, _ = built
@@ -485,6 +485,7 @@ def test_same_evidence_gives_the_same_bytes(built: tuple[str, Path, dict[str, An
         assert (tmp_path / name).read_bytes() == (directory / name).read_bytes()
 
 
+@pytest.mark.sweep(1)
 def test_page_needs_nothing_from_elsewhere(built: tuple[str, Path, dict[str, Any]]) -> None:
     content = (built[1] / "report.html").read_text(encoding="utf-8")
     page = Page(content)
@@ -598,6 +599,7 @@ def test_page_shows_what_rounding_keeps_up() -> None:
     assert "What rounding can keep up by itself" not in page_of(plain())
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("off", [1e-6, -1e-6])
 def test_a_delay_beyond_all_bounds_is_not_framed(off: float) -> None:
     """A zero that rounding has moved off z = -1 delays the nothing that is left at Nyquist by any time at all."""

@@ -74,7 +74,7 @@ def test_every_option_and_every_architecture_is_there() -> None:
     assert {pair for pair in beside if pair not in pairs} == same_key
 
 
-@pytest.mark.sweep(25)
+@pytest.mark.sweep(10)
 @pytest.mark.parametrize(
     "pair", combinations(), ids=lambda pair: "-".join(filter(None, (pair.row, pair.beside, pair.option)))
 )

@@ -18,6 +18,7 @@ def test_a_lock_without_anything_to_load_is_refused() -> None:
         specified(PLAIN + "hardware.reload_lock = true\n")
 
 
+@pytest.mark.slow
 def test_hardware_registers_and_certificate_have_it() -> None:
     plain, locked = (
         generated(design_core(specified(PLAIN + KEYS + more))) for more in ("", "hardware.reload_lock = true\n")

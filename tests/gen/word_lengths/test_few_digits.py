@@ -63,6 +63,7 @@ def test_neighbours_with_fewer_digits(exact: float) -> None:
     assert min(found) < exact < max(found)
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(("multipliers", "chosen"), [(None, "folded"), (1, "folded"), (0, "parallel")])
 def test_without_multipliers_nothing_is_folded(multipliers: int | None, chosen: str) -> None:
     """Within 100 clocks a sample, folded is the smallest that keeps up; serial does not."""

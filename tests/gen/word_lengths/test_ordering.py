@@ -113,6 +113,7 @@ def check(sections: list[NoisySection], scale: Norm, noise: Norm, *, pairing: bo
     assert costs[worst.order] == pytest.approx(worst.cost, rel=1e-9)
 
 
+@pytest.mark.sweep(12)
 @pytest.mark.parametrize("scale", NORMS)
 @pytest.mark.parametrize("feedback", [0, 2])
 @pytest.mark.parametrize("order", range(1, 9))
@@ -196,6 +197,7 @@ def test_a_bad_order_is_changed_and_a_good_one_kept() -> None:
     assert chosen == pytest.approx(min(costs.values()), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_the_word_lengths_are_chosen_in_the_better_order() -> None:
     rows = sorted(map(tuple, signal.cheby1(8, 0.5, 0.05, fs=1.0, output="sos").tolist()), key=lambda row: -row[5])
     ideal = with_rows(butterworth_filter(2, 0.1), rows)

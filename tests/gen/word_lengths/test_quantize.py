@@ -46,7 +46,7 @@ def case(name: str, realization: str) -> Any:
     return pytest.param(name, realization, marks=[pytest.mark.slow] if long else [])
 
 
-@pytest.mark.sweep(8)
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize(("name", "realization"), [case(*each) for each in product(ALL, SECTIONS)])
 def test_examples_stay_within_their_bound(name: str, realization: str) -> None:
     design = example_design(name, realization=realization)
@@ -76,7 +76,7 @@ CASES = [
 with twelve poles next to z = 1, whose peak gains take minutes a design."""
 
 
-@pytest.mark.sweep(4)
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(("kind", "order", "cutoff", "realization"), CASES)
 def test_designs_stay_within_their_bound(kind: str, order: int, cutoff: float, realization: str) -> None:
     quantized = plain(butterworth(order, cutoff, kind), realization)
@@ -85,6 +85,7 @@ def test_designs_stay_within_their_bound(kind: str, order: int, cutoff: float, r
     quantized.datapath.compute_exact(codes[6000:9000])  # raises if a value leaves its range
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("core", ["filter", "calibration", "instrument"])
 def test_parts_of_the_instrument(core: str) -> None:
     quantized = example_design("flange_wear_bench.toml", core=core).quantized
@@ -94,6 +95,7 @@ def test_parts_of_the_instrument(core: str) -> None:
     assert quantized.datapath.compute(codes[:2000]).tolist() == quantized.datapath.compute_exact(codes[:2000])
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("inputs", "output"),
     [
@@ -132,6 +134,7 @@ def test_feedback_without_new_widths() -> None:
     after.datapath.compute_exact(codes[:20000])
 
 
+@pytest.mark.slow
 def test_given_sections_of_an_elliptic_filter() -> None:
     sos = signal.ellip(6, 0.2, 60, 0.01, fs=1.0, output="sos")
     ideal = with_rows(butterworth(2, 0.1), sos)
@@ -146,7 +149,7 @@ INTEGER_ROWS = {
 }
 
 
-@pytest.mark.sweep(3)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("realization", CASCADES)
 @pytest.mark.parametrize("name", INTEGER_ROWS)
 def test_a_section_of_whole_numbers_rounds_nothing(name: str, realization: str) -> None:
@@ -189,7 +192,7 @@ LOWPASS = ("0.1", "0", "0", "1", "-0.9", "0")
 ONE_LATER, TWO_LATER = ("0", "1", "0", "1", "0", "0"), ("0", "0", "1", "1", "0", "0")
 
 
-@pytest.mark.sweep(10)
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize("realization", CASCADES)
 @pytest.mark.parametrize(
     "rows",

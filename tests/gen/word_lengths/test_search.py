@@ -97,7 +97,7 @@ def ideal_coefficients(planned: Plan) -> list[dict[str, Fraction]]:
 # What the estimates are worth.
 
 
-@pytest.mark.sweep(6)
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("realization", CASCADES)
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_what_is_estimated_is_what_is_proven(name: str, realization: str) -> None:
@@ -125,7 +125,7 @@ def test_the_largest_error_is_that_of_the_worst_input(ends: tuple[float, float],
     assert largest_magnitude(response, [ends]) == max(0, *tops, *-bottoms)
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("realization", ["df1", "df1_ef1", "df1_ef2"])
 def test_bits_dropped_from_an_operand_of_inputs_alone_are_not_free(realization: str) -> None:
     """In a band-pass of direct form I, b0 multiplies a difference of two inputs, whose bits are worth something."""
@@ -196,7 +196,7 @@ def shorter(planned: Plan) -> Iterator[tuple[str, Choice]]:
         yield "input stage", replace(choice, input_stage=choice.input_stage + 1)
 
 
-@pytest.mark.sweep(12)
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize("realization", CASCADES)
 @pytest.mark.parametrize(("kind", "order", "cutoff"), FILTERS)
 def test_no_further_step_both_fits_and_saves(kind: str, order: int, cutoff: float, realization: str) -> None:
@@ -209,6 +209,7 @@ def test_no_further_step_both_fits_and_saves(kind: str, order: int, cutoff: floa
     ] == []
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_no_further_step_is_left_where_a_calibration_comes_first(name: str) -> None:
     trimmed, made = trimmed_and_proven(name, "df1_ef2")
@@ -231,6 +232,7 @@ def test_coefficients_are_neighbours_of_the_ideal(name: str, realization: str) -
             assert abs(integer - exact[label] * 2**frac) < 1
 
 
+@pytest.mark.slow
 def test_coefficients_differ_in_width_and_are_not_all_the_nearest() -> None:
     further = 0
     for name in FAST:
@@ -246,6 +248,7 @@ def test_coefficients_differ_in_width_and_are_not_all_the_nearest() -> None:
     assert further
 
 
+@pytest.mark.slow
 def test_long_operands_are_cut_to_fit_a_multiplier() -> None:
     """Tap sums of a low-pass at a low cutoff are longer than a multiplier takes, each of which costs a second one."""
     _, made = trimmed_and_proven("flange_wear_locomotive.toml", "df1_ef2")
@@ -268,7 +271,7 @@ def test_the_gain_at_zero_frequency_stays_exactly_one(order: int, cutoff: float,
         assert sum(model.transfer) == sum(model.denominator)
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("realization", CASCADES)
 def test_the_same_words_are_found_again(realization: str) -> None:
     first, second = (filter_plan("bandpass", 2, 0.1, realization).trimmed() for _ in range(2))
@@ -346,13 +349,14 @@ def count_fallbacks(monkeypatch: pytest.MonkeyPatch) -> list[Plan]:
     return seen
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("realization", CASCADES)
 def test_words_that_fit_need_no_second_way(realization: str, fallbacks: list[Plan]) -> None:
     prove(filter_plan("lowpass", 5, 0.02, realization).trimmed())
     assert fallbacks == []
 
 
-@pytest.mark.sweep(3)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("realization", CASCADES)
 def test_an_estimate_that_is_too_low_is_made_up_for(
     realization: str, fallbacks: list[Plan], monkeypatch: pytest.MonkeyPatch
@@ -377,7 +381,7 @@ def unstable(choice: Choice) -> Choice:
     )
 
 
-@pytest.mark.sweep(4)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("realization", CASCADES)
 @pytest.mark.parametrize("spoilt", [too_short, unstable])
 def test_a_search_that_finds_no_good_words_is_done_without(

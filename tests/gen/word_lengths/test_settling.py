@@ -23,6 +23,7 @@ def remains(made: Quantized, samples: int) -> float:
     return reach * float(np.abs(response[samples:]).sum())
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("realization", ["df1_ef2", "df2t", "state_space", "lattice_wdf"])
 @pytest.mark.parametrize(("order", "cutoff"), [(1, 0.1), (3, 0.02)])
 def test_covers_what_any_past_could_change(order: int, cutoff: float, realization: str) -> None:
@@ -32,6 +33,7 @@ def test_covers_what_any_past_could_change(order: int, cutoff: float, realizatio
     assert remains(made, samples // 2) > float(SETTLED)
 
 
+@pytest.mark.slow
 def test_a_constant_input_has_settled_by_then() -> None:
     """From 2,000 random starts: afterwards the result is that of a filter which has run for ever."""
     design = zero_design("flange_wear_bench.toml")
@@ -47,6 +49,7 @@ def test_a_constant_input_has_settled_by_then() -> None:
     assert error[samples // 2 : samples].max() > float(made.bound + SETTLED)
 
 
+@pytest.mark.slow
 def test_the_manifest_has_it_in_samples_and_seconds() -> None:
     design = zero_design("flange_wear_bench.toml")
     tree = manifest(core_facts(design))

@@ -14,6 +14,7 @@ from sosmith.hdl.plan.streams import fields, width
 from sosmith.model.port import Port
 
 
+@pytest.mark.sweep(6)
 @pytest.mark.parametrize("ready", [0.0, 0.2, 0.5, 0.9, 1.0])
 @pytest.mark.parametrize("valid", [0.3, 1.0])
 def test_nothing_is_lost_and_payload_is_stable(valid: float, ready: float) -> None:

@@ -89,6 +89,7 @@ def board(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Both]:
         yield Both(line, design)
 
 
+@pytest.mark.slow
 def test_before_a_session_nothing_is_answered_but_open(board: Both) -> None:
     for number in (0, 1, 255):
         assert board.line.call(Message(Type.COUNTERS, number).frame, SILENCE).data == b""

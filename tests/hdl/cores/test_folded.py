@@ -106,6 +106,7 @@ def test_every_sample_at_any_pace(serial: bool, channels: int, protect: str, pro
     simulate(dut, testbench)
 
 
+@pytest.mark.slow
 def test_a_result_waits_for_longer_than_the_next_sample_takes() -> None:
     """Its code and its flags stay, though the next sample has begun."""
     datapath = mixer()
@@ -279,6 +280,7 @@ def loading(version: int, words: list[int]) -> list[tuple[Register, int]]:
     return [(VERSION, version), *((DATA, word) for word in words), (CRC, crc_of(version, words))]
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(("channels", "count"), [(1, 33), (3, 40)])
 def test_the_scrubber_mends_all_words_while_the_core_waits(channels: int, count: int) -> None:
     """One bit of every word of both memories at a time, also the last instruction and words that are not used."""
@@ -310,7 +312,7 @@ def test_the_scrubber_mends_all_words_while_the_core_waits(channels: int, count:
     simulate(dut, testbench)
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("name", "serial", "protect"),
     [

@@ -50,7 +50,7 @@ def expected(made: Architecture, codes: np.ndarray) -> list[tuple[int, int]]:
     return [result for result in once for _ in range(made.copies_per_result)]
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("name", "before"), [*((name, name) for name in ARCHITECTURES), ("folded", "parallel"), ("parallel", "folded")]
 )

@@ -156,7 +156,7 @@ BROKEN = [
 ]
 
 
-@pytest.mark.sweep(3)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(("right", "wrong"), [pytest.param(*case, id=subject) for subject, *case in BROKEN])
 def test_what_is_broken_is_found(right: str, wrong: str) -> None:
     made = decimator(4, 3, 6)

@@ -62,7 +62,7 @@ def expected(made: Architecture, samples: list[tuple[int, list[int]]]) -> list[t
     return results
 
 
-@pytest.mark.sweep(3)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("name", "before", "core"),
     [
@@ -84,7 +84,7 @@ def test_results_equal_the_model(name: str, before: str, core: str, hold: bool) 
     assert run_core(made, samples, Pace(idle=0.1, stall=0.9), results=len(wanted)) == wanted
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("name", "before", "core"),
     [
@@ -118,7 +118,7 @@ BROKEN = [
 ]
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(("right", "wrong"), [pytest.param(*case, id=subject) for subject, *case in BROKEN])
 def test_what_is_broken_is_found(right: str, wrong: str, monkeypatch: pytest.MonkeyPatch) -> None:
     made = made_in("folded", "parallel")

@@ -69,7 +69,7 @@ def test_a_filter_that_starts_from_zero() -> None:
     check(audio("df1_ef1", "zero"), 60, Pace())
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(("kind", "order"), [("lowpass", 1), ("lowpass", 2), ("highpass", 3), ("highpass", 5)])
 def test_other_filters(kind: str, order: int) -> None:
     check(made(kind, order), 100, Pace())
@@ -134,7 +134,7 @@ def after_reset(dut: Any, codes: list[list[int]], clock: int) -> list[int]:
     return results
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("clock", [50, 53, 61, 75])
 def test_a_reset_of_one_clock_leaves_nothing_behind(clock: int) -> None:
     datapath = audio("df1_ef1", "zero").datapath
@@ -157,6 +157,7 @@ def test_what_a_reset_leaves_behind_is_found(monkeypatch: pytest.MonkeyPatch) ->
     assert any(results != datapath.compute_exact(codes) for results in found)
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("bits", [16, 24])
 def test_a_very_low_cutoff_takes_no_more_clocks(bits: int) -> None:
     """By area alone, its sections would get inputs of more fraction bits than outputs: 9 clocks, and fewer units."""
@@ -196,7 +197,7 @@ FAULTS = {
 }
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", FAULTS.values(), ids=FAULTS)
 def test_a_fault_is_found(fault: tuple[str, str], monkeypatch: pytest.MonkeyPatch) -> None:
     wrong: ModuleType = broken(cascade, *fault)

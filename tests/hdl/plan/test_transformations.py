@@ -45,6 +45,7 @@ def samples(graph: Graph, seed: int) -> list[list[int]]:
     return [[rng.randint(low, high) for _, low, high in graph.input_ranges] for _ in range(SAMPLES)]
 
 
+@pytest.mark.sweep(8)
 @pytest.mark.parametrize("seed", range(25))
 def test_rewritten_graphs_give_the_same_codes(seed: int) -> None:
     graph = random_graph(seed)

@@ -69,6 +69,7 @@ def share_held(made: BayesianFit, seed: int) -> float:
     return float(np.mean(off <= made.posterior.half_width(V, T, curve, SHARE)))
 
 
+@pytest.mark.slow
 def test_intervals_hold_below_the_rail_and_nothing_is_calibrated_beyond(monkeypatch: pytest.MonkeyPatch) -> None:
     held, taken_for_readings = [], []
     for seed in (1, 3, 5):

@@ -300,6 +300,7 @@ def test_what_is_in_the_store_stays_as_it_is(
     connection.close()
 
 
+@pytest.mark.slow
 def test_10000_measurements_are_refitted(store: MeasurementStore, tmp_path: Path) -> None:
     add(store, "left", batch(tmp_path, "a.csv", 10_000, scatter=0.3), DAY)
     made = refit(store, "left", DAY, required_r=0.99)
@@ -342,6 +343,7 @@ def tables_of(path: Path) -> dict[str, list[tuple[object, ...]]]:
         return {name: sorted(row[1:] for row in connection.execute(f"PRAGMA table_info({name})")) for name in names}
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("version", [1, 2])
 def test_an_older_store_is_brought_up_to_date(tmp_path: Path, version: int) -> None:
     with open_store(tmp_path / "made.db", create=True) as store:

@@ -65,6 +65,7 @@ def ours(part: Part, quantity: str) -> float:
     return float(value)
 
 
+@pytest.mark.slow
 def test_everything_that_differs_is_explained(parts: dict[str, Part]) -> None:
     assert [part.title for part in parts.values() for c in part.comparisons if c.explanation == UNEXPLAINED] == []
 
@@ -221,6 +222,7 @@ CHANGES = [
 ]
 
 
+@pytest.mark.sweep(6)
 @pytest.mark.parametrize(("table", "name", "index", "title"), CHANGES)
 def test_a_wrong_figure_in_the_data_changes_a_label(
     parts: dict[str, Part], table: str, name: str, index: int | None, title: str

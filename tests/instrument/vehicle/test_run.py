@@ -46,6 +46,7 @@ def test_a_run_lasts_until_the_first_wheelset_is_at_the_end(motion: Motion) -> N
         assert values.shape[0] == 3051
 
 
+@pytest.mark.slow
 def test_motion_begins_and_ends_at_rest(motion: Motion) -> None:
     for name in ("wheelset_lateral", "frame_lateral", "body_lateral", "frame_vertical", "body_vertical"):
         values = getattr(motion, name)
@@ -150,6 +151,7 @@ def test_forces_balance_in_a_long_curve(steady: tuple[Motion, int]) -> None:
     assert (wheelset_positions(GIVEN.layout) @ lateral + moment.sum()) / wanted == pytest.approx(0, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_creep_force_is_kalkers(steady: tuple[Motion, int]) -> None:
     """By the creepages of one wheel in the long curve."""
     found, k = steady
@@ -433,6 +435,7 @@ def test_flanges_and_friction_hold_the_vehicle_in_its_curve(ridden: tuple[Track,
     assert 0.3 < quotient < limits(GIVEN, track, found).nadal
 
 
+@pytest.mark.slow
 def test_wheel_loads_carry_weight_and_overturning_moment(ridden: tuple[Track, Motion]) -> None:
     """The moments of all masses about the track, and of the springs' static loads under masses that roll."""
     _, found = ridden

@@ -107,6 +107,7 @@ def test_a_design_leads_to_its_report(tab: Tab, page: Path) -> None:
     assert set(reports) == {"designs/0/report.html"}
 
 
+@pytest.mark.slow
 def test_on_paper_nothing_is_folded_up(tab: Tab, page: Path) -> None:
     tab.show(page, 1200)
     tab.call("Emulation.setEmulatedMedia", media="print")

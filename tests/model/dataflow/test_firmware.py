@@ -24,6 +24,7 @@ def written(datapath: Datapath, folder: Path) -> str:
     return datapath.name
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("example", ["audio_lowpass", "flange_wear_bench"])
 def test_no_conversion_is_left_to_the_compiler(example: str, tmp_path: Path) -> None:
     datapath = example_design(f"{example}.toml").datapath
@@ -65,6 +66,7 @@ def test_the_page_shows_the_figures_recorded() -> None:
 CHECKED = ["-fsanitize=undefined", "-fno-sanitize-recover=all", "-Wno-unused-function"]
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("small", [False, True], ids=["", "16 bits by 16 bits"])
 @pytest.mark.parametrize("name", ["audio_lowpass", "flange_wear_bench", "flange_wear_locomotive"])
 def test_nothing_is_left_undefined_and_the_codes_are_those_of_the_graph(name: str, small: bool, tmp_path: Path) -> None:

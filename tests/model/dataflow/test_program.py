@@ -55,7 +55,7 @@ def run(made: Program, datapath: Datapath, codes: np.ndarray) -> list[int]:
     return [min(max(code, datapath.output.lowest), datapath.output.highest) for code in given_out]
 
 
-@pytest.mark.sweep(20)
+@pytest.mark.sweep(6)
 @pytest.mark.parametrize("digit_bits", [8, 15, 17])
 @pytest.mark.parametrize("realization", FOLDABLE)
 @pytest.mark.parametrize("example", ALL)
@@ -95,6 +95,7 @@ def test_what_is_read_was_stored_long_enough_before(realization: str, products: 
     assert made.instructions[-1].opcode is Opcode.GIVE
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("digit_bits", [15, 17])
 @pytest.mark.parametrize("example", ["audio_lowpass.toml", "flange_wear_bench.toml"])
 def test_two_products_a_clock_compute_the_same_in_fewer_clocks(example: str, digit_bits: int) -> None:
@@ -196,6 +197,7 @@ def test_a_constant_cannot_be_folded() -> None:
         program(datapath, 15)
 
 
+@pytest.mark.slow
 def test_truncation_cannot_be_folded() -> None:
     datapath = example_design("audio_lowpass.toml", realization="normal").datapath
     with pytest.raises(FoldingError, match=r"^the datapath must not truncate inside to be folded$"):

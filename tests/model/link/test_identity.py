@@ -118,6 +118,7 @@ def test_keys_of_later_versions_are_left_out() -> None:
     assert read(tree() | {"later": [1, {"a": 2}]}) == read(tree())
 
 
+@pytest.mark.slow
 @given(st.recursive(st.none() | st.floats() | st.integers() | st.text(), st.lists), st.data())
 @settings(max_examples=40)
 def test_past_the_gate_everything_can_be_shown_and_computed(value: Any, data: st.DataObject) -> None:

@@ -51,6 +51,7 @@ def test_section_computes_its_difference_equation(feedback: int) -> None:
         assert [code * scale_y for code in y] == ys[2:]
 
 
+@pytest.mark.slow
 def test_error_feedback_removes_the_dead_band() -> None:
     """THEORY section 6: a constant 1000 LSB disappears in a plain section, and comes through with feedback."""
     row = F7[1:2] if F7[0][5] == 0 else F7[:1]

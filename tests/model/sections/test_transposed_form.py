@@ -86,7 +86,7 @@ def test_section_computes_its_difference_equation(
     assert found == difference_equation(form, codes)
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("operator", [0, 1])
 def test_exact_states_make_the_direct_form_bit_for_bit(operator: int) -> None:
     """THEORY 3.5: keeping s1 and s2 exact, only y's quantizer is left, and its error is fed back as by (-2, 1)."""

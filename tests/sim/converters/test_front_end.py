@@ -158,7 +158,7 @@ def conversions(job: Case, seed: int = 1) -> list[list[list[int]]]:
     return [[values(job, n, channel, seed) for channel in range(job.channels)] for n in range(len(job.readings))]
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_codes_and_flags_are_those_of_the_model(name: str, tmp_path: Path) -> None:
     check(tmp_path / "run", CASES[name], conversions(CASES[name]))

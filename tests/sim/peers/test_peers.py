@@ -75,6 +75,7 @@ class OneMemory(FoldedCore):
         return super()._memory(m, check, (read[0][:bits], read[1]), (write[0][:bits], *write[1:]))
 
 
+@pytest.mark.slow
 def test_a_mixed_up_channel_is_noticed(tmp_path: Path) -> None:
     made = made_of("folded", "delta", 3)
     codes, order = stimulus(made, 6)

@@ -29,7 +29,6 @@ def worst(made: CoreDesign, kind: str, samples: int, folder: Path, simulator: st
 
 
 @pytest.mark.slow
-@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("lanes", "simulator"),
     [
@@ -56,7 +55,7 @@ def test_the_fastest_cores_hold_their_bound(kind: str, lanes: int, clock: str, s
     worst(designed(lanes, clock=clock), kind, 1 << 20, tmp_path, simulator)
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("lanes", "pipeline"), [(1, "look-ahead"), (2, "plain"), pytest.param(2, "look-ahead", marks=pytest.mark.slow)]
 )

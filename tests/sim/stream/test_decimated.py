@@ -55,7 +55,6 @@ def settling_of(made: CoreDesign) -> float:
 
 
 @pytest.mark.slow
-@pytest.mark.sweep(1)
 @without_pictures
 @pytest.mark.parametrize(
     ("architecture", "simulator"), [("folded", "icarus"), ("parallel", "verilator"), ("serial", "cxxrtl")]
@@ -80,7 +79,6 @@ def test_hardware_equals_the_integer_model(architecture: str, simulator: str, tm
 
 
 @pytest.mark.slow
-@pytest.mark.sweep(1)
 @without_pictures
 @pytest.mark.parametrize(("architecture", "simulator"), [("folded", "verilator"), ("parallel", "icarus")])
 def test_held_results_come_as_often_as_samples(architecture: str, simulator: str, tmp_path: Path) -> None:
@@ -97,7 +95,6 @@ def test_held_results_come_as_often_as_samples(architecture: str, simulator: str
 
 
 @pytest.mark.slow
-@pytest.mark.sweep(1)
 @pytest.mark.parametrize("hold", [False, True])
 def test_vectors_have_a_result_for_every_16th_sample(hold: bool, tmp_path: Path) -> None:
     """The last of three groups is not complete: its result is there, and as often as the others if it is held."""
@@ -127,6 +124,7 @@ def test_held_results_take_no_longer(tmp_path: Path) -> None:
     assert evidence.run.cycles == decimator.warm_up + 1 + last
 
 
+@pytest.mark.slow
 def test_results_come_at_the_rate_that_is_stated(tmp_path: Path) -> None:
     made = locomotive(architecture="folded")
     stated, decimator = made.architecture, made.datapath.decimator

@@ -113,6 +113,7 @@ def outcomes(tmp_path_factory: pytest.TempPathFactory) -> list[list[Any]]:
     return found_in(folder)
 
 
+@pytest.mark.slow
 def test_both_loops_agree_on_every_sample_clock_and_failure(outcomes: list[list[Any]]) -> None:
     assert len(outcomes) == len(cases())
     for case, (in_python, compiled) in zip(cases(), outcomes, strict=True):

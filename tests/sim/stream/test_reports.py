@@ -68,6 +68,7 @@ def check_all(report_of: Report, made: CoreDesign, samples: int, benches: set[st
             assert other | {key: first[key] for key in ("simulator", "tools")} == first, name
 
 
+@pytest.mark.slow
 def test_reports_are_equal(report_of: Report) -> None:
     check_all(report_of, made_in("folded", 2), 100, {"loop in Python", "CXXRTL"})
 

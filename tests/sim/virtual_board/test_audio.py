@@ -55,6 +55,7 @@ def expected(made: sosmith.Design, netlist: Netlist, codes: Codes) -> Codes:
     return np.concatenate([np.zeros((netlist.schedule.silent, codes.shape[1]), np.int64), words])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "clock",
     [pytest.param("ulx3s_25f", id="ULX3S"), pytest.param(24_576_000, id="exact", marks=pytest.mark.slow)],

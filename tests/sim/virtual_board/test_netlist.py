@@ -130,6 +130,7 @@ def test_the_line_is_busy_for_four_fifths_of_the_time(place: Path, monkeypatch: 
     assert useful >= 0.8 * clocks
 
 
+@pytest.mark.slow
 def test_damage_is_mended_and_counted(place: Path) -> None:
     made = filter_design().core
     codes = codes_for(made, 4000)

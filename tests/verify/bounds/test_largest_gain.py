@@ -44,6 +44,7 @@ def with_band(entry: DecimationEntry, band: int, **changes: Fraction) -> Decimat
     return entry.model_copy(update={"bands": tuple(bands)})
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("case", CASES)
 def test_claims_are_proven_and_others_rejected(case: Case) -> None:
     """A claim is at most a thousandth too high; two thousandths off are too much, both ways."""
@@ -59,6 +60,7 @@ def test_claims_are_proven_and_others_rejected(case: Case) -> None:
             check_bands(more, sections)
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("case", CASES)
 def test_claims_of_the_pass_band(case: Case) -> None:
     """They are of decimator and filter together; two thousandths off are too much, both ways."""

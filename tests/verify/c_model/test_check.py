@@ -285,6 +285,7 @@ def test_names_of_inputs_are_plain(name: str, model: Callable[[str], Model]) -> 
         forged.check(worn.source.replace("voltage_code", f"{name}_code"))
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("name", ["worn", "cascade", "decimated"])
 def test_random_changes_of_tokens_are_refused(name: str, model: Callable[[str], Model]) -> None:
     """Numbers, marks and names change places at random, or go: nothing of the kind computes the same."""

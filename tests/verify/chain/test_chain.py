@@ -57,7 +57,7 @@ def test_all_of_a_chain_is_proven(folder: Path) -> None:
     assert proof.bound <= proof.allowed
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "words",
     [
@@ -73,6 +73,7 @@ def test_words_of_the_whole_are_those_of_its_stages(words: dict[str, Any], tmp_p
     assert not proven(tmp_path).missing
 
 
+@pytest.mark.slow
 def test_a_filter_inside_a_mask_is_a_stage(tmp_path: Path) -> None:
     edges = {"passband_edge": 200.0, "stopband_edge": 900.0, "passband_loss": 1.0, "stopband_loss": 20.0}
     masked = {"name": "low", "kind": "iir", "family": "butterworth", "freedom": "mask", **edges}
@@ -258,6 +259,7 @@ def test_other_hardware_than_the_words_ask_for_is_refused(old: str, new: str, fo
         sosmith.ChainCertificate.load(folder / CERTIFICATE).verify(spec=path)
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("edge", [None, "1/40"])
 def test_another_pass_band_than_that_of_the_words_is_refused(edge: str | None, folder: Path) -> None:
     """What is claimed of it is true, of another band than the one that the specification states."""
@@ -313,6 +315,7 @@ def test_other_words_are_refused(folder: Path) -> None:
         proven(folder)
 
 
+@pytest.mark.slow
 def test_a_port_between_stages_that_limits_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each core is proven by itself; that nothing is limited between them is proven of the chain alone."""
     wide = chain_design._Budget._port

@@ -55,6 +55,7 @@ def test_each_variant_is_accepted(variant: dict[str, Any], depth: int) -> None:
     check_flags(module, claim)
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     "variant",
     [
@@ -107,6 +108,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_a_chain_from_zero_with_protection_and_registers_is_proven(written: Path) -> None:
     proof = sosmith.ChainCertificate.load(written / CERTIFICATE).verify(files=written, spec=written / "rx.toml")
     whole = {name for name, part in proof.scope.items() if part.state.value == "proven"}

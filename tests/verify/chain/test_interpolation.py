@@ -32,6 +32,7 @@ def folder(written: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(written, tmp_path / "copy"))
 
 
+@pytest.mark.slow
 def test_all_of_a_chain_that_interpolates_is_proven(folder: Path) -> None:
     proof = proven(folder)
     assert not proof.missing

@@ -47,6 +47,7 @@ def test_another_number_of_cores_is_refused() -> None:
         check(text, claim)
 
 
+@pytest.mark.slow
 def test_no_token_may_be_another_one() -> None:
     text, claim = pair(3, 8)
     refused = 0

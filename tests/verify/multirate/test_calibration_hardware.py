@@ -31,7 +31,7 @@ ENTERS = (
 )
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_a_decimator_behind_a_calibration_is_proven(case: Instrument) -> None:
     _, certificate = designed(case)

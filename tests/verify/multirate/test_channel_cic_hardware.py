@@ -108,7 +108,7 @@ BROKEN_AROUND = [
 ROUNDED = Case(signed=False, output_bits=9, cutoff=20, error=0.02, hold=False, architecture="folded", channels=2)
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [
@@ -122,7 +122,7 @@ def test_hardware_that_is_wrong_is_rejected(right: str, wrong: str, monkeypatch:
     check_rejected_as_made(ROUNDED)
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("right", "wrong"), [pytest.param(*case, id=subject) for subject, *case in BROKEN_AROUND])
 def test_wires_that_are_wrong_are_rejected(right: str, wrong: str, monkeypatch: pytest.MonkeyPatch) -> None:
     written(SMALL)  # what is right, before anything is broken
@@ -159,6 +159,7 @@ def test_sentences() -> None:
         check_decimator(written(SMALL._replace(channels=1)), designed(SMALL)[1], 2)
 
 
+@pytest.mark.slow
 def test_a_port_that_is_too_narrow_for_the_channel_is_rejected() -> None:
     text, (_, certificate) = written(CASES[4]), designed(CASES[4])
     (behind,) = re.findall(r"^module plain_behind\(.*?^endmodule$", text, re.MULTILINE | re.DOTALL)

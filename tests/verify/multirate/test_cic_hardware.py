@@ -33,7 +33,7 @@ CASES = [
 ]
 
 
-@pytest.mark.sweep(4)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(("case", "stages"), CASES)
 def test_a_decimator_is_proven(case: Case, stages: int) -> None:
     _, certificate = designed(case)
@@ -105,7 +105,7 @@ def test_sentences() -> None:
         check_decimator(text, other)
 
 
-@pytest.mark.sweep(5)
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(("right", "wrong"), [pytest.param(*case, id=subject) for subject, *case in BROKEN])
 def test_hardware_that_is_wrong_is_rejected(right: str, wrong: str, monkeypatch: pytest.MonkeyPatch) -> None:
     written(CASES[2][0])  # what is right, before anything is broken

@@ -31,7 +31,7 @@ CASES = [
 ]
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("case", CASES)
 def test_a_core_beside_a_decimator_is_proven(case: Case | Instrument) -> None:
     _, certificate = designed(case)

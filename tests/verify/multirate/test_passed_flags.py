@@ -14,7 +14,7 @@ ALL = f"{{ 5'h00, {WORD}[10:8] }}"
 IN_ORDER = "m_axis_tuser must have its flags from bit 0 on, each once, and zeros above"
 
 
-@pytest.mark.sweep(4)
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(
     ("wrong", "sentence"),
     [
@@ -36,6 +36,7 @@ def test_flags_that_are_wrong_are_rejected(wrong: str, sentence: str) -> None:
         check_decimator(text.replace(ALL, wrong), certificate)
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("right", "wrong", "sentence"),
     [
@@ -55,6 +56,7 @@ def test_flags_have_their_places(right: str, wrong: str, sentence: str) -> None:
         check_decimator(changed, certificate)
 
 
+@pytest.mark.slow
 def test_a_core_whose_output_is_never_limited_has_fewer_flags() -> None:
     case = Case(factor=4, architecture="folded", hold=False, bits=16, output_bits=18, wide=True, error=0.0001)
     text, (_, certificate) = written(case), designed(case)

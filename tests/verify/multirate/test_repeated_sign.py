@@ -14,7 +14,7 @@ FOLDED = Case(output_bits=12, hold=False, architecture="folded")
 UNSIGNED = Case(signed=False, output_bits=9, cutoff=20, error=0.02, hold=False)
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("case", "pattern", "wrong", "bits"),
     [

@@ -51,7 +51,7 @@ def check(core: Made, text: str = "") -> None:
     check_rings(text or core.text, core.certificate, core.item)
 
 
-@pytest.mark.sweep(3)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("hold", [False, True])
 @pytest.mark.parametrize("start", ["zero", "steady"])
 @pytest.mark.parametrize("channels", [1, 3])
@@ -101,6 +101,7 @@ def changed(text: str, pattern: str, by: str) -> str:
     return other
 
 
+@pytest.mark.sweep(4)
 @pytest.mark.parametrize(
     ("row", "bit"), [(0, 0), (0, 3), (1, 2), (1, 5), (1, 6), (2, 6), (2, 7), (2, 15), (3, 7), (3, 14)]
 )
@@ -115,6 +116,7 @@ def test_no_bit_of_a_step_is_free(row: int, bit: int) -> None:
         check(core, text)
 
 
+@pytest.mark.sweep(9)
 @pytest.mark.parametrize(("pattern", "by"), _ONE.values(), ids=_ONE)
 def test_what_is_changed_is_found(pattern: str, by: str) -> None:
     core = made()

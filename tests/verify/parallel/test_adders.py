@@ -17,6 +17,7 @@ def without_multipliers(realization: str, channels: int = 1) -> Made:
     return made(small_design(WITHOUT, realization), channels, blocks=Blocks(0))
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(
     ("realization", "channels"), [("df1_ef2", 1), ("df1", 2), ("state_space", 1), ("df2t", 3), ("lattice_wdf", 1)]
 )

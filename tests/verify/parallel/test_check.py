@@ -18,11 +18,13 @@ from sosmith.verify.parallel.check import check_hardware
 # What the generator writes is accepted.
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("name", ALL)
 def test_examples(name: str) -> None:
     accept(made(parallel_design(name, realization="df1_ef2")))
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("realization", SECTIONS)
 def test_every_realization(realization: str) -> None:
     accept(small(ODD if realization == "lattice_wdf" else PLAIN, realization))
@@ -34,6 +36,7 @@ def test_every_realization_behind_a_calibration(realization: str) -> None:
     accept(small(INSTRUMENT, realization))
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(("realization", "channels"), [("df1_ef1", 2), ("df1_ef1", 17), ("lattice_wdf", 5)])
 def test_several_channels(realization: str, channels: int) -> None:
     accept(small(ODD if realization == "lattice_wdf" else PLAIN, realization, channels))
@@ -365,6 +368,7 @@ def test_a_calibration_of_several_channels() -> None:
     assert sweep(core, 15, seed=8, clocks=200)["rejected"] > 7
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [20, pytest.param(60, marks=pytest.mark.slow)])
 def test_edits(count: int) -> None:
     found = sweep(small(), count, seed=1, clocks=200)

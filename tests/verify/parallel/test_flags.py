@@ -29,6 +29,7 @@ def stated(core: Made, **fields: Any) -> Made:
     return core._replace(certificate=core.certificate.model_copy(update={"about": about}))
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(("spec", "channels"), [(PLAIN, 1), (STEADY_INSTRUMENT + WORN, 1), (SEVERAL, 3)])
 def test_flags_are_proven(spec: str, channels: int) -> None:
     assert rejection(stated(core(spec, channels)), core(spec, channels).text) == ""
@@ -46,6 +47,7 @@ def test_other_codes_are_rejected() -> None:
         assert re.fullmatch(said, rejection(stated(worn, **fields), worn.text))
 
 
+@pytest.mark.slow
 def test_a_range_that_is_not_everything() -> None:
     """The core of a calibration that covers some codes only, as one that is fitted to measurements does."""
     plain = core(STEADY_INSTRUMENT)

@@ -122,6 +122,7 @@ def test_what_is_not_in_the_subset_is_refused(old: str, new: str, sentence: str)
         flattened(read_modules(text), "aclk")
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("channels", [1, 3])
 def test_the_reader_understands_what_icarus_does(channels: int, tmp_path: Path) -> None:
     core = small(channels=channels)

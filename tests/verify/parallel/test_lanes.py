@@ -33,13 +33,13 @@ def accept(core: Made) -> None:
     assert found.states == sum(len(stage.graph.delays) for stage in core.design.datapath.stages) > 0
 
 
-@pytest.mark.sweep(3)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("realization", REALIZATIONS)
 def test_every_realization(realization: str) -> None:
     accept(small(ODD if realization == "lattice_wdf" else PLAIN, realization, lanes=2))
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("spec", [STEADY, STEADY_INSTRUMENT, INSTRUMENT])
 def test_starts_and_a_calibration(spec: str) -> None:
     accept(small(spec, lanes=4))
@@ -49,6 +49,7 @@ def test_an_output_with_more_bits_than_the_input() -> None:
     accept(small(WIDE, "df1", lanes=2))
 
 
+@pytest.mark.slow
 def test_a_product_of_what_the_lane_before_takes_the_upper_bits_of() -> None:
     """The sum whose upper bits are y is computed to the bits that its range needs, not to those of all its operands."""
     core = made(design_core(specified(HIGH)), lanes=2)
@@ -78,6 +79,7 @@ def test_outputs_of_no_whole_bytes(bits: int, realization: str, lanes: int) -> N
     accept(small(with_output(bits), realization, lanes=lanes))
 
 
+@pytest.mark.slow
 def test_a_port_narrower_than_a_limited_sum() -> None:
     """Each word of the buffer is loaded for itself, and one of them with zeros only."""
     core = small(STEADY_INSTRUMENT, lanes=2)
@@ -192,7 +194,6 @@ def test_a_second_sample_moves_whether_another_one_comes_or_not() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.sweep(1)
 @pytest.mark.parametrize(("bits", "lanes", "count"), [(8, 2, 40), (12, 2, 20), (10, 2, 20), (12, 16, 2)], ids=str)
 def test_edits(bits: int, lanes: int, count: int) -> None:
     found = sweep(small(with_output(bits), lanes=lanes), count, seed=4, clocks=150)

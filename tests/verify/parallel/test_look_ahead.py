@@ -28,7 +28,6 @@ def test_an_example(lanes: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("spec", "lanes"),
     [(PLAIN, 1), (NARROW, 1), (STEADY, 2), (STEADY_INSTRUMENT, 1), pytest.param(INSTRUMENT, 4, marks=pytest.mark.slow)],
@@ -118,6 +117,7 @@ def test_each_kind_of_break_is_named(kind: str) -> None:
     assert re.fullmatch(sentence, rejection(core, text)), rejection(core, text)
 
 
+@pytest.mark.slow
 def test_a_dozen_edits() -> None:
     found = sweep(looking_ahead(FIRST_ORDER), 12, seed=6, clocks=300)
     assert found["accepted"] + found["rejected"] == 12

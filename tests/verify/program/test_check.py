@@ -28,7 +28,7 @@ LOCOMOTIVE = "flange_wear_locomotive.toml"
 # What the generator writes is accepted.
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("architecture", ["folded", "serial"])
 @pytest.mark.parametrize("name", ALL)
 def test_examples(name: str, architecture: str) -> None:
@@ -42,7 +42,7 @@ def test_examples(name: str, architecture: str) -> None:
     assert verdict.states > 5
 
 
-@pytest.mark.sweep(8)
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("architecture", ["folded", "serial"])
 @pytest.mark.parametrize("realization", FOLDABLE)
 @pytest.mark.parametrize("spec", [PLAIN, INSTRUMENT], ids=["plain", "instrument"])
@@ -59,7 +59,7 @@ def test_channels_have_one_program(architecture: str) -> None:
     )
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("realization", "start"), [("delta", "zero"), ("df2t", "steady")])
 def test_a_state_that_is_always_zero(realization: str, start: str) -> None:
     """As that of a section whose rounded poles cancel its zeros: what it takes over is like no node but a zero."""
@@ -71,7 +71,7 @@ def test_a_state_that_is_always_zero(realization: str, start: str) -> None:
     assert core.check().instructions == len(core.program.instructions)
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("realization", ["delta", "df2t"])
 def test_a_slow_filter(realization: str) -> None:
     """Its last states are 0 for a long time, and cannot be told apart until then."""
@@ -109,7 +109,7 @@ NOTHING = re.sub(
 ).replace('"faithful"', "0.5")
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("start", ["zero", "steady"])
 @pytest.mark.parametrize("realization", ["df1", "df1_ef1"])
 def test_a_section_that_does_nothing(realization: str, start: str) -> None:
@@ -159,6 +159,7 @@ def test_a_wrong_coefficient_is_named() -> None:
         core.check(text)
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("opcode", "field", "sentence"),
     [

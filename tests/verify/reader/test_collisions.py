@@ -25,6 +25,7 @@ def test_what_is_marked_is_read() -> None:
     assert not any(module.unchecked for module in read_source(parallel(channels=3).text, "plain").modules.values())
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("memory", ["v1_memory", "x1_memory", "x2_memory"])
 def test_a_state_that_is_read_as_it_is_written_must_not_be_marked(memory: str) -> None:
     """Which states these are depends on the schedule: x1 takes over its input at once."""

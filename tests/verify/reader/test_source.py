@@ -20,7 +20,7 @@ def plain(text: str) -> str:
     return re.sub(r"\n(, |\);)", r"\1", "\n".join(lines) + "\n")
 
 
-@pytest.mark.sweep(3)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("kind", CORES)
 def test_what_is_read_is_printed_as_it_was_written(kind: str) -> None:
     text = core(kind)

@@ -298,6 +298,7 @@ def test_a_short_text_is_no_large_core(count: int, inside: str, sentence: str) -
     refused(doubling(count, inside), sentence, name="m0")
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("make", [lambda: parallel().text, lambda: folded(PLAIN).text], ids=["parallel", "folded"])
 def test_any_name_that_is_written_otherwise_is_refused(make: object) -> None:
     """Wherever a name or number is changed by a sign, the text is another one, or none."""

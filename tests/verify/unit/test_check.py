@@ -16,7 +16,7 @@ from sosmith.verify.graph import RejectedError
 # What the generator writes is accepted.
 
 
-@pytest.mark.sweep(4)
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(
     ("spec", "architecture", "channels", "products"),
     [
@@ -41,6 +41,7 @@ def test_small_cores(spec: str, architecture: str, channels: int, products: int)
     assert found.pace.interval == cycles_per_sample(program, serial=serial, channels=channels)
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("architecture", ["folded", "serial"])
 def test_words_in_slices(architecture: str) -> None:
     core = unit(STEADY, architecture, 24)
@@ -401,6 +402,7 @@ def _swept(core: Unit, count: int, seed: int, clocks: int) -> Counter[str]:
     return swept(edited, rejection, lambda text: core.seen(text, clocks, seed), core.text)
 
 
+@pytest.mark.slow
 def test_four_edits() -> None:
     found = _swept(unit(STEADY), 4, seed=1, clocks=80)
     assert found["rejected"] + found["accepted"] > 2

@@ -22,6 +22,7 @@ def spec(**keys: object) -> sosmith.Specification:
     return made.replaced(**keys)
 
 
+@pytest.mark.sweep(8)
 @pytest.mark.parametrize(
     ("form", "name"), list(product(FORMS, (*FORMS, "df1", "state_space", "lattice_wdf", "look_ahead_2")))
 )

@@ -85,6 +85,7 @@ AHEAD = {f"decimation.calibration.{key}" for key in ("cycles_per_sample", "laten
 AROUND = {f"decimation.{key}" for key in ("deviation_db", "delay", "cycles_per_result", "direct_largest_db")}
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(
     ("name", "unheld"), [("parallel", set()), ("folded", set()), ("worn", RELOAD), ("decimated", AROUND | AHEAD)]
 )

@@ -40,6 +40,7 @@ def kept(architecture: str, *, keep: bool = True) -> dict[str, str]:
     return generated(design_core(from_text(STEADY + options, Path("spec.toml"))))
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("kind", ["parallel", "folded"])
 def test_nets_have_names_but_for_some_glue(kind: str) -> None:
     source = read_source(written(kind)).modules
@@ -49,6 +50,7 @@ def test_nets_have_names_but_for_some_glue(kind: str) -> None:
     assert len(nameless) <= GLUE < len(names) / 10
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("protect", ["detect", "correct"])
 def test_a_check_bit_is_one_parity(protect: str) -> None:
     """Not a chain of nets, each with a bit more."""
@@ -167,6 +169,7 @@ def synthesized(text: str, folder: Path) -> set[str]:
     return set(re.findall(r"^  wire .*\\(\S+)$", (folder / "plain.il").read_text(), re.MULTILINE))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("architecture", [pytest.param("parallel", marks=pytest.mark.slow), "folded"])
 def test_kept_nets_stay_through_synthesis(architecture: str, tmp_path: Path) -> None:
     modules = read_source(kept(architecture)["plain.sv"]).modules

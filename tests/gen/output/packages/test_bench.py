@@ -24,7 +24,7 @@ def stimuli_of(name: str) -> Stimuli:
     return bench_stimuli(design_of(name).core, interface_of(name))
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("way", "name"),
     [("c", name) for name in SPECIFICATIONS]
@@ -120,7 +120,7 @@ def spoil_result(folder: Path, name: str) -> None:
     path.write_text("\n".join([*lines, f"{last[:-1]}{int(last[-1], 16) ^ 1:x}", ""]), encoding="utf-8")
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["wide", "sparse", "held"])
 @pytest.mark.parametrize("way", ["icarus", "c"])
 def test_the_last_result_is_compared_too(way: str, name: str, tmp_path: Path) -> None:
@@ -149,7 +149,7 @@ def test_a_result_too_few_or_too_many_fails(name: str, tmp_path: Path) -> None:
         assert "the files of vectors must fit each other and the core" in result.stderr
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["sparse", "held"])
 def test_a_decimator_that_hands_on_another_sample_is_seen(name: str, tmp_path: Path) -> None:
     """The core finds a result each time that the counter of samples is 0: let it be 1."""

@@ -26,7 +26,7 @@ def run(target: str, name: str, folder: Path, *options: str) -> subprocess.Compl
     return called(FUSESOC, *command, at=empty, simulator="verilator" if target == "lint" else "icarus")
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SPECIFICATIONS)
 def test_lint(name: str, tmp_path: Path) -> None:
     result = run("lint", name, unpacked(name, tmp_path))
@@ -35,6 +35,7 @@ def test_lint(name: str, tmp_path: Path) -> None:
     assert "%Warning" not in result.stdout + result.stderr
 
 
+@pytest.mark.slow
 def test_lint_reports_what_is_not_waived(tmp_path: Path) -> None:
     sv = unpacked("plain", tmp_path) / "core" / "plain.sv"
     text, count = re.subn(r"assign m_axis_tdata = .*;", "", sv.read_text(encoding="utf-8"))
@@ -51,6 +52,7 @@ def test_simulation(tmp_path: Path) -> None:
     assert re.search(r"^PASS: \d+ samples, 0 mismatches$", result.stdout, re.MULTILINE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("target", "tool"), [("sim_verilator", "--binary"), ("synth", "synth_ice40")])
 def test_other_targets_are_set_up(target: str, tool: str, tmp_path: Path) -> None:
     """The Yosys of these tests lacks Tcl, which FuseSoC's script for it needs, so that it is set up, not run."""

@@ -26,6 +26,7 @@ def component(name: str) -> str:
     return package_of(name)[f"ip_xact/{name}.xml"]
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("name", SPECIFICATIONS)
 def test_the_schema_accepts_it(name: str, schema: Any) -> None:
     schema.assertValid(etree.fromstring(component(name).encode()))

@@ -118,6 +118,7 @@ def test_the_bench_passes_with_the_wrapper_around_the_core(maker: str, name: str
     )
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("maker", EVERY_MAKER)
 def test_wrappers_of_a_reloadable_core_have_its_bus(maker: str, tmp_path: Path) -> None:
     folder = unpacked("tunable", tmp_path)
@@ -226,7 +227,7 @@ def test_cocotb_drives_the_core_in_physical_units(name: str, tmp_path: Path) -> 
     assert registers == ([[MAGIC, True], False, True] if name == "tunable" else [])
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "samples", "copies"), [("wide", 16, 1), ("sparse", 13, 1), ("held", 6, 4)])
 def test_cocotb_gets_the_results_of_a_beat_or_of_several_samples(
     name: str, samples: int, copies: int, tmp_path: Path

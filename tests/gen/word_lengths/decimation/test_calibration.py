@@ -36,7 +36,7 @@ def whole(decimate: str = '"auto"', architecture: str = "auto") -> CoreDesign:
     return locomotive(decimate, architecture, "instrument")
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("scenario", ["worst_case", "worst_case_errors"])
 def test_no_input_exceeds_the_bound(scenario: str) -> None:
     made = whole()
@@ -120,6 +120,7 @@ def test_the_locomotive_costs_less_than_without() -> None:
     assert ours.bound <= theirs.bound <= float(made.spec.max_error)
 
 
+@pytest.mark.slow
 def test_facts_for_programs() -> None:
     made = whole()
     tree = manifest(core_facts(made))
@@ -156,6 +157,7 @@ def at_clock(clock: int, **changes: Any) -> CoreDesign:
     return design_core(replace(spec, hardware=replace(spec.hardware, clock=Fraction(clock), **changes)))
 
 
+@pytest.mark.slow
 def test_each_has_the_smallest_architecture_that_keeps_up() -> None:
     """The filter has four times as long as the calibration."""
     made = at_clock(3500, realization="df2t")
@@ -213,7 +215,7 @@ def test_registers_too_wide_for_the_models() -> None:
         decimator_module._rounded(x, found, coarsest=Fraction(1), allowed=Fraction(1))
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("hold", [False, True])
 def test_wear_is_judged_behind_the_filter(hold: bool) -> None:
     wear = "\n[wear]\ninitial = 4.0\nwarning = 1.4\nlimit = 1.8\n"

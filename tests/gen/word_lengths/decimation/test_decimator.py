@@ -24,6 +24,7 @@ from sosmith.model.port import Port
 from sosmith.model.reference.golden import entering_filter, filtered
 
 
+@pytest.mark.slow
 def test_the_locomotive_costs_less_than_without() -> None:
     """The same proven millimetres with fewer clocks and less memory, and a delay at most a tenth longer."""
     made = locomotive()
@@ -117,6 +118,7 @@ def test_the_response_from_the_input_on() -> None:
     assert gains[3] < float(design.core.spec.max_error / output.lsb) / 2**15
 
 
+@pytest.mark.slow
 def test_what_is_not_worth_it_is_not_decimated() -> None:
     spec = locomotive_spec()
     wanted = replace(spec, filter=replace(spec.filter, order=2, cutoff=(Fraction(20),)))

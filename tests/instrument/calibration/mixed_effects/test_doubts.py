@@ -27,6 +27,7 @@ def measured(
     return Measurements(d, V, T, "m.csv", tuple(day.astype(int).tolist()))
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("seed", range(3))
 def test_errors_of_the_type_are_no_reason_to_doubt(seed: int) -> None:
     assert fitted(measured(seed)).doubts == ()

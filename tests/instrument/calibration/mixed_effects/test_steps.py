@@ -23,6 +23,7 @@ def stepped(volts: float, *, on: int = DAYS - 1, days: int = DAYS, seed: int = 3
     return Measurements(d, V + volts * (day >= on), T, "m.csv", tuple((FIRST + day).tolist()))
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("volts", [-1.0, 1.0])
 def test_a_large_step_is_told_on_its_first_day(volts: float) -> None:
     step = fitted(stepped(volts)).step
@@ -93,6 +94,7 @@ def test_the_curve_after_a_step_is_that_of_the_days_since() -> None:
     assert made.step.posterior.curve(V, T) == pytest.approx(TRUE(V + 1.0, T), abs=0.25)
 
 
+@pytest.mark.slow
 def test_no_step_is_told_where_there_is_none() -> None:
     found = [fitted(stepped(0.0, seed=seed)).step for seed in range(10, 20)]
     assert not any(step is not None and step.told for step in found)

@@ -66,6 +66,7 @@ def test_uncertain_voltages_and_temperatures_count_by_the_slope_of_the_type() ->
     assert TYPE.known_variance(V, T, u) == pytest.approx(expected, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_the_routine_of_a_morning(tmp_path: Path) -> None:
     with open_store(tmp_path / "c.db", create=True) as store:
         add(store, "left", write_csv(tmp_path / "a.csv", readings(60)), "2024-03-01", method="bayes")

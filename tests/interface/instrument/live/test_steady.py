@@ -54,6 +54,7 @@ def test_the_mean_of_equal_results_is_known_exactly() -> None:
     assert (found.value, found.scatter, found.uncertainty, found.count) == (3.25, 0.0, 0.0, 20)
 
 
+@pytest.mark.slow
 def test_what_was_kept_before_does_not_count_and_a_filter_settles() -> None:
     clock, rng = Time(), np.random.default_rng(1)
     steady, _ = reader(lambda t: (2.0 if t < 10 else 5.0) + rng.normal(0, 0.01), clock)
@@ -100,6 +101,7 @@ def test_noise_is_no_motion() -> None:
         assert clock.now - begin < 2.0
 
 
+@pytest.mark.slow
 def test_each_channel_is_read_by_itself_though_results_were_overwritten() -> None:
     for channel, voltage in enumerate((2.0, 5.0, 8.0)):
         clock = Time()

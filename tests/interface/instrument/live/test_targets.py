@@ -33,6 +33,7 @@ def board_of(design: sosmith.Design, clock: Time, voltages: Any, core: Any = Non
     return Board.on(ModelLine(GaugingDevice(design, clock.monotonic, voltages, core, **changes)))
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("gain", [1.0, 0.9])
 def test_the_voltage_before_the_sensor_is_read(gain: float, tmp_path: Path) -> None:
     """A filter whose gain at zero frequency is not 1 is undone as well."""
@@ -73,6 +74,7 @@ def test_results_in_volts_need_no_files() -> None:
     assert found.voltage == pytest.approx(3.25, abs=0.001)
 
 
+@pytest.mark.slow
 def test_the_set_that_was_loaded_counts(tmp_path: Path) -> None:
     design = reloadable()
     design.generate(tmp_path)

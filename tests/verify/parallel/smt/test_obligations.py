@@ -35,6 +35,7 @@ def edited(text: str, pattern: str, new: str) -> str:
     return result
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("solver", NAMES)
 def test_every_register_of_a_small_core_is_proven_by_each_solver(solver: str) -> None:
     check_hardware(core(NARROW).text, core(NARROW).certificate)
@@ -62,6 +63,7 @@ BROKEN = [
 ]
 
 
+@pytest.mark.sweep(4)
 @pytest.mark.parametrize("solver", NAMES)
 @pytest.mark.parametrize(("pattern", "new", "place"), BROKEN)
 def test_a_broken_core_has_a_counterexample(pattern: str, new: str, place: str, solver: str) -> None:
@@ -77,6 +79,7 @@ def test_the_texts_are_the_same_each_time() -> None:
     assert all(text.count("(check-sat)") == 1 and "(set-logic QF_BV)" in text for text in again.values())
 
 
+@pytest.mark.slow
 def test_a_core_with_memories_is_refused() -> None:
     ahead = looking_ahead()
     with pytest.raises(RejectedError, match=r"^goals for solvers must be of a core without memories$"):

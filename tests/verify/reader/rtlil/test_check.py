@@ -53,6 +53,7 @@ def texts() -> Callable[[str], Texts]:
     return made
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("name", [*FAST, pytest.param("protected", marks=pytest.mark.slow)])
 def test_what_is_written_is_the_same(name: str, texts: Callable[[str], Texts]) -> None:
     found = texts(name).check()
