@@ -129,8 +129,8 @@ class Target:
 
     @property
     def memories(self) -> tuple[Place, ...]:
-        """The places with several words."""
-        return tuple(place for place in self.places if place.depth > 1)
+        """The places with several words, and the registers in which the states of two channels are."""
+        return tuple(place for place in self.places if place.depth > 1 or re.search(r"_word[01]$", place.name))
 
     @property
     def states(self) -> tuple[Place, ...]:
@@ -142,8 +142,8 @@ class Target:
     @property
     def registers(self) -> tuple[Place, ...]:
         """The other registers."""
-        states = set(self.states)
-        return tuple(place for place in self.places if place.depth == 1 and place not in states)
+        others = {*self.states, *self.memories}
+        return tuple(place for place in self.places if place not in others)
 
     def run(
         self,

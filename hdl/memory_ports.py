@@ -16,9 +16,9 @@ from amaranth.lib.memory import Memory, ReadPort, WritePort
 _MEMBERS = {"addr": "address", "data": "data", "en": "enable"}
 
 
-def read_port(memory: Memory, name: str, *, at_once: bool = False) -> ReadPort:
-    """Return a port that reads a memory, one clock later or `at_once`."""
-    port = memory.read_port(domain="comb" if at_once else "sync")
+def read_port(memory: Memory, name: str) -> ReadPort:
+    """Return a port that reads a memory, one clock later."""
+    port = memory.read_port()
     _name(port, f"{name}_read")
     return port
 

@@ -57,8 +57,8 @@ _PROGRAM = "tests/verify/program/test_check.py::"
 _SPECIFIED = "tests/verify/specified/"
 _REPORT = "tests/gen/report/test_report.py::"
 _HDL = (
-    "tests/hdl/test_stage.py::test_stages_equal_their_graphs[flange_wear_locomotive",
-    "tests/hdl/test_stage.py::test_stages_equal_their_graphs[audio",
+    "tests/hdl/stages/test_stage.py::test_stages_equal_their_graphs[flange_wear_locomotive",
+    "tests/hdl/stages/test_stage.py::test_stages_equal_their_graphs[audio",
     "tests/hdl/test_reload.py::test_a_broken_port_is_noticed",
 )
 

@@ -74,8 +74,12 @@ def _state(plan: Pipelined, index: int, device: Device, protect: str) -> Quantit
 
 
 def _held_state(plan: Pipelined, width: int, device: Device, protect: str) -> Quantities:
-    made = of_memory(device, plan.words, width + check_bits(width, protect), block=plan.block_ram)
-    made += Counter({"registers": width * plan.block_ram, "states": width})
+    whole = width + check_bits(width, protect)
+    if plan.words_in_registers:
+        made: Quantities = Counter({"muxed": whole, "registers": plan.words * whole})
+    else:
+        made = of_memory(device, plan.words, whole, block=plan.block_ram)
+        made += Counter({"registers": width * plan.block_ram, "states": width})
     if protect == "none":
         return made
     return made + of_check_bits(width, protect) + Counter({"chosen": width})  # a scrub writes what it has read

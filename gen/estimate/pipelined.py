@@ -34,6 +34,8 @@ class Pipelined:
         States that lie in memories.
     words : int
         Words of each such memory.
+    words_in_registers : bool
+        Whether these memories are registers.
     distance : int
         Least number of samples from one of a channel to its next.
     block_ram : bool
@@ -49,6 +51,7 @@ class Pipelined:
     adders: Collection[int] = ()
     held: Collection[int] = ()
     words: int = 1
+    words_in_registers: bool = False
     distance: int = 1
     block_ram: bool = False
     writes: Mapping[int, int] = field(default_factory=dict)
@@ -63,8 +66,17 @@ class Pipelined:
     def of_channels(cls, graph: Graph, channels: int, adders: Collection[int], *, rewrites: bool) -> Pipelined:
         """Return the plan for several channels; `rewrites` as in `schedule`."""
         plan = schedule(graph, channels, rewrites=rewrites, adders=adders)
-        block = plan.reading > 1
-        return cls(graph, plan.pipeline_stages, adders, graph.delays, channels, plan.distance, block, plan.writes)
+        return cls(
+            graph,
+            plan.pipeline_stages,
+            adders,
+            graph.delays,
+            channels,
+            plan.reading == 0,
+            plan.distance,
+            plan.reading > 1,
+            plan.writes,
+        )
 
     @classmethod
     def of_turns(cls, plan: TurnPlan) -> Pipelined:

@@ -43,15 +43,16 @@ like a sample of its channel, but that each memory is written with what it has r
     +----------+        +--> failed --> or -->[fault2]..    ^
                                                the next state
 
-The latency is 4 clocks. The same recursion takes 3 pipeline stages for 2 channels, whose memories are read without a
-clock, and 5 for 17, whose block RAM has a register before it and one behind.
+The latency is 4 clocks. The same recursion takes 3 pipeline stages for 2 channels, whose states are registers and read
+without a clock (`sosmith.hdl.stages.register_words`), and 5 for 17, whose block RAM has a register before it and one
+behind.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 
-from amaranth.hdl import Const, Module, Mux, Signal, Value
+from amaranth.hdl import Const, Module, Mux, Shape, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
@@ -63,6 +64,7 @@ from sosmith.hdl.pipelined_logic import PipelinedLogic, banks_in_use, limits, na
 from sosmith.hdl.plan.interleaving import schedule
 from sosmith.hdl.plan.pipeline import inner_sums
 from sosmith.hdl.plan.streams import channel_bits
+from sosmith.hdl.stages.register_words import two_words
 from sosmith.model.dataflow.graph import Op
 from sosmith.model.dataflow.structure import Stage
 
@@ -190,35 +192,58 @@ class InterleavedStage(wiring.Component):
         for index in graph.delays:
             node, written = graph.nodes[index], plan.writes[index]
             check = CheckBits(node.width, self.protect)
-            m.submodules[f"{names[index]}_memory"] = memory = Memory(
-                shape=shape_of(node) if self.protect == "none" else check.width,
-                depth=self.channels,
-                init=[0] * self.channels,
-                attrs=_BLOCK_RAM if plan.reading > 1 else {},
-            )
-            read = read_port(memory, f"{names[index]}_memory", at_once=not plan.reading)
-            write = write_port(memory, f"{names[index]}_memory")
-            word = read.data
-            if plan.reading > 1:
-                word = Signal(read.data.shape(), name=f"{names[index]}_read", reset_less=True)
-                with m.If(self.advance):
-                    m.d.sync += word.eq(read.data)
-            reads[index] = check.read(m, word, names[index])
             following, writes = at(node.operands[0], written), valid[written]
             if self.protect != "none":
                 state = Signal(shape_of(node), name=f"{names[index]}_next")
                 m.d.comb += state.eq(Mux(scrub[written], at(index, written), following))
                 following, writes = state.as_unsigned(), valid[written] | scrub[written]
-            if plan.reading:
-                m.d.comb += read.en.eq(self.advance)
-            m.d.comb += [
-                read.addr.eq(channel[plan.pipeline_stages[index] - plan.reading]),
-                wires[index].eq(reads[index].data),
-                write.addr.eq(Mux(self.clear, self.clear_channel, channel[written])),
-                write.data.eq(Mux(self.clear, 0, check.written(following))),
-                write.en.eq(self.clear | (self.advance & writes)),
-            ]
+            word = self._word(
+                m,
+                shape_of(node) if self.protect == "none" else Shape(check.width),
+                names[index],
+                address=channel[plan.pipeline_stages[index] - plan.reading],
+                write=self.advance & writes,
+                write_address=channel[written],
+                data=check.written(following),
+            )
+            reads[index] = check.read(m, word, names[index])
+            m.d.comb += wires[index].eq(reads[index].data)
         return reads
+
+    def _word(
+        self, m: Module, shape: Shape, name: str, *, address: Value, write: Value, write_address: Value, data: Value
+    ) -> Value:
+        """Keep a word of a state for each channel; return the one at `address`, `Schedule.reading` clocks later."""
+        if not self.schedule.reading:
+            return two_words(
+                m,
+                shape,
+                name,
+                address=address,
+                write=write,
+                write_address=write_address,
+                data=data,
+                clear=self.clear,
+                clear_address=self.clear_channel,
+            )
+        reading = self.schedule.reading
+        m.submodules[f"{name}_memory"] = memory = Memory(
+            shape=shape, depth=self.channels, init=[0] * self.channels, attrs=_BLOCK_RAM if reading > 1 else {}
+        )
+        read, written = read_port(memory, f"{name}_memory"), write_port(memory, f"{name}_memory")
+        m.d.comb += [
+            read.en.eq(self.advance),
+            read.addr.eq(address),
+            written.addr.eq(Mux(self.clear, self.clear_channel, write_address)),
+            written.data.eq(Mux(self.clear, 0, data)),
+            written.en.eq(self.clear | write),
+        ]
+        if reading < 2:
+            return read.data
+        word = Signal(read.data.shape(), name=f"{name}_read", reset_less=True)
+        with m.If(self.advance):
+            m.d.sync += word.eq(read.data)
+        return word
 
     def _scrub(self, m: Module) -> list[Value]:
         """Return for each pipeline stage, and for the outputs, whether it holds a scrub."""

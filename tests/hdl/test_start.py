@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from tests.gen.word_lengths.filters import butterworth, plain
 from tests.hdl.core_bench import Pace, run_core, simulate
-from tests.hdl.stage_bench import run
+from tests.hdl.stages.stage_bench import run
 
 from sosmith.gen.architectures.registry import ARCHITECTURES
 from sosmith.model.dataflow.datapath import Datapath

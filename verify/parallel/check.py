@@ -38,6 +38,7 @@ from sosmith.verify.parallel.forms import Forms
 from sosmith.verify.parallel.graph_codes import GraphCodes
 from sosmith.verify.parallel.netlist import Netlist, flattened
 from sosmith.verify.parallel.pipeline import DATA, Pipeline
+from sosmith.verify.parallel.register_words import with_memories
 from sosmith.verify.parallel.split import split
 from sosmith.verify.progress import Progress
 from sosmith.verify.reader.recursion import deep_recursion
@@ -156,6 +157,7 @@ def check_modules(
 def _checked(netlist: Netlist, certificate: Certificate, channels: int, inside: Inside) -> HardwareVerdict:
     forms = Forms()
     prefix = inside.prefix
+    netlist = with_memories(netlist) if channels == 2 else netlist
     words = {name: len(memory.first) for name, memory in netlist.memories.items()} if channels == 1 else {}
     graph = GraphCodes(certificate, forms, inside.lanes, words, prefix)
     netlist = split(netlist, {netlist.holder(graph.state_name(node)) or "" for node in graph.delays})

@@ -25,7 +25,7 @@ from hypothesis import strategies as st
 from scipy import signal
 from tests.gen.designs import with_rows
 from tests.gen.word_lengths.filters import butterworth, errors, plain, stimulus
-from tests.hdl.stage_bench import run
+from tests.hdl.stages.stage_bench import run
 
 from sosmith.gen.proof.linear_model import linear_model
 from sosmith.gen.realizations.noise import (

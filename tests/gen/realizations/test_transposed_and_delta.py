@@ -12,7 +12,7 @@ from scipy import signal
 from tests.gen.designs import with_rows
 from tests.gen.proven_stages import Ranges, datapath_of, proven_cascade
 from tests.gen.word_lengths.filters import butterworth, errors, plain, stimulus
-from tests.hdl.stage_bench import run as run_hardware
+from tests.hdl.stages.stage_bench import run as run_hardware
 
 from sosmith.gen.proof.linear_model import linear_model
 from sosmith.gen.realizations.coefficients import Rounding

@@ -1,7 +1,7 @@
 """Bits of sums that are used, and sums that take no adder: the model and the hardware agree on both."""
 
 import pytest
-from tests.hdl.stage_bench import run
+from tests.hdl.stages.stage_bench import run
 
 from sosmith.hdl.plan.used_bits import used_bits
 from sosmith.model.dataflow.graph import Graph, GraphBuilder

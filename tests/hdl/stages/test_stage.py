@@ -5,7 +5,7 @@ import doctest
 import pytest
 from tests.gen.designs import ALL, example_design
 from tests.gen.word_lengths.filters import stimulus
-from tests.hdl.stage_bench import run
+from tests.hdl.stages.stage_bench import run
 
 from sosmith.gen.realizations.registry import SECTIONS
 from sosmith.hdl.stages import pipelined as stage_module
