@@ -12,11 +12,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cached_property, partial
+from functools import cache, cached_property, partial
 
 import numpy as np
 import numpy.typing as npt
-from flint import acb, arb, fmpq
+from flint import acb, arb, ctx, fmpq
 
 from sosmith.gen.filter.exact_form import Exact, exact_bilinear, exact_form, given_form, pole_factors
 from sosmith.gen.filter.impulse_invariance import Aliasing, aliasing, impulse_invariant, simple_level
@@ -42,6 +42,8 @@ _COMFORTABLE = 20  # samples per period of the band edge; fewer hardly reduce th
 _UNITY = 1e-14  # relative distance within which the gain of given sections counts as one: rounding, not intent
 _MARGINS = 64  # parts of the losses by which a mask is narrowed around the filter from which a search starts
 _GRID = 2048  # frequencies up to half the sample rate at which given sections are evaluated
+_ROUGH = 64  # bits with which the largest of these gains are looked for
+_NEARLY = 1 + 2**-50  # gains this near to each other may round to one double
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -474,16 +476,34 @@ def _normalized(rows: Sequence[Row]) -> tuple[str, tuple[Row, ...]]:
 
 def _kind_and_reference(rows: Sequence[Row]) -> tuple[str, acb]:
     """Kind of given sections, by the frequency of their largest gain, and the point on the unit circle to scale at."""
-    # cos and sin of the grid from 0 to just below half the sample rate
-    grid = [acb(arb.cos_pi_fmpq(fmpq(k, _GRID)), arb.sin_pi_fmpq(fmpq(k, _GRID))) for k in range(_GRID)]
-    gains = [nearest_double(abs(_response(rows, z))) for z in grid]
-    dc, nyquist, top = gains[0], gains[-1], max(gains)
+    highest = _highest(rows)
+    gains = {k: nearest_double(abs(_response(rows, _on_grid(k)))) for k in {0, *highest, _GRID - 1}}
+    dc, nyquist, top = gains[0], gains[_GRID - 1], max(gains.values())
     if dc >= top / 2:
         kind = "bandstop" if nyquist >= top / 2 else "lowpass"
     else:
         kind = "highpass" if nyquist >= top / 2 else "bandpass"
-    z = {"lowpass": acb(1), "bandstop": acb(1), "highpass": acb(-1), "bandpass": grid[gains.index(top)]}[kind]
-    return kind, z
+    if kind == "bandpass":
+        return kind, _on_grid(min(k for k, gain in gains.items() if gain == top))
+    return kind, acb(-1 if kind == "highpass" else 1)
+
+
+def _highest(rows: Sequence[Row]) -> list[int]:
+    """Return the places on the grid whose gain may be the largest, or round to the same double."""
+    with ctx.workprec(_ROUGH):
+        gains = [abs(_response(rows, z)) for z in _rough_grid()]
+        largest = max((gain for gain in gains if gain.is_finite()), key=arb.lower, default=arb(0))
+        return [k for k, gain in enumerate(gains) if not gain * _NEARLY < largest]
+
+
+@cache
+def _rough_grid() -> Sequence[acb]:
+    return [_on_grid(k) for k in range(_GRID)]
+
+
+def _on_grid(k: int) -> acb:
+    """Return a point of the upper half of the unit circle, whose grid ends just below half the sample rate."""
+    return acb(arb.cos_pi_fmpq(fmpq(k, _GRID)), arb.sin_pi_fmpq(fmpq(k, _GRID)))
 
 
 def _response(rows: Sequence[Row], z: acb) -> acb:

@@ -106,6 +106,7 @@ def test_a_line_rate_above_a_fourth_of_the_clock_is_refused(programs: dict[str, 
     BUILD.refused(message, "plain.toml", "--board", "icestick", "--baud", "3000001")
 
 
+@pytest.mark.slow
 def test_a_design_for_a_board_shows_what_it_takes_there_and_builds_it_once(
     programs: dict[str, str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

@@ -40,6 +40,7 @@ def test_the_design_tells_of_the_calibration(path: str) -> None:
         assert f"Schedule: {len(program.instructions)} instructions for each sample of each channel{where}\n" in table
 
 
+@pytest.mark.slow
 def test_the_same_for_programs(path: str) -> None:
     found = json.loads(Invocation("design").good(path, "--json").stdout)
     assert found["decimation"]["calibration"]["instructions"] > 10

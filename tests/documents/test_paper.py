@@ -30,6 +30,7 @@ def test_the_document_is_what_the_command_writes(files: dict[str, str]) -> None:
     assert (DOCS / "paper.md").read_text(encoding="utf-8") == files["paper.md"]
 
 
+@pytest.mark.slow
 def test_the_pictures_are_what_the_command_draws(files: dict[str, str]) -> None:
     drawn = {name: text for name, text in files.items() if name != "paper.md"}
     there = {path.relative_to(DOCS).as_posix() for path in (DOCS / "images").glob("paper_*")}

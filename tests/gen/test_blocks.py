@@ -97,7 +97,7 @@ def test_the_shortest_look_ahead_that_reaches_the_clock_is_chosen(clock: str, or
     assert made.architecture.cost.multiplications == ()
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("clock", "rate", "chosen"), [("100e6", "90e6", True), ("100e6", "40e6", False), ("50e6", "50e6", False)]
 )

@@ -34,7 +34,7 @@ def _spoilt_module(module: str, *, always: bool) -> str:
     return module
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("architecture", "realization", "channels"),
     [("folded", "df1_ef2", 3), ("serial", "df2t", 3), ("parallel", "df1_ef2", 17), ("parallel", "delta", 17)],

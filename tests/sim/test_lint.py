@@ -81,7 +81,7 @@ def test_verilator_has_no_warning_left(core: Path, tmp_path: Path) -> None:
     assert lint(core, core.stem, tmp_path) == []
 
 
-@pytest.mark.sweep(7)
+@pytest.mark.sweep(3)
 def test_icarus_has_no_warning(core: Path) -> None:
     assert icarus_check(core, core.stem) == []
 

@@ -144,7 +144,7 @@ def test_limits_of_another_channel_are_noticed(tmp_path: Path) -> None:
     assert simulate(broken, traces, tmp_path, simulator="icarus").run.mismatches > 0
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("architecture", ["parallel", "folded", "serial"])
 @pytest.mark.parametrize(("channels", "initial"), [(1, ("1.5",)), (3, ("1.5", "2", "0.5"))], ids=["1", "3-different"])
 def test_wear_leaves_nothing_for_a_linter_or_a_compiler(

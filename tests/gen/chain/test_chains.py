@@ -96,6 +96,7 @@ def gains_at(chain: sosmith.Chain, frequencies: np.ndarray) -> np.ndarray:
     return gains
 
 
+@pytest.mark.slow
 def test_gains_to_the_end_are_those_of_responses() -> None:
     """A gain that is claimed is the sum of the magnitudes of what an impulse behind the stage makes at the end."""
     chain = sosmith.design_chain(draw(5))

@@ -66,6 +66,7 @@ def test_the_bound_holds_with_other_coefficients(cutoff: float, chain: sosmith.C
     assert loaded._swap.bound <= Fraction(1, 100)
 
 
+@pytest.mark.slow
 def test_a_swap_without_a_reset_fades(chain: sosmith.Chain) -> None:
     loaded = chain.reload(other(stage(1, cutoff=390.0)))
     assert loaded.writes["transient_samples"] > 0

@@ -498,6 +498,7 @@ def test_page_needs_nothing_from_elsewhere(built: tuple[str, Path, dict[str, Any
     assert len(content.encode()) < 1_000_000
 
 
+@pytest.mark.sweep(1)
 def test_references_inside_the_page_lead_somewhere(built: tuple[str, Path, dict[str, Any]]) -> None:
     content = (built[1] / "report.html").read_text(encoding="utf-8")
     page = Page(content)

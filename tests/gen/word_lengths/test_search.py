@@ -167,7 +167,7 @@ def test_there_is_no_start_beyond_the_most_bits() -> None:
 # What the search ends with.
 
 
-@pytest.mark.sweep(6)
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("realization", CASCADES)
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_trimming_saves(name: str, realization: str) -> None:

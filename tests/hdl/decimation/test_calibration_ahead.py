@@ -61,6 +61,7 @@ def test_results_equal_the_model(name: str, before: str) -> None:
     assert run(made, codes, Pace(idle=0.3, stall=0.4)).results == wanted
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("name", ["parallel", "folded"])
 def test_held_results_equal_the_model(name: str) -> None:
     made, codes = made_in(name, hold=True), codes_for(61)

@@ -186,7 +186,7 @@ def test_random_designs(number: int, tmp_path: Path) -> None:
     check_proof_and_hardware(made, samples_of, number, tmp_path)
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("architecture", ["folded", "parallel"])
 def test_tools_read_the_text_without_a_warning(architecture: str, tmp_path: Path) -> None:
     made = locomotive(architecture=architecture)

@@ -146,6 +146,7 @@ def test_cxxrtl_agrees_on_them_too(outcomes: list[list[Any]], tmp_path: Path) ->
         assert mine == verilators, case
 
 
+@pytest.mark.slow
 def test_every_rule_is_broken_and_named(outcomes: list[list[Any]]) -> None:
     for case, ((failure, *_), _) in zip(cases(), outcomes, strict=True):
         if case["work"] == 0:

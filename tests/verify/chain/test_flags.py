@@ -55,7 +55,7 @@ def test_each_variant_is_accepted(variant: dict[str, Any], depth: int) -> None:
     check_flags(module, claim)
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "variant",
     [

@@ -61,6 +61,7 @@ def test_a_range_that_is_not_everything() -> None:
         assert re.fullmatch("bit 1 of m_axis_tuser must be .*", said)
 
 
+@pytest.mark.slow
 def test_limits_of_the_channel_of_the_sample() -> None:
     several = core(SEVERAL, 3)
     words = several.text.replace("wear_limits[1] = 24'h78", "wear_limits[1] = 24'h79")

@@ -37,6 +37,7 @@ def test_the_schema_would_find_a_mistake(schema: Any) -> None:
     assert not schema.validate(etree.fromstring(wrong.encode()))
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("name", SPECIFICATIONS)
 def test_another_tool_reads_ports_and_buses(name: str, tmp_path: Path) -> None:
     path = tmp_path / "component.xml"

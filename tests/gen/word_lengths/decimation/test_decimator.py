@@ -42,6 +42,7 @@ def test_the_locomotive_costs_less_than_without() -> None:
     assert theirs.clocks_per_sample == direct.architecture.cycles_per_sample
 
 
+@pytest.mark.slow
 def test_the_decimator_is_a_row_of_the_budget() -> None:
     made = locomotive()
     decimator, output = made.datapath.decimator, made.datapath.output
