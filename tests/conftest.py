@@ -80,10 +80,16 @@ SEARCHING = ("word_lengths", "realizations", "proof", "test_core.py")
 
 
 @pytest.fixture(scope="session")
-def _formats(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a folder of this run alone, one for all of its processes, for the formats that the search comes to."""
+def run_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder of this run alone, one for all of its processes."""
     own = tmp_path_factory.getbasetemp()
-    folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "formats"
+    return own.parent if "PYTEST_XDIST_WORKER" in os.environ else own
+
+
+@pytest.fixture(scope="session")
+def _formats(run_folder: Path) -> Path:
+    """Return a folder for the formats that the search comes to."""
+    folder = run_folder / "formats"
     folder.mkdir(exist_ok=True)
     return folder
 

@@ -1,10 +1,12 @@
-"""Designs are searched for once in each process of the tests: the same specification gives the same design.
+"""Designs are searched for once, also if several processes test: the same specification gives the same design.
 
 A plugin, so that the mutation bench can leave it out: there, each test is to execute what it looks at.
 """
 
 from __future__ import annotations
 
+import hashlib
+import os
 import pickle
 import sys
 from collections import OrderedDict
@@ -19,6 +21,7 @@ MOST = 128
 """Designs that are kept, those that were asked for last."""
 
 _kept: OrderedDict[bytes, tuple[list[str], Any]] = OrderedDict()
+"""What this process has found or read: the steps that were told, and the design."""
 
 
 def _key(search: Any, kinds: Sequence[type]) -> bytes | None:
@@ -32,8 +35,30 @@ def _key(search: Any, kinds: Sequence[type]) -> bytes | None:
         return None
 
 
+@pytest.fixture(scope="session")
+def _designs(run_folder: Path) -> Path:
+    """Return a folder of this run alone for what its processes find."""
+    folder = run_folder / "designs"
+    folder.mkdir(exist_ok=True)
+    return folder
+
+
+def _read(place: Path) -> tuple[list[str], Any] | None:
+    try:
+        return pickle.loads(place.read_bytes())  # type: ignore[no-any-return]
+    except FileNotFoundError:
+        return None
+
+
+def _write(place: Path, kept: tuple[list[str], Any]) -> None:
+    """Write a file at once: another process may read it at any moment, or write the same."""
+    own = place.with_suffix(f".{os.getpid()}")
+    own.write_bytes(pickle.dumps(kept))
+    own.replace(place)
+
+
 @pytest.fixture(autouse=True)
-def _designs_are_kept(searches_anew: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+def _designs_are_kept(searches_anew: bool, monkeypatch: pytest.MonkeyPatch, _designs: Path) -> None:
     """Take a design that was found before, its steps told again, but where the search itself is tested."""
     module = sys.modules.get("sosmith.gen.architectures.search")
     if module is None or searches_anew:
@@ -42,23 +67,26 @@ def _designs_are_kept(searches_anew: bool, monkeypatch: pytest.MonkeyPatch) -> N
 
     def kept(search: Any, kinds: Sequence[type]) -> Any:
         key = _key(search, kinds)
-        if key is None or key not in _kept:
+        if key is None:
+            return found(search, kinds)
+        place = _designs / hashlib.sha256(key).hexdigest()
+        known = _kept.get(key) or _read(place)
+        if known is None:
             steps: list[str] = []
 
             def progress(step: str) -> None:
                 steps.append(step)
                 search.progress(step)
 
-            result = found(replace(search, progress=progress), kinds)
-            if key is None:
-                return result
-            _kept[key] = steps, result
-            if len(_kept) > MOST:
-                _kept.popitem(last=False)
+            known = steps, found(replace(search, progress=progress), kinds)
+            _write(place, known)
         else:
-            for step in _kept[key][0]:
+            for step in known[0]:
                 search.progress(step)
+        _kept[key] = known
         _kept.move_to_end(key)
-        return _kept[key][1]
+        if len(_kept) > MOST:
+            _kept.popitem(last=False)
+        return known[1]
 
     monkeypatch.setattr(module.Search, "first_that_keeps_up", kept)
