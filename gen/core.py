@@ -270,6 +270,7 @@ def pre_stage_in(
         spec.max_error,
         polynomial,
         f"{spec.name}_ahead",
+        steady=spec.hardware.start == "steady",
     )
     return pre_stage, {"decimation": reason}
 

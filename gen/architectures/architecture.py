@@ -254,6 +254,8 @@ class Architecture(ABC):
             return max(cleared, filled) + (0 if before is None else before._taken_cycles)
         if before is None:
             return filled
+        if not self.decimator.steady:
+            return before._cleared_cycles + before._taken_cycles
         # The calibration gives the first sample that the decimator fills with.
         return before._cleared_cycles + before.latency_cycles + filled + decimator_clocks.FIRST_SAMPLE
 

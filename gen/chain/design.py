@@ -207,7 +207,7 @@ class ChainDesign:
         """Number of the first result for which all stages have settled."""
         settled = 0
         for stage in self.stages:
-            settled += max(core.quantized.settling for core in stage.cores)
+            settled += max(core.quantized.settling_of_input for core in stage.cores)
             settled = -(-settled * stage.rate.rise // stage.rate.factor)
         return settled
 

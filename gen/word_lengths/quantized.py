@@ -107,8 +107,14 @@ class Quantized:
 
     @property
     def settling(self) -> int:
-        """Samples after a start that are flagged as settling; 0 without the flag."""
+        """Samples of the filter after a start that are flagged as settling; 0 without the flag."""
         return cast("OutputStage", self.datapath.stages[-1]).settling
+
+    @property
+    def settling_of_input(self) -> int:
+        """The same in samples of the input, of which each of the filter takes several behind a decimator."""
+        decimator = self.datapath.decimator
+        return self.settling * (1 if decimator is None else decimator.factor)
 
     def unfiltered(self, codes: Codes) -> Values:
         """Compute what enters the filter, in double precision, at the samples that bring a result."""

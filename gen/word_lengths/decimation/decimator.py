@@ -118,6 +118,8 @@ def pre_stage_of(
     max_error: Fraction,
     polynomial: Polynomial | None = None,
     name: str = "calibration",
+    *,
+    steady: bool = True,
 ) -> tuple[PreStage | None, str]:
     """Choose the decimator before a filter.
 
@@ -137,6 +139,8 @@ def pre_stage_of(
         Calibration; None if the decimator takes the input itself, which then has the unit of the output.
     name : str
         Name of the core of the calibration.
+    steady : bool
+        Whether the first sample counts as if it had been there for ever.
 
     Returns
     -------
@@ -171,7 +175,8 @@ def pre_stage_of(
     gain = gain_of(filter_)
     before = calibration(gain)
     x = inputs[0] if before is None else before.datapath.output
-    decimator = _rounded(x, decimation, coarsest=gain * x.lsb / output.lsb / 2, allowed=allowed)
+    coarsest = gain * x.lsb / output.lsb / 2
+    decimator = replace(_rounded(x, decimation, coarsest=coarsest, allowed=allowed), steady=steady)
     rounding = gain * decimator.rounding / output.lsb
     if rounding > allowed * _LARGEST_SHARE:
         raise ShortfallError(

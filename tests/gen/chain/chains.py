@@ -54,7 +54,7 @@ def draw(seed: int) -> dict[str, Any]:
         rate /= stage.get("decimate", 1)
     options = random.Random(f"hardware of chain {seed}")
     start: dict[str, Any] = {}
-    if options.random() < 0.4 and not any(s["kind"] == "iir" and "decimate" in s for s in stages):
+    if options.random() < 0.4:
         start = {"start": "zero"}
     for stage in stages:
         if "decimate" not in stage:

@@ -649,12 +649,6 @@ BAD = [
         "not yet available: hardware.protect must be 'none' with filter.decimate, not 'detect'",
     ),
     (
-        "decimation from a start at zero",
-        CLOCK,
-        f'{CLOCK}\nstart = "zero"\n{DECIMATED}',
-        "not yet available: hardware.start must be 'steady' with filter.decimate, not 'zero'",
-    ),
-    (
         "decimation before on-line arithmetic",
         CLOCK,
         f'{CLOCK}\narchitecture = "online"\n{DECIMATED}',
