@@ -84,7 +84,7 @@ class SharedUnit(Architecture):
             for digit_bits in range(self.digit_bits - 1, 0, -1):
                 if not self.reload or instruction_bits(folded) <= BITS:  # one register holds an instruction
                     break
-                folded = program(self.datapath, digit_bits, spare_words=SPARE_WORDS)
+                folded = program(self.datapath.behind_decimator, digit_bits, spare_words=SPARE_WORDS)
         except FoldingError as error:
             raise ShortfallError(unsuitable(self.name, error)) from None
         if not self.reload:

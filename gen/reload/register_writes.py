@@ -62,7 +62,7 @@ def reload_json(hardware: CoreDesign, swap: Swap, version: int) -> dict[str, Any
         "error_parts": {part: float(value * output.lsb) for part, value in quantized.budget.items()},
         "error_unit": output.unit,
         "restarts": hardware.architecture.restarts,
-        "transient_samples": swap.samples,
+        "transient_samples": swap.samples * quantized.samples_of_input,
         "error_after_transient": float((quantized.bound + (RESIDUE if swap.samples else 0)) * output.lsb),
         "state_use": float(swap.use),
         "calibration": None if polynomial is None else [[str(a) for a in row] for row in polynomial.coefficients],

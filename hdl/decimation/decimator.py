@@ -40,6 +40,7 @@ from amaranth.lib import data, wiring
 from amaranth.lib.wiring import In, Out
 
 from sosmith.hdl.axi_stream import codes_of, core_members, extended
+from sosmith.hdl.bus.axi_lite import forward_slave, slave_members
 from sosmith.hdl.cores.folded import FoldedCore
 from sosmith.hdl.cores.parallel import Core
 from sosmith.hdl.decimation.channel_decimator import ChannelDecimator
@@ -47,6 +48,7 @@ from sosmith.hdl.plan.streams import width
 from sosmith.hdl.status import OF_INPUT, at_rail
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.decimator import Decimator
+from sosmith.model.reload.registers import ADDRESS_BITS
 
 
 class CicDecimator(wiring.Component):
@@ -251,8 +253,8 @@ class DecimatedCore(wiring.Component):
 
     Members
     -------
-    aclk, aresetn, s_axis_*, m_axis_*
-        As in `sosmith.hdl.cores.parallel.Core`.
+    aclk, aresetn, s_axis_*, m_axis_*, s_axil_*
+        As in `sosmith.hdl.cores.parallel.Core`; the registers are those of `core`.
     """
 
     def __init__(
@@ -270,7 +272,8 @@ class DecimatedCore(wiring.Component):
         self.hold = hold
         self.core = core
         self.channels = core.channels
-        super().__init__(core_members(datapath.inputs, datapath.output, self.channels))
+        members = core_members(datapath.inputs, datapath.output, self.channels)
+        super().__init__(members if core.fingerprint is None else members | slave_members(ADDRESS_BITS))
 
     def elaborate(self, platform: object) -> Module:
         """Connect decimator and core."""
@@ -285,6 +288,7 @@ class DecimatedCore(wiring.Component):
             m.submodules.ahead = self.calibration
         m.submodules.decimator = DomainRenamer("front")(decimator)
         m.submodules.behind = core
+        forward_slave(m, self, core)
         if self.calibration is not None:
             self._connect_calibration(m, self.calibration, decimator)
         else:

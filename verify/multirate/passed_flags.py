@@ -12,6 +12,7 @@ from itertools import pairwise
 from sosmith.verify.graph import require
 from sosmith.verify.multirate.bit_logic import Bit, BitLogic
 from sosmith.verify.multirate.connections import BEHIND, CoreConnections
+from sosmith.verify.multirate.passed_registers import check_registers
 from sosmith.verify.parallel.netlist import Netlist
 
 _LEAVING = _, _FLAGS, _DEST = "m_axis_tdata", "m_axis_tuser", "m_axis_tdest"
@@ -76,7 +77,7 @@ def check_passed(
         require(own, f"{_DEST} must be the channel as the core gives it, not another value")
     elsewhere = {bit for name, bits in left.items() if name != _FLAGS for bit in bits}
     require(elsewhere.isdisjoint(flags), f"{_FLAGS} must have no bit that leaves elsewhere")
-    passed = elsewhere | {*flags}
+    passed = elsewhere | {*flags} | check_registers(netlist, logic)
     for name in sorted(netlist.widths):
         if name.startswith(BEHIND) and name not in netlist.inlets | {connections.taken, connections.valid}:
             lost = [place for place, bit in enumerate(logic.net(name)) if bit not in passed]

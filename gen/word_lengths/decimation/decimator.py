@@ -11,7 +11,7 @@ from sosmith.gen.filter.design import Filter
 from sosmith.gen.specification.specification import FilterSpec
 from sosmith.gen.word_lengths.decimation.calibration import calibration_before_decimator
 from sosmith.gen.word_lengths.quantize import gain_of
-from sosmith.gen.word_lengths.quantized import CALIBRATION, DECIMATION, Quantized
+from sosmith.gen.word_lengths.quantized import Quantized, counted
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.decimator import MAX_WIDTH, Decimator
 from sosmith.model.errors import ShortfallError
@@ -97,17 +97,7 @@ class PreStage:
 
     def counted(self, quantized: Quantized) -> Quantized:
         """Return the proven filter with the parts of decimator and calibration in its budget."""
-        budget = {DECIMATION: self.rounding, **quantized.budget} if self.rounding else quantized.budget
-        if self.calibration is None:
-            return replace(quantized, budget=budget, decimation=self.decimation)
-        return replace(
-            quantized,
-            polynomial=self.calibration.polynomial,
-            budget={CALIBRATION: self.input_error * self.gain, **budget},
-            input_error=self.input_error,
-            decimation=self.decimation,
-            calibration=self.calibration,
-        )
+        return counted(quantized, self.gain, self.decimation, self.decimator, self.calibration)
 
 
 def pre_stage_of(

@@ -637,12 +637,6 @@ BAD = [
         "not yet available: filter.decimate must be left out unless the filter is given by order and cutoff, not 2",
     ),
     (
-        "decimation with constants to be loaded",
-        CLOCK,
-        f"{CLOCK}\nreload = true\n{DECIMATED}",
-        "not yet available: hardware.reload must be false with filter.decimate, not true",
-    ),
-    (
         "decimation with protection",
         CLOCK,
         f'{CLOCK}\nprotect = "detect"\n{DECIMATED}',

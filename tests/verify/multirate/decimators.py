@@ -31,6 +31,7 @@ class Case(NamedTuple):
     core: str = "filter"
     wide: bool = False
     start: str = "steady"
+    reload: bool = False
 
     @property
     def text(self) -> str:
@@ -58,6 +59,7 @@ max_error = {self.error}
 architecture = "{self.architecture}"
 realization = "df1"
 start = "{self.start}"
+reload = {str(self.reload).lower()}
 """
 
 
