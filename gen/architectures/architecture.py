@@ -19,6 +19,8 @@ from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.decimator import Decimator
 from sosmith.model.dataflow.graph import Graph
 from sosmith.model.dataflow.program import Program
+from sosmith.model.reload.constants import constants, packed, values_of
+from sosmith.model.reload.registers import BITS
 from sosmith.model.sections.online import OnlineSchedule
 
 if TYPE_CHECKING:
@@ -158,6 +160,25 @@ class Architecture(ABC):
         return fingerprint(
             self.name, self.datapath, self.channels, self.program, protect=self.protect, restarts=self.restarts
         )
+
+    # Constants that are loaded.
+
+    @property
+    def bank_size(self) -> tuple[int, int]:
+        """Number of words in a bank of constants, and the number of bits used in each."""
+        return sum(constant.words for constant in constants(self.datapath)), BITS
+
+    def bank(self, datapath: Datapath, program: Program | None) -> list[int]:
+        """Return the words of a bank for a datapath of the same structure, and its program if there is one.
+
+        Raises
+        ------
+        ShortfallError
+            If they do not fit the hardware.
+        """
+        del program
+        loadable = constants(self.datapath)
+        return packed(values_of(datapath, loadable), loadable)
 
     # Size.
 

@@ -238,7 +238,9 @@ def other_set(
             if calibrated is not None:
                 _check_calibrated(hardware, calibrated)
                 quantized = replace(quantized, datapath=replace(quantized.datapath, calibrated=calibrated))
-            return OtherSet(quantized=quantized, program=_fitted(hardware, quantized.datapath, "set"))
+            made = OtherSet(quantized=quantized, program=_fitted(hardware, quantized.datapath, "set"))
+            hardware.architecture.bank(quantized.datapath, made.program)  # which says what does not fit there
+            return made
         except ShortfallError as error:
             refusal = refusal or error  # the first refusal is for the hardware's own formats
     assert refusal is not None
@@ -265,12 +267,6 @@ def room_of(hardware: CoreDesign) -> int:
         ),
         default=0,
     )
-
-
-def parallel_bank(hardware: CoreDesign, new_set: OtherSet) -> list[int]:
-    """Contents of a bank in the parallel architecture."""
-    loadable = constants(hardware.datapath)
-    return packed(values_of(new_set.quantized.datapath, loadable), loadable)
 
 
 def check_swap(hardware: CoreDesign, active: OtherSet | None, other: OtherSet) -> Swap:

@@ -57,8 +57,8 @@ def draw(seed: int) -> dict[str, Any]:
     if options.random() < 0.4:
         start = {"start": "zero"}
     for stage in stages:
-        if "decimate" not in stage:
-            stage.update(options.choice([{}, {"protect": "detect"}, {"protect": "correct"}, {"reload": True}]))
+        guards: list[dict[str, Any]] = [{"protect": "detect"}, {"protect": "correct"}]
+        stage.update(options.choice([{}, {"reload": True}, *([] if "decimate" in stage else guards)]))
     bits, low = rng.randint(6, 16), rng.choice([0.0, -1.0])
     return {
         "name": f"chain{seed}",

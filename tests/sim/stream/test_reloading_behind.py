@@ -1,4 +1,4 @@
-"""Reloads of the filter behind a decimator at random moments: each result is computed with one set, the right one."""
+"""Reloads of filters that decimate at random moments: each result is computed with one set, the right one."""
 
 import json
 import os
@@ -13,6 +13,7 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 from cocotb_tools.runner import Icarus
+from tests.formal.prover import broken
 from tests.gen.designs import EXAMPLES
 from tests.model.reload.swapping import compute_swapping
 
@@ -22,6 +23,7 @@ from sosmith.gen.reload.other_constants import with_constants
 from sosmith.gen.reload.register_writes import register_writes
 from sosmith.gen.reload.reload import OtherSet, room_of, set_for
 from sosmith.gen.specification.specification import Specification, from_text
+from sosmith.hdl.cores import ring
 from sosmith.sim.simulators import find_simulator
 
 LOADS = 12
@@ -65,7 +67,7 @@ def simulated(made: CoreDesign, sets: list[OtherSet], folder: Path) -> tuple[dic
         "loads": [[[(register.address, word) for register, word in each], True] for each in writes],
         "seed": seed,
         "folded": made.architecture.program is not None,
-        "behind": True,
+        "behind": made.datapath.decimator is not None,
     }
     (folder / "core.sv").write_text(to_verilog(to_rtlil(made.architecture.component(), "rx")))
     (folder / "job.json").write_text(json.dumps(job))
@@ -110,3 +112,62 @@ def test_reloads_at_any_moment(architecture: str, channels: int, start: str, tmp
         wanted |= zip(own.tolist(), compute_swapping(first, steps, entering), strict=True)
     received = [(int(dests[place]), wanted[place] % (1 << 16)) for place in order]
     assert [tuple(pair) for pair in outcome["received"]] == received
+
+
+def fir(channels: int, start: str, taps: tuple[float, ...], error: float) -> Specification:
+    text = f"""
+name = "rx"
+sample_rate = 8000.0
+channels = {channels}
+input.x = {{ bits = 8, signed = true, range = [-1.0, 1.0] }}
+output = {{ bits = 12, signed = true, range = [-2.0, 2.0], max_error = {error} }}
+filter = {{ taps = {list(taps)}, decimate = 3 }}
+hardware = {{ reload = true, start = "{start}" }}
+"""
+    return from_text(text, Path("rx.toml"))
+
+
+def results_of_taps(channels: int, start: str, folder: Path) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
+    """Return what came of a core with several sets of taps, and what had to."""
+    made = design_core(fir(channels, start, (0.1, 0.2, 0.31, 0.2, 0.1), 0.001))
+    others = ((0.11, 0.15, 0.4, 0.15, 0.11), (0.05, 0.22, 0.5, 0.22, 0.05), (-0.1, 0.12, 0.3, 0.12, -0.1))
+    sets = [set_for(made, fir(channels, start, taps, 0.01)) for taps in others]
+    job, outcome, chosen = simulated(made, sets, folder)
+    down, taken = made.datapath.downsampler, outcome["taken"]
+    assert down is not None
+    codes = np.resize(np.array(job["words"], dtype=np.uint8).view(np.int8), taken).astype(np.int64)
+    dests = np.resize(np.array(job["dests"] or [0]), taken)
+    swaps: list[int] = outcome["swaps"]
+    assert swaps[-1] == LOADS
+    wanted: dict[int, int] = {}
+    for channel in range(channels):
+        places = np.flatnonzero(dests == channel)
+        entering = down.preceded(codes[places][:, np.newaxis])
+        used = [swaps[place] for place in places.tolist()]
+        steps = [
+            (turn + down.filled, sets[chosen[now - 1]].quantized.datapath)
+            for turn, (before, now) in enumerate(zip([0, *used], used, strict=False))
+            if now != before
+        ]
+        first = with_constants(made.quantized, None, None).datapath
+        results = compute_swapping(first, steps, entering)[down.filled :: down.factor]
+        wanted |= zip(places[:: down.factor].tolist(), results, strict=True)
+    received = [(int(dests[place]), wanted[place] % (1 << 16)) for place in sorted(wanted)]
+    return [(dest, word) for dest, word in outcome["received"]], received
+
+
+@pytest.mark.slow
+@pytest.mark.sweep(2)
+@pytest.mark.parametrize("start", ["steady", "zero"])
+@pytest.mark.parametrize("channels", [1, 3])
+def test_taps_are_loaded_at_any_moment(channels: int, start: str, tmp_path: Path) -> None:
+    found, wanted = results_of_taps(channels, start, tmp_path)
+    assert found == wanted
+
+
+@pytest.mark.slow
+def test_a_result_of_two_banks_is_noticed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    right, wrong = "return port, used", "return port, port.bank"
+    monkeypatch.setattr(ring, "RingCore", broken(ring, right, wrong).RingCore)
+    found, wanted = results_of_taps(1, "zero", tmp_path)
+    assert found != wanted
