@@ -14,9 +14,11 @@ from tests.verify.multirate.decimators import (
 )
 
 from sosmith.gen.core import CoreDesign
-from sosmith.gen.output.certificate import certificate
+from sosmith.gen.output.certificate import about, certificate
 from sosmith.gen.word_lengths.settling import samples_to_settle, with_settling
 from sosmith.hdl.decimation import channel_decimator, decimator
+from sosmith.model.dataflow.c_model import c_header, c_source
+from sosmith.verify.c_model.check import check_c_model
 from sosmith.verify.certificate_file import Certificate
 from sosmith.verify.graph import RejectedError
 from sosmith.verify.multirate.cic import check_decimator
@@ -89,3 +91,19 @@ def test_it_settles_before_its_filter() -> None:
     verify(with_flags(made, samples))
     with pytest.raises(RejectedError, match=r"^another past must change the output by at most 1/2 LSB from sample "):
         verify(with_flags(made, samples - 2))
+
+
+@pytest.mark.parametrize("case", [ONE, Instrument(start="zero")])
+def test_the_c_model_starts_as_the_certificate_says(case: Case | Instrument) -> None:
+    design, _ = designed(case)
+    other, _ = designed(case._replace(start="steady"))
+    made = certificate(design.quantized, design.spec.max_error, about(design, {}))
+    assert made.about is not None
+    assert made.about.item is not None
+    item = made.about.item
+    check_c_model(c_source(design.datapath), c_header(design.datapath), made, item)
+    assert design.datapath.decimator is not None
+    filled = replace(design.datapath, decimator=replace(design.datapath.decimator, steady=True))
+    for source, header in ((design.datapath, filled), (filled, design.datapath), (other.datapath, other.datapath)):
+        with pytest.raises(RejectedError):
+            check_c_model(c_source(source), c_header(header), made, item)
