@@ -19,6 +19,7 @@ from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.decimator import Decimator
 from sosmith.model.dataflow.graph import Graph
 from sosmith.model.dataflow.program import Program
+from sosmith.model.errors import ShortfallError
 from sosmith.model.reload.constants import constants, packed, values_of
 from sosmith.model.reload.registers import BITS
 from sosmith.model.sections.online import OnlineSchedule
@@ -167,6 +168,20 @@ class Architecture(ABC):
     def bank_size(self) -> tuple[int, int]:
         """Number of words in a bank of constants, and the number of bits used in each."""
         return sum(constant.words for constant in constants(self.datapath)), BITS
+
+    def check_registers(self) -> None:
+        """Check that a word of a bank fits a register.
+
+        Raises
+        ------
+        ShortfallError
+            If it does not.
+        """
+        _, bits = self.bank_size
+        if bits > BITS:
+            raise ShortfallError(
+                f"a constant that can be loaded must have at most {BITS} bits, not {bits}: raise output.max_error"
+            )
 
     def bank(self, datapath: Datapath, program: Program | None) -> list[int]:
         """Return the words of a bank for a datapath of the same structure, and its program if there is one.

@@ -17,7 +17,6 @@ from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.downsampler import Downsampler
 from sosmith.model.dataflow.program import Program
 from sosmith.model.errors import ShortfallError
-from sosmith.model.reload.registers import BITS
 
 if TYPE_CHECKING:
     from amaranth.lib.wiring import Component
@@ -70,18 +69,7 @@ class FoldedFir(Architecture):
 
     @property
     def bank_size(self) -> tuple[int, int]:
-        """Number of words in a bank of coefficients, and the number of bits used in each.
-
-        Raises
-        ------
-        ShortfallError
-            If a coefficient does not fit a register.
-        """
-        if self.plan.factor_bits > BITS:
-            raise ShortfallError(
-                f"a coefficient that can be loaded must have at most {BITS} bits, not {self.plan.factor_bits}: raise "
-                "output.max_error"
-            )
+        """Number of words in a bank of coefficients, and the number of bits used in each."""
         return len(self.plan.steps), self.plan.factor_bits
 
     def bank(self, datapath: Datapath, program: Program | None = None) -> list[int]:

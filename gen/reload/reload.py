@@ -174,14 +174,15 @@ def _filter_of(hardware: CoreDesign, wanted: Specification) -> Filter:
     ShortfallError
         If too much folds into its pass band.
     """
-    quantized, decimator = hardware.quantized, hardware.datapath.decimator
-    if decimator is None or quantized.decimation is None:
-        return filter_of(wanted)
-    spec, path = wanted.filter, hardware.spec.path
-    if spec.decimate not in {hardware.spec.filter.decimate, decimator.factor} or spec.cutoff is None:
+    quantized, decimator, spec = hardware.quantized, hardware.datapath.decimator, wanted.filter
+    factor, own = hardware.datapath.samples_per_result, hardware.spec.filter
+    if (spec.decimate or 1) not in {own.decimate, factor} or spec.hold != own.hold:
         raise SpecificationError(
-            f"{wanted.path}: filter.decimate must be as in {path} for a set to be loaded there, {decimator.factor}"
+            f"{wanted.path}: filter.decimate and filter.hold must be as in {hardware.spec.path} for a set to be loaded "
+            f"there, {factor} and {str(own.hold).lower()}"
         )
+    if decimator is None or quantized.decimation is None or spec.cutoff is None:
+        return filter_of(wanted)
     decimation = replace(quantized.decimation, edge=spec.cutoff[0])
     ideal = decimated(spec, decimation)
     low, high = hardware.datapath.decimated_range

@@ -111,7 +111,13 @@ def test_hardware_with_another_decimator_is_another_one() -> None:
             FILTER,
             "decimate = 4",
             "decimate = 2",
-            "filter.decimate must be as in rx.toml for a set to be loaded there, 4",
+            "filter.decimate and filter.hold must be as in rx.toml for a set to be loaded there, 4 and false",
+        ),
+        (
+            TAPS,
+            "decimate = 4",
+            "decimate = 4, hold = true",
+            "filter.decimate and filter.hold must be as in rx.toml for a set to be loaded there, 4 and false",
         ),
         (
             INSTRUMENT,
@@ -173,3 +179,10 @@ def test_what_judges_wear_does_not_take_other_taps_yet() -> None:
     sentence = "rx.toml: not yet available: wear must be left out with filter.decimate and hardware.reload = true, not "
     with pytest.raises(SpecificationError, match=f"^{sentence}"):
         read(worn)
+
+
+def test_a_coefficient_that_is_loaded_fits_a_register() -> None:
+    fine = TAPS.replace("bits = 12", "bits = 32").replace("bits = 10", "bits = 24").replace("0.01 }", "1.0e-9 }")
+    sentence = "a constant that can be loaded must have at most 32 bits, not "
+    with pytest.raises(ShortfallError, match=f"{sentence}.*: raise output.max_error$"):
+        design_core(read(fine))
