@@ -270,6 +270,7 @@ def pre_stage_in(
         spec.max_error,
         polynomial,
         f"{spec.name}_ahead",
+        steady=spec.hardware.start == "steady",
     )
     return pre_stage, {"decimation": reason}
 
@@ -290,7 +291,7 @@ def _calibration_hardware(
     if datapath is None:
         return None, budget, {}
     wanted = spec.hardware.architecture
-    each = replace(budget, decimate=1, hold=False, blocks=budget.blocks.keeping_one())
+    each = replace(budget, decimate=1, hold=False, blocks=budget.blocks.keeping_one(), reload=False, reload_lock=False)
     refused = ""
     for kind in candidates(wanted, budget.blocks, asked_by(spec)):
         try:

@@ -244,8 +244,8 @@ class OnlineEntry(Entry):
 class ClaimsEntry(Entry):
     """Claims, in output LSBs; gains have no unit, and `peak_gain` is that of the ideal filter.
 
-    `settling` is the number of samples after a start from zero that are flagged, since another past could change their
-    results by more than half an LSB; None without the flag. `online` is None in the other architectures.
+    `settling` is the number of samples of the filter after a start from zero that are flagged, since another past could
+    change their results by more than half an LSB; None without the flag. `online` is None in the other architectures.
     """
 
     budget: dict[Text, Rational]

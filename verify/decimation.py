@@ -84,6 +84,19 @@ def handed_on(certificate: Certificate) -> Certificate:
     return certificate.model_copy(update={"inputs": (code,), "ideal": ideal, "decimation": None})
 
 
+def samples_of_filter(certificate: Certificate) -> int:
+    """Return how many samples of the input each sample of the filter takes: one without a decimator."""
+    return 1 if certificate.decimation is None else certificate.decimation.factor
+
+
+def remembered(entry: DecimationEntry | None) -> int:
+    """Return how many results after a start depend on what was before it: those whose samples reach that far.
+
+    Result n has the ``N (R - 1)`` samples before sample ``n R`` in it.
+    """
+    return 0 if entry is None else -(-entry.stages * (entry.factor - 1) // entry.factor)
+
+
 def calibration_alone(certificate: Certificate) -> Certificate | None:
     """Return the certificate of the calibration before the decimator of a certificate; None if there is none.
 

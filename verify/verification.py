@@ -37,7 +37,7 @@ from sosmith.verify.bounds.largest_gain import check_bands
 from sosmith.verify.bounds.polynomial import output_error, polynomial_error
 from sosmith.verify.bounds.settling import check_fading, without_counter
 from sosmith.verify.certificate_file import Certificate, Operation, StageEntry, on_grid
-from sosmith.verify.decimation import at_lower_rate, calibration_alone, rounding
+from sosmith.verify.decimation import at_lower_rate, calibration_alone, remembered, rounding
 from sosmith.verify.graph import RejectedError, Transfer, check_graph, inputs_of, label, require
 from sosmith.verify.online import check_online
 from sosmith.verify.start import Start, check_start, section_alone
@@ -142,7 +142,7 @@ def _verified(certificate: Certificate, progress: Progress) -> Verdict:
         if settling is not None:
             require(start is None, "settling must not be claimed of a filter that starts from its first sample")
             progress("settling", 0, 0)
-            check_fading(sections, settling)
+            check_fading(sections, settling - remembered(decimation))
         if decimation is not None:
             progress("aliasing", 0, 0)
             check_bands(decimation, certificate.ideal.sections)

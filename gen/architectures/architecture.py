@@ -19,6 +19,9 @@ from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.decimator import Decimator
 from sosmith.model.dataflow.graph import Graph
 from sosmith.model.dataflow.program import Program
+from sosmith.model.errors import ShortfallError
+from sosmith.model.reload.constants import constants, packed, values_of
+from sosmith.model.reload.registers import BITS
 from sosmith.model.sections.online import OnlineSchedule
 
 if TYPE_CHECKING:
@@ -159,6 +162,39 @@ class Architecture(ABC):
             self.name, self.datapath, self.channels, self.program, protect=self.protect, restarts=self.restarts
         )
 
+    # Constants that are loaded.
+
+    @property
+    def bank_size(self) -> tuple[int, int]:
+        """Number of words in a bank of constants, and the number of bits used in each."""
+        return sum(constant.words for constant in constants(self.datapath)), BITS
+
+    def check_registers(self) -> None:
+        """Check that a word of a bank fits a register.
+
+        Raises
+        ------
+        ShortfallError
+            If it does not.
+        """
+        _, bits = self.bank_size
+        if bits > BITS:
+            raise ShortfallError(
+                f"a constant that can be loaded must have at most {BITS} bits, not {bits}: raise output.max_error"
+            )
+
+    def bank(self, datapath: Datapath, program: Program | None) -> list[int]:
+        """Return the words of a bank for a datapath of the same structure, and its program if there is one.
+
+        Raises
+        ------
+        ShortfallError
+            If they do not fit the hardware.
+        """
+        del program
+        loadable = constants(self.datapath)
+        return packed(values_of(datapath, loadable), loadable)
+
     # Size.
 
     @cached_property
@@ -254,6 +290,8 @@ class Architecture(ABC):
             return max(cleared, filled) + (0 if before is None else before._taken_cycles)
         if before is None:
             return filled
+        if not self.decimator.steady:
+            return before._cleared_cycles + before._taken_cycles
         # The calibration gives the first sample that the decimator fills with.
         return before._cleared_cycles + before.latency_cycles + filled + decimator_clocks.FIRST_SAMPLE
 

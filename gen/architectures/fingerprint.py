@@ -29,4 +29,10 @@ def fingerprint(
     # A core without them keeps the number that it had before there were protection and restarts.
     guarded = "" if protect == "none" else f", {protect!r}"
     restart = ", 'restarts'" if restarts else ""
-    return zlib.crc32(f"({shape!r}, {sizes}{guarded}{restart})".encode())
+    before = "" if datapath.decimator is None else f", {datapath.decimator!r}, {_constants(datapath.calibration)!r}"
+    return zlib.crc32(f"({shape!r}, {sizes}{guarded}{restart}{before})".encode())
+
+
+def _constants(calibration: Datapath | None) -> object:
+    """Everything about a calibration before a decimator, whose constants are fixed."""
+    return None if calibration is None else [stage.graph.nodes for stage in calibration.stages]

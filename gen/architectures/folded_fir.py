@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -13,7 +13,10 @@ from sosmith.gen.fpga.boards import Board
 from sosmith.gen.specification.combinations import FOLDED
 from sosmith.gen.word_lengths.objective import Objective
 from sosmith.hdl.plan.tap_steps import TapSteps, tap_steps
+from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.downsampler import Downsampler
+from sosmith.model.dataflow.program import Program
+from sosmith.model.errors import ShortfallError
 
 if TYPE_CHECKING:
     from amaranth.lib.wiring import Component
@@ -41,7 +44,7 @@ class FoldedFir(Architecture):
     @cached_property
     def plan(self) -> TapSteps:
         """The steps, and their clocks."""
-        return tap_steps(self.datapath)
+        return tap_steps(self.datapath, loadable=self.reload)
 
     @property
     def _down(self) -> Downsampler:
@@ -63,6 +66,21 @@ class FoldedFir(Architecture):
     def memory_bits(self) -> int:
         """Bits of the samples that it keeps of a channel, once."""
         return self.plan.words * self.datapath.inputs[0].bits
+
+    @property
+    def bank_size(self) -> tuple[int, int]:
+        """Number of words in a bank of coefficients, and the number of bits used in each."""
+        return len(self.plan.steps), self.plan.factor_bits
+
+    def bank(self, datapath: Datapath, program: Program | None = None) -> list[int]:
+        """Return the words of a bank: the coefficient of each step."""
+        del program
+        other = tap_steps(datapath, loadable=True)
+        if other.frac != self.plan.frac or [step[1:] for step in map(astuple, other.steps)] != [
+            step[1:] for step in map(astuple, self.plan.steps)
+        ]:
+            raise ShortfallError("the set must fit the hardware: its steps must be those of the taps that it has")
+        return [step.coefficient & (1 << self.plan.factor_bits) - 1 for step in other.steps]
 
     @property
     def _latency_cycles(self) -> int:
@@ -96,7 +114,13 @@ class FoldedFir(Architecture):
         del before
         from sosmith.hdl.cores.ring import RingCore  # only what makes hardware loads Amaranth
 
-        return RingCore(self.datapath, self.channels, copies=self.copies_per_result)
+        return RingCore(
+            self.datapath,
+            self.channels,
+            copies=self.copies_per_result,
+            fingerprint=self.fingerprint,
+            lock=self.reload_lock,
+        )
 
     def reason(self, why: str, available: int) -> str:
         """Say in a sentence that it was chosen and `why`, with `available` clocks for each result."""

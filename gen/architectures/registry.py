@@ -67,6 +67,8 @@ def fitting(
         budget.reload_lock,
     )
     budget.check(architecture)
+    if budget.reload:
+        architecture.check_registers()
     return architecture
 
 

@@ -214,6 +214,7 @@ class Search:
         spare = 3 if spec.hardware.reload else 1
         filled = self.response.factor > 1 and spec.hardware.start == "steady"
         settles = 0 if filled else spare * samples_to_settle(datapath)
+        settles += 0 if pre_stage is None or not settles else pre_stage.decimator.remembered
         flagged = replace(with_settling(datapath, settles), wear=wear)
         if self.response.factor > 1:
             flagged = replace(flagged, downsampler=self._downsampler(datapath, filled=filled))

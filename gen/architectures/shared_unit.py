@@ -11,7 +11,7 @@ from sosmith.gen.architectures.blocks import NO_LIMIT, Blocks
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.word_lengths.objective import Objective, ShortProgram, unsuitable
 from sosmith.hdl.plan import folded_clocks
-from sosmith.hdl.plan.instructions import instruction_bits
+from sosmith.hdl.plan.instructions import encoded, instruction_bits
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.folding.fold import program
 from sosmith.model.dataflow.folding.values import FoldingError
@@ -84,7 +84,7 @@ class SharedUnit(Architecture):
             for digit_bits in range(self.digit_bits - 1, 0, -1):
                 if not self.reload or instruction_bits(folded) <= BITS:  # one register holds an instruction
                     break
-                folded = program(self.datapath, digit_bits, spare_words=SPARE_WORDS)
+                folded = program(self.datapath.behind_decimator, digit_bits, spare_words=SPARE_WORDS)
         except FoldingError as error:
             raise ShortfallError(unsuitable(self.name, error)) from None
         if not self.reload:
@@ -96,6 +96,17 @@ class SharedUnit(Architecture):
     def multiplier_blocks(self) -> int:
         """Multiplier blocks that it takes, without what stands before a decimator."""
         return 0 if self.bit_serial else self.products_with(self.blocks)
+
+    @property
+    def bank_size(self) -> tuple[int, int]:
+        """Number of instructions, and the number of bits of each."""
+        return len(self.program.instructions), instruction_bits(self.program)
+
+    def bank(self, datapath: Datapath, program: Program | None) -> list[int]:
+        """Return the instructions of a program."""
+        del datapath
+        assert program is not None
+        return [encoded(instruction, program) for instruction in program.instructions]
 
     def clocks_of(self, other: Program) -> int:
         """Clocks between samples of one channel at the highest rate with another program that is fixed."""

@@ -25,6 +25,7 @@ from sosmith.gen.filter.exact_form import Exact
 from sosmith.gen.filter.largest_gain import Peak
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.specification.specification import Specification
+from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.gen.word_lengths.selection import Progress
 from sosmith.model.arrays import Codes
 from sosmith.model.dataflow.status import Flag
@@ -207,7 +208,7 @@ class ChainDesign:
         """Number of the first result for which all stages have settled."""
         settled = 0
         for stage in self.stages:
-            settled += max(core.quantized.settling for core in stage.cores)
+            settled += max(core.quantized.settling_of_input for core in stage.cores)
             settled = -(-settled * stage.rate.rise // stage.rate.factor)
         return settled
 
@@ -420,15 +421,20 @@ def reach_behind(spec: ChainSpec, parts: Sequence[tuple[Part, ...]]) -> Fraction
 
 def _parts_of(stage: StageDesign) -> tuple[Part, ...]:
     """Return the exact response of what was designed."""
-    quantized, datapath = stage.design.quantized, stage.design.datapath
-    if quantized.filter is None:
-        return ()
+    quantized = stage.design.quantized
     if len(stage.cores) > 1:
         return (Part((_turns([core.quantized.filter for core in stage.cores]),), 1, len(stage.cores)),)
-    decimator = datapath.decimator
+    return parts_of(quantized)
+
+
+def parts_of(quantized: Quantized) -> tuple[Part, ...]:
+    """Return the exact response of one core, that of a decimator before its filter first; nothing without a filter."""
+    if quantized.filter is None:
+        return ()
+    decimator = quantized.datapath.decimator
     if decimator is not None:
         return cic(decimator.factor, decimator.stages), Part(quantized.filter.exact)
-    return (Part(quantized.filter.exact, datapath.samples_per_result),)
+    return (Part(quantized.filter.exact, quantized.datapath.samples_per_result),)
 
 
 def _turns(filters: Sequence[Filter | None]) -> Exact:

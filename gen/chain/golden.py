@@ -54,7 +54,8 @@ def _of_core(core: CoreDesign, values: Values) -> Values:
         taps = np.array(impulse_response(decimator.factor, decimator.stages)) / float(
             decimator.factor**decimator.stages
         )
-        before = np.concatenate([np.full(len(taps) - 1, values[0]), values])
+        past = values[0] if decimator.steady else float(decimator.input.zero)
+        before = np.concatenate([np.full(len(taps) - 1, past), values])
         values = np.asarray(np.convolve(before, taps, mode="valid")[:: decimator.factor], dtype=np.float64)
     sos = quantized.filter.sos
     initial: float = values[0] if core.spec.hardware.start == "steady" else 0.0

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 
-from sosmith.gen.chain.design import ChainDesign, StageDesign, gains_to_the_end, reach_behind
+from sosmith.gen.chain.design import ChainDesign, StageDesign, gains_to_the_end, parts_of, reach_behind
 from sosmith.gen.chain.response import Part, peak_gain
 from sosmith.gen.chain.specification import ChainSpec
 from sosmith.gen.quantity import quantity
@@ -63,7 +63,7 @@ def reload_chain(design: ChainDesign, wanted: ChainSpec, *, reset: bool) -> Chai
     quantized = swap.new_set.quantized
     assert quantized.filter is not None
     parts = [each.parts for each in design.stages]
-    parts[k] = (Part(quantized.filter.exact, stage.design.datapath.samples_per_result),)
+    parts[k] = parts_of(quantized)
     errors = [each.bound for each in design.stages]
     errors[k] = quantized.bound * stage.output.lsb
     _check_ports(design, parts, errors)

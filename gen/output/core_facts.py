@@ -446,7 +446,9 @@ def _settling(design: CoreDesign) -> SettlingFacts | None:
     if not samples:
         return None
     return SettlingFacts(
-        samples=samples, seconds=float(samples / design.spec.sample_rate), limit=float(SETTLED * output.lsb)
+        samples=samples,
+        seconds=float(design.quantized.settling_of_input / design.spec.sample_rate),
+        limit=float(SETTLED * output.lsb),
     )
 
 

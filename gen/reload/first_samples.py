@@ -17,7 +17,7 @@ from sosmith.model.errors import ShortfallError
 from sosmith.model.sections.start import StartStage
 
 _MARGIN = Fraction(1, 4)
-"""Share of the range of the samples by which it is widened at either end; none where samples are not calibrated."""
+"""Share of the range of the samples by which it is widened at either end; none where no calibration is loaded."""
 
 Limits = tuple[Fraction, Fraction]
 """Smallest and largest value, in output LSBs."""
@@ -35,7 +35,8 @@ def first_samples(hardware: Quantized) -> Limits:
     A range that begins or ends at 0 or does not contain it stays on its side: hardware may have no sign bit.
     """
     low, high = samples_of(hardware)
-    more = (high - low) * _MARGIN if hardware.polynomial is not None else Fraction(0)
+    loads = hardware.polynomial is not None and hardware.calibration is None
+    more = (high - low) * _MARGIN if loads else Fraction(0)
     zero = Fraction(0)
     return low - more if low < 0 else max(low - more, zero), high + more if high > 0 else min(high + more, zero)
 

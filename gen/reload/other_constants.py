@@ -18,7 +18,7 @@ from sosmith.gen.reload.first_samples import Limits, first_samples
 from sosmith.gen.word_lengths.cascade import cascade, chosen_formats, parts_of, stages_of
 from sosmith.gen.word_lengths.input_stage import InputStage, normalised, starting_like
 from sosmith.gen.word_lengths.quantize import gain_at_zero, gain_of
-from sosmith.gen.word_lengths.quantized import Quantized, assembled
+from sosmith.gen.word_lengths.quantized import Quantized, assembled, counted
 from sosmith.gen.word_lengths.search import Search
 from sosmith.gen.word_lengths.settling import with_settling
 from sosmith.model.dataflow.graph import Op
@@ -77,20 +77,25 @@ def with_constants(
         if design.steady and not design.datapath.restarts:  # which would take another first sample
             before = _with_any_first_sample(before, first_samples(design), sections, filled)
     datapath = design.datapath
+    gain = Fraction(1) if filled is None else gain_of(filled)
     other = assembled(
         name=datapath.name,
-        inputs=datapath.inputs,
+        inputs=datapath.entry,
         output=datapath.output,
         ideal=filled,
         polynomial=polynomial or design.polynomial,
         realization=design.realization,
-        gain=Fraction(1) if filled is None else gain_of(filled),
+        gain=gain,
         input_stage=before,
         sections=sections,
         proof=proof,
     )
+    if datapath.decimator is not None and design.decimation is not None:
+        edge = design.decimation.edge if ideal is None or ideal.cutoff is None else Fraction(ideal.cutoff[0])
+        decimation = replace(design.decimation, edge=edge)
+        other = counted(other, gain, decimation, datapath.decimator, design.calibration)
     flagged = with_settling(other.datapath, design.settling)
-    return replace(other, datapath=replace(flagged, calibrated=datapath.calibrated, wear=datapath.wear))
+    return replace(other, datapath=replace(datapath, stages=flagged.stages))
 
 
 def _with_any_first_sample(
@@ -119,7 +124,9 @@ def _input_stage(design: Quantized, polynomial: Polynomial | None) -> InputStage
     stages = tuple(stage for stage in datapath.stages if isinstance(stage, HornerStep))
     if polynomial is None or design.polynomial is None:
         behind = datapath.stages[len(stages)].graph
-        return InputStage(stages=stages, output=behind.input_ranges[0], error=design.input_error)
+        # A calibration before a decimator counts for itself.
+        error = design.input_error if design.calibration is None else Fraction(0)
+        return InputStage(stages=stages, output=behind.input_ranges[0], error=error)
     room = [len(row) for row in normalised(design.polynomial, datapath.inputs, datapath.output)]
     exact = normalised(polynomial, datapath.inputs, datapath.output)
     counts = [len(row) for row in exact]

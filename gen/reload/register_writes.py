@@ -8,18 +8,13 @@ from typing import Any
 from sosmith.gen.architectures.architecture import Architecture
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.proof.fading import RESIDUE
-from sosmith.gen.reload.reload import OtherSet, Swap, parallel_bank
-from sosmith.hdl.plan.instructions import encoded, instruction_bits
-from sosmith.model.reload.constants import constants
-from sosmith.model.reload.registers import BITS, CRC, DATA, VERSION, Register
+from sosmith.gen.reload.reload import OtherSet, Swap
+from sosmith.model.reload.registers import CRC, DATA, VERSION, Register
 
 
 def bank_size(architecture: Architecture) -> tuple[int, int]:
     """Return the number of words in a bank of a core, and the number of bits used in each."""
-    program = architecture.program
-    if program is not None:
-        return len(program.instructions), instruction_bits(program)
-    return sum(constant.words for constant in constants(architecture.datapath)), BITS
+    return architecture.bank_size
 
 
 def register_writes(hardware: CoreDesign, new_set: OtherSet, version: int) -> list[tuple[Register, int]]:
@@ -36,10 +31,7 @@ def register_writes(hardware: CoreDesign, new_set: OtherSet, version: int) -> li
     """
     if not 0 <= version < 1 << 32:
         raise ValueError(f"version must be in 0..4294967295, not {version}")
-    if new_set.program is None:
-        words = parallel_bank(hardware, new_set)
-    else:
-        words = [encoded(instruction, new_set.program) for instruction in new_set.program.instructions]
+    words = hardware.architecture.bank(new_set.quantized.datapath, new_set.program)
     crc = zlib.crc32(b"".join(word.to_bytes(4, "little") for word in (version, *words)))
     return [(VERSION, version), *((DATA, word) for word in words), (CRC, crc)]
 
@@ -62,7 +54,7 @@ def reload_json(hardware: CoreDesign, swap: Swap, version: int) -> dict[str, Any
         "error_parts": {part: float(value * output.lsb) for part, value in quantized.budget.items()},
         "error_unit": output.unit,
         "restarts": hardware.architecture.restarts,
-        "transient_samples": swap.samples,
+        "transient_samples": swap.samples * quantized.samples_of_input,
         "error_after_transient": float((quantized.bound + (RESIDUE if swap.samples else 0)) * output.lsb),
         "state_use": float(swap.use),
         "calibration": None if polynomial is None else [[str(a) for a in row] for row in polynomial.coefficients],

@@ -16,6 +16,7 @@ from sosmith.gen.architectures.budget import Budget
 from sosmith.gen.architectures.fingerprint import structure
 from sosmith.gen.architectures.shared_unit import SharedUnit
 from sosmith.gen.core import CoreDesign, calibrated_codes, filter_of, polynomial_of
+from sosmith.gen.filter.decimation import decimated
 from sosmith.gen.filter.design import Filter
 from sosmith.gen.quantity import quantity
 from sosmith.gen.reload.first_samples import check_samples, first_samples, held_codes
@@ -103,7 +104,9 @@ def own_set(hardware: CoreDesign) -> OtherSet:
 def _check_settling(hardware: CoreDesign, other: Quantized) -> None:
     """Check that the hardware counts far enough for a set, if it flags samples until the filter has settled."""
     counted = hardware.quantized.settling
-    samples = samples_to_settle(other.datapath) if counted else 0
+    decimator = other.datapath.decimator
+    remembered = 0 if decimator is None else decimator.remembered
+    samples = samples_to_settle(other.datapath) + remembered if counted else 0
     if samples > counted:
         raise ShortfallError(
             f"the set must settle within {counted:,} samples, to which the hardware counts, not {samples:,}"
@@ -147,13 +150,51 @@ def set_for(hardware: CoreDesign, wanted: Specification) -> OtherSet:
     quantized = hardware.quantized
     ideal, polynomial, covered = None, None, None
     if quantized.filter is not None and wanted.filter != spec.filter:
-        ideal = filter_of(wanted)
+        ideal = _filter_of(hardware, wanted)
+    if quantized.calibration is not None and wanted.calibration != spec.calibration:
+        raise SpecificationError(
+            f"{wanted.path}: calibration must be as in {spec.path} for a set to be loaded there, as it stands before "
+            "the decimator"
+        )
     if quantized.polynomial is not None and wanted.calibration != spec.calibration:
         polynomial, fitted = polynomial_of(wanted)
         inputs = hardware.datapath.inputs
         ends = tuple((port.lowest, port.highest) for port in inputs)
         covered = ends if fitted is None else calibrated_codes(inputs, fitted)
     return other_set(hardware, ideal=ideal, polynomial=polynomial, calibrated=covered, max_error=wanted.max_error)
+
+
+def _filter_of(hardware: CoreDesign, wanted: Specification) -> Filter:
+    """Design the filter of a specification, of the hardware with a decimator the one behind that.
+
+    Raises
+    ------
+    SpecificationError
+        If it decimates by another factor.
+    ShortfallError
+        If too much folds into its pass band.
+    """
+    quantized, decimator, spec = hardware.quantized, hardware.datapath.decimator, wanted.filter
+    factor, own = hardware.datapath.samples_per_result, hardware.spec.filter
+    if (spec.decimate or 1) not in {own.decimate, factor} or spec.hold != own.hold:
+        raise SpecificationError(
+            f"{wanted.path}: filter.decimate and filter.hold must be as in {hardware.spec.path} for a set to be loaded "
+            f"there, {factor} and {str(own.hold).lower()}"
+        )
+    if decimator is None or quantized.decimation is None or spec.cutoff is None:
+        return filter_of(wanted)
+    decimation = replace(quantized.decimation, edge=spec.cutoff[0])
+    ideal = decimated(spec, decimation)
+    low, high = hardware.datapath.decimated_range
+    amplitude = decimator.input.lsb * (high - low) / 2
+    gain = max(decimation.worst_aliasing, decimation.passing(ideal, bands=1)[0].gain)
+    if gain * amplitude > wanted.max_error:
+        folds, allowed = (quantity(float(x), wanted.output.unit) for x in (gain * amplitude, wanted.max_error))
+        raise ShortfallError(
+            f"the decimator must keep a full-scale sine that folds into the pass band within {allowed}, not {folds}: "
+            "lower the cutoff or raise output.max_error"
+        )
+    return ideal
 
 
 def other_set(
@@ -198,7 +239,9 @@ def other_set(
             if calibrated is not None:
                 _check_calibrated(hardware, calibrated)
                 quantized = replace(quantized, datapath=replace(quantized.datapath, calibrated=calibrated))
-            return OtherSet(quantized=quantized, program=_fitted(hardware, quantized.datapath, "set"))
+            made = OtherSet(quantized=quantized, program=_fitted(hardware, quantized.datapath, "set"))
+            hardware.architecture.bank(quantized.datapath, made.program)  # which says what does not fit there
+            return made
         except ShortfallError as error:
             refusal = refusal or error  # the first refusal is for the hardware's own formats
     assert refusal is not None
@@ -225,12 +268,6 @@ def room_of(hardware: CoreDesign) -> int:
         ),
         default=0,
     )
-
-
-def parallel_bank(hardware: CoreDesign, new_set: OtherSet) -> list[int]:
-    """Contents of a bank in the parallel architecture."""
-    loadable = constants(hardware.datapath)
-    return packed(values_of(new_set.quantized.datapath, loadable), loadable)
 
 
 def check_swap(hardware: CoreDesign, active: OtherSet | None, other: OtherSet) -> Swap:
@@ -333,10 +370,17 @@ def _fitted(hardware: CoreDesign, datapath: Datapath, what: str) -> Program | No
         return None
     before = architecture.program
     try:
-        new_program = program(datapath, before.digit_bits, like=before).padded(len(before.instructions))
+        new_program = program(datapath.behind_decimator, before.digit_bits, like=before).padded(
+            len(before.instructions)
+        )
     except ValueError as error:  # FoldingError is one
         raise ShortfallError(f"the {what} must fit the hardware: {error}") from None
-    budget = Budget(clock=spec.hardware.clock, sample_rate=spec.sample_rate, channels=architecture.channels)
+    budget = Budget(
+        clock=spec.hardware.clock,
+        sample_rate=spec.sample_rate,
+        channels=architecture.channels,
+        decimate=datapath.samples_per_result,
+    )
     needed = architecture.clocks_of(new_program)
     if needed > budget.cycles:
         raise ShortfallError(f"the {what} must take at most {budget.cycles:,} clocks a sample, not {needed:,}")

@@ -441,6 +441,8 @@ def _check_downsampling(document: Document) -> None:
     if document.converter:
         tables = ", ".join(map(literal, document.converter))
         raise UnfitError("left out with filter.decimate", tables, where="converter", later=True)
+    if document.wear is not None and document.hardware.reload:
+        raise UnfitError("left out with filter.decimate and hardware.reload = true", "given", where="wear", later=True)
     ((name, port),) = document.input.items()
     ratio = _lsb(port) / _lsb(document.output)
     if port.signed is False and port.range[0] != 0:

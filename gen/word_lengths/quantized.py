@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from typing import cast
@@ -22,6 +22,7 @@ from sosmith.gen.word_lengths.input_stage import InputStage
 from sosmith.gen.word_lengths.output_stage import output_stage
 from sosmith.model.arrays import Codes, Values
 from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.dataflow.decimator import Decimator
 from sosmith.model.dataflow.structure import Stage
 from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
@@ -107,8 +108,19 @@ class Quantized:
 
     @property
     def settling(self) -> int:
-        """Samples after a start that are flagged as settling; 0 without the flag."""
+        """Samples of the filter after a start that are flagged as settling; 0 without the flag."""
         return cast("OutputStage", self.datapath.stages[-1]).settling
+
+    @property
+    def settling_of_input(self) -> int:
+        """The same in samples of the input."""
+        return self.settling * self.samples_of_input
+
+    @property
+    def samples_of_input(self) -> int:
+        """Samples of the input for each of the filter: one without a decimator."""
+        decimator = self.datapath.decimator
+        return 1 if decimator is None else decimator.factor
 
     def unfiltered(self, codes: Codes) -> Values:
         """Compute what enters the filter, in double precision, at the samples that bring a result."""
@@ -179,6 +191,40 @@ def assembled(
         budget=budget,
         input_error=input_stage.error,
         proof=proof,
+    )
+
+
+def counted(
+    quantized: Quantized, gain: Fraction, decimation: Decimation, decimator: Decimator, calibration: Quantized | None
+) -> Quantized:
+    """Return a proven filter with what stands before it in its budget: the rounding of a decimator, and a calibration.
+
+    Parameters
+    ----------
+    quantized : Quantized
+        The filter alone.
+    gain : Fraction
+        Worst-case peak gain of the filter.
+    decimation : Decimation
+        How samples are decimated.
+    decimator : Decimator
+        The same as integers.
+    calibration : Quantized or None
+        What stands before the decimator; None if that takes the input itself.
+    """
+    lsb, budget = quantized.datapath.output.lsb, quantized.budget
+    if decimator.rounding:
+        budget = {DECIMATION: gain * decimator.rounding / lsb, **budget}
+    if calibration is None:
+        return replace(quantized, budget=budget, decimation=decimation)
+    error = calibration.bound * calibration.datapath.output.lsb / lsb
+    return replace(
+        quantized,
+        polynomial=calibration.polynomial,
+        budget={CALIBRATION: error * gain, **budget},
+        input_error=error,
+        decimation=decimation,
+        calibration=calibration,
     )
 
 

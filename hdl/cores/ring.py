@@ -28,6 +28,9 @@ The sum begins with half a step of the output, so that it is rounded by what is 
 `pointer` is where the next sample goes. Before the first one the ring is filled, a word a clock: with zeros, or with
 that sample as often as it has words. With one channel that sample waits on the stream until then.
 
+With a fingerprint, the coefficients stand in a memory of their own, in two banks: a result is computed with those of
+the bank that was active when the sample that brings it was taken.
+
 With several channels a sample is kept, with its channel, while the control word of that is read: whether it has been
 filled, `pointer`, `phase`, `rail` and `counted`. After a reset all control words are cleared, one a clock.
 """
@@ -45,14 +48,20 @@ from sosmith.hdl.memory_ports import read_port, write_port
 from sosmith.hdl.pipelined_logic import limits
 from sosmith.hdl.plan.streams import channel_bits
 from sosmith.hdl.plan.tap_steps import PIPELINE, tap_steps
+from sosmith.hdl.reload import ReloadPort
 from sosmith.hdl.shell.shell import Shell
 from sosmith.hdl.status import at_rail, status_of_result
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.downsampler import Downsampler
 from sosmith.model.dataflow.graph import Op
+from sosmith.model.reload.constants import with_room
 
 _NO_COLLISIONS = {"no_rw_check": 1}
 """Attribute of memories: no word is used that is read at the clock at which it is written."""
+
+
+_LATER = 2
+"""Clocks from the addresses of a step's taps to its coefficient."""
 
 
 class _Kept(NamedTuple):
@@ -88,20 +97,32 @@ class RingCore(Shell):
         Number of channels.
     copies : int
         Times that each result leaves.
+    fingerprint : int or None
+        Fingerprint of the structure, 32 bits; None for a core whose coefficients cannot be loaded.
+    lock : bool
+        Whether loading can be locked until a reset.
 
     Members
     -------
-    aclk, aresetn, s_axis_*, m_axis_*
+    aclk, aresetn, s_axis_*, m_axis_*, s_axil_*
         As those of `sosmith.hdl.shell.shell.Shell`.
     """
 
-    def __init__(self, datapath: Datapath, channels: int = 1, *, copies: int = 1) -> None:
+    def __init__(
+        self,
+        datapath: Datapath,
+        channels: int = 1,
+        *,
+        copies: int = 1,
+        fingerprint: int | None = None,
+        lock: bool = False,
+    ) -> None:
         if datapath.downsampler is None:
             raise ValueError("datapath must have a downsampler")
         self._down: Downsampler = datapath.downsampler
-        self._steps = tap_steps(datapath)
+        self._steps = tap_steps(datapath, loadable=fingerprint is not None)
         self._copies = copies
-        super().__init__(datapath, channels)
+        super().__init__(datapath, channels, fingerprint, lock=lock)
 
     def fill(self, m: Module) -> None:
         """Build control, rings and the multiplier."""
@@ -126,7 +147,7 @@ class RingCore(Shell):
             m.d.sync += self._step.eq(self._step + 1)
         with m.If(ends & ready):
             m.d.sync += self._running.eq(0)
-        total = self._multiply(m, write)
+        total = self._multiply(m, write, self._reload(m, taken.taken & taken.completes))
         self._give(m, total, ends, ready, rail, counted)
 
     # What is kept of a channel.
@@ -251,9 +272,42 @@ class RingCore(Shell):
 
     # The sum.
 
-    def _multiply(self, m: Module, write: tuple[Value, Value, Value]) -> Signal:
+    def _reload(self, m: Module, begins: Value) -> tuple[ReloadPort, Signal] | None:
+        """Return what loads coefficients, and the bank of those for the result in work, which `begins` at a clock."""
+        if self.fingerprint is None:
+            return None
+        plan = self._steps
+        port = ReloadPort(len(plan.steps), bits=plan.factor_bits, design=self.fingerprint, lock=self.lock)
+        self.join_port(m, port)
+        used = Signal(name="bank_in_use", reset_less=True)
+        with m.If(begins):
+            m.d.sync += used.eq(port.bank)
+        m.d.comb += [port.may_swap.eq(1), port.shadow_free.eq(~self._running | (used == port.bank))]
+        return port, used
+
+    def _coefficients(self, m: Module, rows: list[int], reload: tuple[ReloadPort, Signal]) -> Value:
+        """Make the memory of both banks of coefficients; return the one that was read."""
+        port, used = reload
+        m.submodules.coefficients_memory = memory = Memory(
+            shape=signed(self._steps.factor_bits), depth=2 * len(rows), init=rows, attrs=_NO_COLLISIONS
+        )
+        reader, writer = read_port(memory, "coefficients"), write_port(memory, "coefficients")
+        bits = len(self._step)
+        m.d.comb += [
+            reader.addr.eq(Cat(self._step, used)),
+            reader.en.eq(1),
+            writer.addr.eq(Cat((port.write_address + _LATER)[:bits], ~port.bank)),
+            writer.data.eq(port.write_data),
+            writer.en.eq(port.write_enable),
+        ]
+        return reader.data
+
+    def _multiply(
+        self, m: Module, write: tuple[Value, Value, Value], reload: tuple[ReloadPort, Signal] | None
+    ) -> Signal:
         """Build the table of steps, the rings, and the multiplier; return the sum."""
-        plan, graph = self._steps, self.datapath.stages[-1].graph
+        plan = self._steps
+        graph = (self.datapath if reload is None else with_room(self.datapath)).stages[-1].graph
         (port,) = self.datapath.inputs
         pairs = plan.pairs
         alone = pairs and any(step.second is None for step in plan.steps)
@@ -266,7 +320,7 @@ class RingCore(Shell):
                 "second": bits if pairs else 0,
                 "alone": int(alone),
                 "minus": int(differs),
-                "coefficient": signed(factor_bits),
+                **({"coefficient": signed(factor_bits)} if reload is None else {}),
             }
         )
         rows = [0] * (1 << (plan.last_step).bit_length())
@@ -275,11 +329,17 @@ class RingCore(Shell):
             second = step.first if step.second is None else step.second
             rows[k] |= step.first << at["first"] | (second << at["second"] if pairs else 0)
             rows[k + 1] |= (step.second is None) * alone << at["alone"] | (step.sign < 0) << at["minus"]
-            rows[k + 2] |= (step.coefficient & ((1 << factor_bits) - 1)) << at["coefficient"]
+            if reload is None:
+                rows[k + _LATER] |= (step.coefficient & ((1 << factor_bits) - 1)) << at["coefficient"]
         m.submodules.steps_memory = table = Memory(shape=layout.size, depth=len(rows), init=rows)
         reader = read_port(table, "steps")
         m.d.comb += [reader.addr.eq(self._step), reader.en.eq(1)]
         row = data.View(layout, reader.data)
+        if reload is None:
+            coefficient: Value = row.coefficient
+        else:
+            own = [0] * _LATER + [step.coefficient for step in plan.steps]
+            coefficient = self._coefficients(m, own + [0] * (len(rows) - len(own)), reload)
         taps = [self._ring(m, name, getattr(row, name), write) for name in ("first", "second")[: 1 + pairs]]
         pair = Signal(signed(plan.pair_bits(port)), name="pair", reset_less=True)
         first, second = taps[0], taps[-1]
@@ -287,7 +347,7 @@ class RingCore(Shell):
         both: Value = first if not pairs else Mux(row.minus, first - other, first + other) if differs else first + other
         product = Signal(signed(len(pair) + factor_bits), name="product", reset_less=True)
         # On the grid of the sum, which may be finer by what an offset of the output needs.
-        m.d.sync += [pair.eq(both), product.eq(pair * row.coefficient)]
+        m.d.sync += [pair.eq(both), product.eq(pair * coefficient)]
         grid, begin = self._rounding()
         source = graph.nodes[graph.inputs[0]]
         last = graph.nodes[graph.outputs[0]]

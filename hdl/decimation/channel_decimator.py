@@ -13,9 +13,9 @@
     what is kept       sample    control     sum 1    ..    sum N       comb 1    ..    comb N      o_data, o_valid
 
 The first sample of a channel is as if it had been there for ever: it is taken off all samples, so that the sums begin
-with 0, and added to each result, times ``R**N``. Of a channel that has not started, states count as 0; so only the
-control is cleared, a channel a clock after a reset. All sums are modulo ``2**width``, see
-`sosmith.model.dataflow.decimator`.
+with 0, and added to each result, times ``R**N``. With a start from zero there is none of that: it is not kept. Of a
+channel that has not started, states count as 0; so only the control is cleared, a channel a clock after a reset. All
+sums are modulo ``2**width``, see `sosmith.model.dataflow.decimator`.
 
 A sample without a result takes N + 2 clocks, one with a result 2N + 3. A sample of a channel that does not exist is
 accepted and dropped. `i_ready` comes from registers only.
@@ -100,7 +100,11 @@ class ChannelDecimator(wiring.Component):
         kept = self._control(m, channel, sample, gathered)
         adds = Signal()
         total = self._states(m, channel, (step, adds), kept.started, acc)
-        rounded = acc + (extended(self._code(kept.first), cic.width) << cic.growth)[: cic.width]
+        changed: Value = self._code(sample)
+        result: Value = acc
+        if cic.steady:
+            changed -= self._code(kept.first)
+            result = (acc + (extended(self._code(kept.first), cic.width) << cic.growth)[: cic.width])[: cic.width]
         with m.If(self.o_ready):
             m.d.sync += self.o_valid.eq(0)
         # One of these is 1 at each clock.
@@ -118,7 +122,7 @@ class ChannelDecimator(wiring.Component):
             with m.If(self.i_valid & (self.i_dest < self.channels)):
                 m.d.sync += [idle.eq(0), takes.eq(1)]
         with m.If(takes):
-            m.d.sync += [acc.eq(self._code(sample) - self._code(kept.first)), step.eq(0), takes.eq(0), adds.eq(1)]
+            m.d.sync += [acc.eq(changed), step.eq(0), takes.eq(0), adds.eq(1)]
         with m.If(adds):
             m.d.sync += [acc.eq(total), step.eq(step + 1)]
             with m.If((step == cic.stages - 1) & ~kept.completes):
@@ -129,7 +133,7 @@ class ChannelDecimator(wiring.Component):
         with m.If(gives & (~self.o_valid | self.o_ready)):
             m.d.comb += kept.writes.eq(1)
             m.d.sync += [
-                self.o_data.eq((rounded[: cic.width] + (1 << cic.dropped >> 1)) >> cic.dropped),
+                self.o_data.eq((result + (1 << cic.dropped >> 1)) >> cic.dropped),
                 self.o_flags.eq(kept.flags | gathered),
                 self.o_dest.eq(channel),
                 self.o_valid.eq(1),
@@ -146,7 +150,8 @@ class ChannelDecimator(wiring.Component):
         """Keep of each channel whether it has started, the phase, the flags, and the first sample."""
         cic, count = self.decimator, len(self.o_flags)
         phases = cic.factor.bit_length() - 1
-        m.submodules.control = memory = Memory(shape=1 + phases + count + len(sample), depth=self.channels, init=[])
+        size = 1 + phases + count + (len(sample) if cic.steady else 0)
+        m.submodules.control = memory = Memory(shape=size, depth=self.channels, init=[])
         read, write = read_port(memory, "control"), write_port(memory, "control")
         kept = _Kept(
             started=Signal(name="started"),
@@ -158,9 +163,10 @@ class ChannelDecimator(wiring.Component):
             writes=Signal(name="writes"),
         )
         phase = Signal(phases)
-        m.d.comb += kept.first.eq(sample)
+        if cic.steady:
+            m.d.comb += kept.first.eq(sample)
         with m.If(read.data[0]):
-            m.d.comb += Cat(kept.started, phase, kept.flags, kept.first).eq(read.data)
+            m.d.comb += Cat(kept.started, phase, kept.flags, kept.first)[:size].eq(read.data)
         flags = Mux(kept.completes, 0, kept.flags | gathered)
         m.d.comb += [
             kept.completes.eq(~phase.any()),
@@ -170,7 +176,7 @@ class ChannelDecimator(wiring.Component):
             write.addr.eq(channel),
         ]
         with m.If(kept.writes):
-            m.d.comb += write.data.eq(Cat(Const(1, 1), (phase + 1)[:phases], flags[:count], kept.first))
+            m.d.comb += write.data.eq(Cat(Const(1, 1), (phase + 1)[:phases], flags[:count], kept.first)[:size])
         return kept
 
     def _states(

@@ -14,7 +14,8 @@ Each stage holds what belongs to one sample, and has a valid bit; the combs move
 are modulo ``2**width``, see `sosmith.model.dataflow.decimator`.
 
 The first sample after a reset is offered for ``N R`` clocks before it is accepted, and goes in at each of them: after
-that the filter is as if it had been there for ever. Nothing that the sums or combs held before counts any more.
+that the filter is as if it had been there for ever. Nothing that the sums or combs held before counts any more. With a
+start from zero, a reset clears sums and combs instead, and nothing is filled.
 
 A sample that completes a result is not accepted before the core has taken the result before; all others are, one a
 clock. `s_axis_tready` comes from registers only.
@@ -34,11 +35,12 @@ The first sample goes into it before it is accepted, and waits behind it while t
 
 from __future__ import annotations
 
-from amaranth.hdl import Cat, ClockDomain, ClockSignal, DomainRenamer, Module, ResetSignal, Signal, Value
+from amaranth.hdl import Cat, ClockDomain, ClockSignal, Const, DomainRenamer, Module, ResetSignal, Signal, Value
 from amaranth.lib import data, wiring
 from amaranth.lib.wiring import In, Out
 
 from sosmith.hdl.axi_stream import codes_of, core_members, extended
+from sosmith.hdl.bus.axi_lite import forward_slave, slave_members
 from sosmith.hdl.cores.folded import FoldedCore
 from sosmith.hdl.cores.parallel import Core
 from sosmith.hdl.decimation.channel_decimator import ChannelDecimator
@@ -46,6 +48,7 @@ from sosmith.hdl.plan.streams import width
 from sosmith.hdl.status import OF_INPUT, at_rail
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.decimator import Decimator
+from sosmith.model.reload.registers import ADDRESS_BITS
 
 
 class CicDecimator(wiring.Component):
@@ -95,11 +98,10 @@ class CicDecimator(wiring.Component):
         m = Module()
         cic = self.decimator
         phase = Signal(range(cic.factor))
-        filling = Signal(init=1)
-        filled = Signal(range(cic.stages + 1))
         waiting = Signal()
         completes = Signal()
         enters = Signal()
+        filling = self._fill(m, enters & phase.all()) if cic.steady else Const(0, 1)
         m.d.comb += [
             completes.eq(~phase.any()),
             self.i_ready.eq(~filling & ~(waiting & completes)),
@@ -107,10 +109,6 @@ class CicDecimator(wiring.Component):
         ]
         with m.If(enters):
             m.d.sync += phase.eq(phase + 1)  # the factor is a power of two
-            with m.If(phase.all()):
-                m.d.sync += filled.eq(filled + 1)
-                with m.If(filled == cic.stages - 1):
-                    m.d.sync += filling.eq(0)
         with m.If(enters & completes & ~filling):
             m.d.sync += waiting.eq(1)
         with m.Elif(self.o_valid & self.o_ready):
@@ -125,6 +123,17 @@ class CicDecimator(wiring.Component):
         with m.Elif(self.o_ready):
             m.d.sync += self.o_valid.eq(0)
         return m
+
+    def _fill(self, m: Module, ends: Value) -> Signal:
+        """Return whether the first sample still fills the filter, from the last of each R times that it goes in."""
+        cic = self.decimator
+        filling = Signal(init=1, name="filling")
+        filled = Signal(range(cic.stages + 1), name="filled")
+        with m.If(ends):
+            m.d.sync += filled.eq(filled + 1)
+            with m.If(filled == cic.stages - 1):
+                m.d.sync += filling.eq(0)
+        return filling
 
     def _flag_rails(self, m: Module, accepted: Value, completes: Value) -> None:
         """Hold whether any sample of a result is at the end of the range, from the last of them on."""
@@ -149,22 +158,23 @@ class CicDecimator(wiring.Component):
         (code,) = codes_of([cic.input], self.i_data)
         value: Value = Signal(cic.width, name="code")
         m.d.comb += value.eq(extended(code, cic.width))
-        valid, last, real = enters, completes, counts
+        # From zero, every result counts.
+        valid, last, *real = (enters, completes, counts) if cic.steady else (enters, completes)
         for k in range(1, cic.stages + 1):
-            total = Signal(cic.width, name=f"sum{k}", reset_less=True)
+            total = Signal(cic.width, name=f"sum{k}", reset_less=cic.steady)
             with m.If(valid):
                 m.d.sync += total.eq(total + value)
             value = total
-            valid, last, real = self._later(m, f"integrator{k}", valid, last, real)
+            valid, last, *real = self._later(m, f"integrator{k}", valid, last, *real)
         moves = valid & last
         for k in range(1, cic.stages + 1):
-            before = Signal(cic.width, name=f"comb{k}", reset_less=True)
+            before = Signal(cic.width, name=f"comb{k}", reset_less=cic.steady)
             difference = Signal(cic.width, name=f"difference{k}", reset_less=True)
             with m.If(moves):
                 m.d.sync += [difference.eq(value - before), before.eq(value)]
             value = difference
-            moves, real = self._later(m, f"comb{k}", moves, real)
-        return value, moves, real
+            moves, *real = self._later(m, f"comb{k}", moves, *real)
+        return value, moves, real[0] if real else Const(1, 1)
 
     def _later(self, m: Module, name: str, valid: Value, *others: Value) -> tuple[Value, ...]:
         """Return bits of the control a clock later; the first, the valid bit, is 0 from a reset on."""
@@ -243,8 +253,8 @@ class DecimatedCore(wiring.Component):
 
     Members
     -------
-    aclk, aresetn, s_axis_*, m_axis_*
-        As in `sosmith.hdl.cores.parallel.Core`.
+    aclk, aresetn, s_axis_*, m_axis_*, s_axil_*
+        As in `sosmith.hdl.cores.parallel.Core`; the registers are those of `core`.
     """
 
     def __init__(
@@ -262,7 +272,8 @@ class DecimatedCore(wiring.Component):
         self.hold = hold
         self.core = core
         self.channels = core.channels
-        super().__init__(core_members(datapath.inputs, datapath.output, self.channels))
+        members = core_members(datapath.inputs, datapath.output, self.channels)
+        super().__init__(members if core.fingerprint is None else members | slave_members(ADDRESS_BITS))
 
     def elaborate(self, platform: object) -> Module:
         """Connect decimator and core."""
@@ -277,6 +288,7 @@ class DecimatedCore(wiring.Component):
             m.submodules.ahead = self.calibration
         m.submodules.decimator = DomainRenamer("front")(decimator)
         m.submodules.behind = core
+        forward_slave(m, self, core)
         if self.calibration is not None:
             self._connect_calibration(m, self.calibration, decimator)
         else:
@@ -330,11 +342,16 @@ class DecimatedCore(wiring.Component):
             decimator.i_valid.eq(calibration.m_axis_tvalid),
             calibration.m_axis_tready.eq(decimator.i_ready),
         ]
-        if isinstance(decimator, CicDecimator):
-            self._fill(m, calibration, decimator)
-        else:
+        if isinstance(decimator, ChannelDecimator):
             m.d.comb += calibration.s_axis_tdest.eq(self.s_axis_tdest)
             self._open(m, calibration.s_axis_tvalid, calibration.s_axis_tready)
+        elif decimator.decimator.steady:
+            self._fill(m, calibration, decimator)
+        else:
+            m.d.comb += [
+                calibration.s_axis_tvalid.eq(self.s_axis_tvalid),
+                self.s_axis_tready.eq(calibration.s_axis_tready),
+            ]
 
     def _open(self, m: Module, valid: Value, ready: Value) -> None:
         """Let samples in to what takes them, but not before all memories behind it are cleared."""

@@ -11,7 +11,10 @@ def latency_cycles(decimator: Decimator, channels: int = 1) -> int:
 
 
 def reset_cycles(decimator: Decimator, channels: int = 1) -> int:
-    """Clocks after a reset until the first sample is accepted, which is on offer."""
+    """Clocks after a reset until the first sample is accepted, which is on offer: while it fills the decimator.
+
+    With several channels, while these are cleared.
+    """
     return decimator.warm_up if channels == 1 else channels
 
 

@@ -11,6 +11,7 @@ from functools import cached_property
 
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.port import Port
+from sosmith.model.reload.constants import SPARE_BITS
 from sosmith.model.sections.fir import FirSection, Form
 
 PIPELINE = 4
@@ -47,9 +48,12 @@ class TapSteps:
     ----------
     section : FirSection
         In a form that keeps samples: direct, or symmetric.
+    loadable : bool
+        Whether other coefficients can be loaded: then the steps are the same for all.
     """
 
     section: FirSection
+    loadable: bool = False
 
     def __post_init__(self) -> None:
         if self.section.form is Form.TRANSPOSED:
@@ -62,7 +66,7 @@ class TapSteps:
 
     @cached_property
     def steps(self) -> tuple[TapStep, ...]:
-        """The products; a tap alone counts twice with half of its coefficient, if all such can."""
+        """The products; a tap alone counts twice with half of its coefficient, if all such can and none is loaded."""
         steps: list[TapStep] = []
         for product in self.section.products:
             coefficient = product.coefficient << self.frac - product.frac
@@ -76,7 +80,7 @@ class TapSteps:
                     steps.append(TapStep(sign * coefficient, first))
                 taps = rest
         alone = [step for step in steps if step.second is None]
-        if len(alone) < len(steps) and not any(step.coefficient % 2 for step in alone):
+        if not self.loadable and len(alone) < len(steps) and not any(step.coefficient % 2 for step in alone):
             return tuple(
                 replace(step, coefficient=step.coefficient // 2, second=step.first) if step.second is None else step
                 for step in steps
@@ -90,9 +94,9 @@ class TapSteps:
 
     @property
     def factor_bits(self) -> int:
-        """Bits of a coefficient, with its sign."""
+        """Bits of a coefficient, with its sign, and one to spare for others."""
         sizes = ((-c - 1 if c < 0 else c).bit_length() for c in (step.coefficient for step in self.steps))
-        return 1 + max(sizes)
+        return 1 + max(sizes) + (SPARE_BITS if self.loadable else 0)
 
     @staticmethod
     def pair_bits(port: Port) -> int:
@@ -126,8 +130,8 @@ class TapSteps:
         return channels if channels > 1 else self.words
 
 
-def tap_steps(datapath: Datapath) -> TapSteps:
-    """Return the steps of a datapath that is one FIR filter.
+def tap_steps(datapath: Datapath, *, loadable: bool = False) -> TapSteps:
+    """Return the steps of a datapath that is one FIR filter, for hardware whose coefficients are `loadable` or not.
 
     Raises
     ------
@@ -137,4 +141,4 @@ def tap_steps(datapath: Datapath) -> TapSteps:
     section, *others = datapath.stages
     if not isinstance(section, FirSection) or len(others) != 1:
         raise ValueError(f"stages must be an FIR filter and the output, not {len(datapath.stages)}")
-    return TapSteps(section)
+    return TapSteps(section, loadable)

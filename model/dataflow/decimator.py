@@ -10,7 +10,8 @@ coefficients are positive and add up to ``R**N``, so that its output lies within
 it needs ``N log2 R`` bits more. The integrators overflow, which does not matter: everything up to the rounding is
 computed modulo ``2**width``, and a result that fits `width` bits is exact.
 
-The first result belongs to the first sample, as if that had been there for ever; result n belongs to sample ``n R``.
+The first result belongs to the first sample, as if that had been there for ever, or the code 0 with a start from zero;
+result n belongs to sample ``n R``.
 """
 
 from __future__ import annotations
@@ -56,6 +57,8 @@ class Decimator:
         N, from 1 on: pairs of an integrator and a comb.
     dropped : int
         Bits that the rounding to nearest (halves upward) behind the last comb drops, 0 to `growth`.
+    steady : bool
+        Whether the first sample counts as if it had been there for ever, and not the code 0.
 
     Examples
     --------
@@ -71,6 +74,7 @@ class Decimator:
     factor: int
     stages: int
     dropped: int
+    steady: bool = True
 
     def __post_init__(self) -> None:
         if self.factor < 2 or self.factor & (self.factor - 1):
@@ -105,7 +109,7 @@ class Decimator:
     @property
     def bits_of_channel(self) -> int:
         """Bits that hardware for several channels keeps of each in memories: all sums, first sample, and phase."""
-        return 2 * self.stages * self.width + self.input.bits + self.factor.bit_length()
+        return 2 * self.stages * self.width + (self.input.bits if self.steady else 0) + self.factor.bit_length()
 
     @property
     def lsb(self) -> Fraction:
@@ -156,8 +160,13 @@ class Decimator:
 
     @property
     def warm_up(self) -> int:
-        """Times that the first sample goes in before it counts: then it has been there for ever."""
-        return self.stages * self.factor
+        """Times that the first sample goes in before it counts: then it has been there for ever. 0 from zero."""
+        return self.stages * self.factor if self.steady else 0
+
+    @property
+    def remembered(self) -> int:
+        """Results after a start that depend on what was before: as many as samples before them reach into."""
+        return self.stages - self.stages // self.factor
 
     def count(self, samples: int) -> int:
         """Count the results of so many samples."""
@@ -178,7 +187,8 @@ class Decimator:
         if not len(codes):
             return np.zeros(0, dtype=np.int64)
         # The arithmetic of unsigned words is modulo 2**64, a multiple of 2**width.
-        values = np.concatenate([np.repeat(codes[:1], self.warm_up), codes]).astype(np.int64).view(np.uint64)
+        before = np.repeat(codes[:1] if self.steady else 0, self.stages * self.factor)
+        values = np.concatenate([before, codes]).astype(np.int64).view(np.uint64)
         for _ in range(self.stages):
             values = np.cumsum(values, dtype=np.uint64)
         values = values[:: self.factor]

@@ -98,8 +98,9 @@ def entering_filter(codes: Codes, datapath: Datapath, polynomial: Polynomial | N
     if datapath.calibration is not None:
         values = calibrated(codes, datapath.inputs, polynomial)
         for _ in range(decimator.factor.bit_length() - 1):
-            for _ in range(decimator.stages):  # the first sample as if it had been there for ever
-                values = np.concatenate([values[:1], (values[1:] + values[:-1]) / 2])
+            for _ in range(decimator.stages):
+                before = values[:1] if decimator.steady else np.full(len(values[:1]), float(decimator.input.zero))
+                values = (values + np.concatenate([before, values[:-1]])) / 2
             values = values[::2]
         return values
     unrounded = replace(decimator, dropped=0)

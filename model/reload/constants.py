@@ -92,7 +92,7 @@ def with_room(datapath: Datapath) -> Datapath:
     """
     widths = {(constant.stage, constant.node): constant.bits for constant in constants(datapath)}
     stages: list[Stage] = []
-    ends = [(port.lowest, port.highest) for port in datapath.inputs]
+    ends = [(port.lowest, port.highest) for port in datapath.entry]
     for number, stage in enumerate(datapath.stages):
         bits = {node: width for (owner, node), width in widths.items() if owner == number}
         graph = _roomy(stage.graph, ends, bits)
@@ -133,7 +133,7 @@ def with_ranges(datapath: Datapath, ranges: Sequence[Mapping[str, tuple[int, int
         If the output's range leaves that of its port.
     """
     stages: list[Stage] = []
-    ends = [(port.lowest, port.highest) for port in datapath.inputs]
+    ends = [(port.lowest, port.highest) for port in datapath.entry]
     for stage, given in zip(datapath.stages, ranges, strict=True):
         nodes = stage.graph.nodes
         wide = [

@@ -2,9 +2,10 @@
 
 Reads ``job.json`` of the folder named by RELOAD_BENCH: ``words`` of the input stream, ``dests`` (their channels; empty
 if there is one channel only), ``loads`` (each a list of register writes [address, data], and whether it is right),
-``seed``. Writes ``outcome.json``: ``received`` (pairs of channel and word),
-``swaps`` (number of swaps before each sample that was taken), ``accepted`` (numbers of the loads in the order in which
-they were accepted), ``refused`` (those whose last write was refused).
+``seed``, ``behind`` (whether the core with the sets stands behind a decimator, whose samples count). Writes
+``outcome.json``: ``received`` (pairs of channel and word), ``swaps`` (number of swaps before each sample that was
+taken), ``accepted`` (numbers of the loads in the order in which they were accepted), ``refused`` (those whose last
+write was refused).
 """
 
 import json
@@ -23,25 +24,27 @@ OKAY, SLVERR = 0, 2
 class Bench:
     def __init__(self, dut: Any, job: dict[str, Any]) -> None:
         self.dut, self.job = dut, job
+        self.core = dut.behind if job["behind"] else dut
         self.pace = random.Random(job["seed"])
         self.falling = FallingEdge(dut.aclk)
         self.swaps = 0
         self.loading = True
         self.used: list[int] = []
+        self.taken = 0
         self.received: list[tuple[int, int]] = []
         self.accepted: list[int] = []
         self.refused: list[int] = []
 
     async def count_swaps(self) -> None:
         while True:
-            await ValueChange(self.dut.reload_port.bank)
+            await ValueChange(self.core.reload_port.bank)
             self.swaps += 1
 
     def swaps_before_sample(self) -> int:
         """Count the swaps before the sample that is taken now; a folded core has chosen its bank some clocks before."""
         if not self.job["folded"]:
             return self.swaps
-        return self.swaps - (int(self.dut.bank.value) != self.swaps % 2)
+        return self.swaps - (int(self.core.bank.value) != self.swaps % 2)
 
     async def send(self) -> None:
         dut, number = self.dut, 0
@@ -58,13 +61,23 @@ class Bench:
                     break
                 if self.job["folded"]:
                     await RisingEdge(dut.s_axis_tready)
-            self.used.append(self.swaps_before_sample())
+            if not self.job["behind"]:
+                self.used.append(self.swaps_before_sample())
             await RisingEdge(dut.aclk)
             number += 1
+            self.taken = number
             if self.pace.random() < 0.3:
                 dut.s_axis_tvalid.value = 0
                 await ClockCycles(dut.aclk, self.pace.randrange(1, 30))
         dut.s_axis_tvalid.value = 0
+
+    async def watch(self) -> None:
+        names = (("s_axis_tready", "advance"), ("s_axis_tvalid", "i_valid"))  # ports of a core, or of its buffer
+        ready, valid = (next(getattr(self.core, name) for name in each if hasattr(self.core, name)) for each in names)
+        while True:
+            await self.falling
+            if int(valid.value) and int(ready.value):
+                self.used.append(self.swaps_before_sample())
 
     async def receive(self) -> None:
         dut = self.dut
@@ -134,10 +147,12 @@ async def reloading(dut: Any) -> None:
     dut.aresetn.value = 1
     cocotb.start_soon(bench.count_swaps())
     cocotb.start_soon(bench.receive())
+    if bench.job["behind"]:
+        cocotb.start_soon(bench.watch())
     loading = cocotb.start_soon(bench.load())
     await bench.send()
     await loading
     await ClockCycles(dut.aclk, 3000)
     names = ("received", "accepted", "refused")
-    outcome = {name: getattr(bench, name) for name in names} | {"swaps": bench.used}
+    outcome = {name: getattr(bench, name) for name in names} | {"swaps": bench.used, "taken": bench.taken}
     (folder / "outcome.json").write_text(json.dumps(outcome))

@@ -111,6 +111,7 @@ def run(
         "loads": loads,
         "seed": seed,
         "folded": made.architecture.program is not None,
+        "behind": False,
     }
     (folder / "core.sv").write_text(source)
     (folder / "job.json").write_text(json.dumps(job))

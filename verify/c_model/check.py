@@ -25,6 +25,7 @@ from sosmith.verify.c_model.frame import (
     RESET,
     STEP,
     SUMS,
+    WARM_UP,
     WEAR,
     filled,
     ticks,
@@ -263,7 +264,7 @@ class _Model:
         inputs = self._certificate.inputs
         codes = ", ".join(f"{port.name}_code" for port in inputs)
         taken, flags = inputs[0], "uint8_t flags;"
-        calibrates = entry.calibration is not None
+        calibrates, steady = entry.calibration is not None, self._certificate.ideal.start is not None
         return filled(
             text,
             NAME=self._name,
@@ -273,7 +274,8 @@ class _Model:
             FIRST=f"{flags} const int64_t code = ahead_step(NULL, {codes}, &flags);"
             if calibrates
             else f"const int64_t code = {codes}; {flags}",
-            WARM=entry.stages * entry.factor,
+            STARTED="started," if steady else "",
+            WARM_UP=filled(WARM_UP, WARM=entry.stages * entry.factor, FACTOR=entry.factor) if steady else "",
             FACTOR=entry.factor,
             KEPT="flags" if calibrates else "at_rail",
             SEEN="flags & 0x03" if calibrates else f"code == {taken.lowest} || code == {taken.highest}",

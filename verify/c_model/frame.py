@@ -148,14 +148,7 @@ static int64_t comb(NAME_decimator *state) {
 int NAME_push(NAME_decimator *state, TAKEN, int64_t *result, uint8_t *status) {
     FIRST
     int found = 0;
-    if (!state->started) {
-        for (size_t k = 0; k < WARM; k++) {
-            integrate(state, code);
-            if (k % FACTOR == 0)
-                comb(state);
-        }
-        state->started = 1;
-    }
+    WARM_UP
     integrate(state, code);
     state->KEPT |= SEEN;
     if (state->phase == 0) {
@@ -169,6 +162,17 @@ int NAME_push(NAME_decimator *state, TAKEN, int64_t *result, uint8_t *status) {
     state->phase = (state->phase + 1) % FACTOR;
     return found;
 }
+"""
+
+WARM_UP = """
+    if (!state->started) {
+        for (size_t k = 0; k < WARM; k++) {
+            integrate(state, code);
+            if (k % FACTOR == 0)
+                comb(state);
+        }
+        state->started = 1;
+    }
 """
 
 HEADER = """
@@ -237,7 +241,7 @@ int NAME_push(NAME_decimator *state, TAKEN, int64_t *result, uint8_t *status);
 DECIMATOR = """
 typedef struct {
     uint64_t sums[STAGES], combs[STAGES];
-    unsigned phase, started, KEPT;
+    unsigned phase, STARTED KEPT;
     NAME_state filter;
 } NAME_decimator;
 

@@ -31,6 +31,7 @@ from sosmith.verify.chain.manifest import check_chain_manifest
 from sosmith.verify.chain.responses import Part, factor_of, parts_of, peak_gain, reach_of, rise_of
 from sosmith.verify.chain.top import Stage, check_top
 from sosmith.verify.chain.words import check_words
+from sosmith.verify.decimation import samples_of_filter
 from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.verdict.door import Judgement, Stated, judge
 from sosmith.verify.verdict.generated_files import about_of, ascii_text, content_of, sha256, unicode_text
@@ -270,7 +271,8 @@ def _flags(chain: ChainCertificate, groups: Groups, items: Sequence[Sequence[Ite
     for cores in groups:
         own = parts_of(cores)
         rates.append((rise_of(own), factor_of(own)))
-        settled = -(-(settled + max(core.claims.settling or 0 for core in cores)) * rates[-1][0] // rates[-1][1])
+        settled += max((core.claims.settling or 0) * samples_of_filter(core) for core in cores)
+        settled = -(-settled * rates[-1][0] // rates[-1][1])
     timing = timing_of(rates[1:])
     count, settling = timing.bringing(settled) if len(groups) > 1 else (settled, settled)
     require(chain.settling == settling, f"settling of the chain must be {settling} results, not {chain.settling}")

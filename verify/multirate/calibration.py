@@ -9,7 +9,7 @@ r"""How a calibration is wired before a decimator: its first sample fills the de
 
 A source holds a sample until it is accepted. So the first one goes into the calibration once, and its result stays
 there while the decimator fills, which takes it at each clock and accepts it at the end. From then on, each sample that
-is accepted goes into the calibration, and each of its results into the decimator.
+is accepted goes into the calibration, and each of its results into the decimator; with a start from zero, all do.
 """
 
 from __future__ import annotations
@@ -129,11 +129,14 @@ class CalibrationPorts:
         Whether the decimator takes a result.
     width : int
         Bits of `s_axis_tdata`.
+    fills : bool
+        Whether the first sample fills the decimator.
     """
 
     connections: CalibrationConnections
     ready: Callable[[Logic], int]
     width: int
+    fills: bool
 
     @property
     def nets(self) -> Mapping[str, int]:
@@ -144,6 +147,8 @@ class CalibrationPorts:
     @property
     def registers(self) -> Mapping[str, RegisterShape]:
         """What is done with the first sample."""
+        if not self.fills:
+            return {}
         return {"first": RegisterShape(1, 1), "fills": RegisterShape(1, 0), "filled": RegisterShape(1, 0)}
 
     @property
@@ -157,7 +162,9 @@ class CalibrationPorts:
             return now.word(self.connections.entering[name])
         if name == self.connections.ready:
             return constant(self.ready(now))
-        first, fills, filled = (now.bit(register) for register in ("first", "fills", "filled"))
+        first, fills, filled = (
+            (now.bit(register) for register in ("first", "fills", "filled")) if self.fills else (0, 0, 0)
+        )
         flows = not (first or fills or filled)
         if name == self.connections.offered:
             return constant(int((first or flows) and now.bit(SOURCE)))

@@ -20,6 +20,8 @@
   else goes on until then. With the last step of a sample its control word is written back. So each sample finds what
   the one before has left.
 
+With a start from zero there is no first sample: none is kept, taken off or added.
+
 The states of step k + 1 are read while step k writes its own; the control word is read only while nothing is written.
 """
 
@@ -149,7 +151,8 @@ def check_channels(
     def valid(now: Logic) -> int:
         return gate.offered(now) if calibration is None else now.bit(calibration.valid)
 
-    cic = ChannelCic(entry, port, channels, connections, names, enters, valid, netlist.widths[taken])
+    steady = certificate.ideal.start is not None
+    cic = ChannelCic(entry, port, channels, connections, names, enters, valid, netlist.widths[taken], steady=steady)
     gate: Gate = Gate(closed.first, closed.width, cic.ready, calibration, netlist.widths)
     return check_parts(netlist, [leaving, cic, gate], Signals({**layout, **cic.layout}, cic.one_hot), cic)
 
@@ -181,6 +184,8 @@ class ChannelCic:
         Whether there is a sample.
     dest_width : int
         Width of the port of the core that takes the channel.
+    steady : bool
+        Whether the first sample of a channel counts as if it had been there for ever.
     """
 
     entry: DecimationEntry
@@ -191,6 +196,7 @@ class ChannelCic:
     enters: _Enters
     valid: Callable[[Logic], int]
     dest_width: int
+    steady: bool
 
     # What there is.
 
@@ -226,7 +232,7 @@ class ChannelCic:
     @property
     def memories(self) -> Mapping[str, MemoryShape]:
         """The control words, and the states."""
-        word = 1 + self._phase_bits + self._flag_bits + self.port.bits
+        word = 1 + self._phase_bits + self._flag_bits + (self.port.bits if self.steady else 0)
         return {
             _CONTROL: MemoryShape(word, self.channels),
             _STATES: MemoryShape(self.entry.width, self.channels << self._step_bits),
@@ -236,7 +242,7 @@ class ChannelCic:
     def layout(self) -> Mapping[str, list[Field]]:
         """What a control word is made of."""
         fields = [Field(_STARTED, 1), Field(_PHASE, self._phase_bits), Field(_FLAGS, self._flag_bits)]
-        return {self.names.control: [*fields, Field(_FIRST, self.port.bits)]}
+        return {self.names.control: [*fields, Field(_FIRST, self.port.bits)] if self.steady else fields}
 
     @property
     def one_hot(self) -> Mapping[str, tuple[str, int]]:
@@ -416,10 +422,14 @@ class ChannelCic:
         return int(low == high and low in {self.port.lowest % (1 << self.port.bits), self.port.highest})
 
     def _first(self, now: Logic) -> Form:
-        """Return the bits of the channel's first sample."""
+        """Return the bits of the channel's first sample; nothing with a start from zero."""
+        if not self.steady:
+            return {}
         return now.signal(_FIRST) if self._started(now) else now.word(CIC + "sample")
 
     def _signed_first(self, now: Logic) -> Form:
+        if not self.steady:
+            return {}
         return self._signed(now, _FIRST if self._started(now) else CIC + "sample")
 
     def _signed(self, now: Logic, signal: str) -> Form:

@@ -15,7 +15,8 @@ before the first clock leave no sample and no result. That this is a CIC filter 
   held before does not count, as each comb takes away a power of the polynomial that comes of it.
 - While `filling` is 1, no sample is accepted, but the one that is offered goes in at each clock, N R times: N of them
   move the combs, and no result counts. Then every sum that counts is of samples since the reset, the first of them
-  with those that it stands for.
+  with those that it stands for. With a start from zero there is no `filling`: sums and combs are 0 before the first
+  clock and after a reset, as if all samples before had been 0, and every result counts.
 - A sample is accepted with the phase 0 only when no result is `waiting`, from the sample that completes it until it is
   taken. So each result finds `o_data` free, and stays until it is taken.
 - The holder takes a word when it is empty or hands out the last of its copies, and hands out R of each.
@@ -110,7 +111,8 @@ def check_decimator(text: str, certificate: Certificate, channels: int = 1) -> D
         registers = _check_one(netlist, box, certificate, connections, leaving)
     else:
         registers = check_channels(netlist, box, certificate, channels, connections, shell.names, leaving)
-    check_passed(netlist, connections, word, (channels - 1).bit_length())
+    settles = certificate.claims.settling is not None
+    check_passed(netlist, connections, word, (channels - 1).bit_length(), settles=settles)
     check_signs(shell.modules, output, CLOCK)
     return DecimatorVerdict(registers, entry.factor if word else 1, channels)
 
@@ -149,16 +151,16 @@ def _check_one(
     netlist: Netlist, box: Module | None, certificate: Certificate, connections: CoreConnections, leaving: Part
 ) -> int:
     """Check the decimator of one channel, and what is before it."""
-    entry = certificate.decimation
+    entry, steady = certificate.decimation, certificate.ideal.start is not None
     assert entry is not None
     if entry.calibration is None:
         (port,) = certificate.inputs
-        cic = _Cic(entry, port, connections, _Source(SOURCE, DATA, ()), {"s_axis_tready": 1})
+        cic = _Cic(entry, port, connections, _Source(SOURCE, DATA, ()), {"s_axis_tready": 1}, steady=steady)
         return check_parts(netlist, [leaving, cic], Signals({DATA: [Field(DATA, port.bits)]}))
     port = entry.calibration.output
     calibration = calibration_connections(netlist, box, port.bits)
-    cic = _Cic(entry, port, connections, _Source(calibration.valid, CODE, FLAGS), {})
-    parts = [leaving, cic, CalibrationPorts(calibration, cic.ready, netlist.widths[DATA])]
+    cic = _Cic(entry, port, connections, _Source(calibration.valid, CODE, FLAGS), {}, steady=steady)
+    parts = [leaving, cic, CalibrationPorts(calibration, cic.ready, netlist.widths[DATA], fills=steady)]
     return check_parts(netlist, parts, Signals(layout_of(netlist, calibration, port)))
 
 
@@ -179,13 +181,17 @@ class _Source(NamedTuple):
 
 @dataclass(frozen=True)
 class _Cic:
-    """The decimator, up to what enters the core; `accepting` are nets that say whether it takes a sample."""
+    """The decimator, up to what enters the core.
+
+    `accepting` are nets that say whether it takes a sample, and `steady` says whether the first one fills it.
+    """
 
     entry: DecimationEntry
     port: PortEntry
     connections: CoreConnections
     source: _Source
     accepting: Mapping[str, int]
+    steady: bool
 
     @property
     def nets(self) -> Mapping[str, int]:
@@ -198,14 +204,15 @@ class _Cic:
     def registers(self) -> Mapping[str, RegisterShape]:
         """Control, N sums, N combs and differences, and the output."""
         bits, flags, width = self.entry.factor.bit_length() - 1, len(self.source.flags), self.entry.width
-        shapes = {"phase": RegisterShape(bits, 0), "filled": RegisterShape(self.entry.stages.bit_length(), 0)}
-        shapes |= {"filling": RegisterShape(1, 1), "waiting": RegisterShape(1, 0)}
+        shapes = {"phase": RegisterShape(bits, 0), "waiting": RegisterShape(1, 0)}
+        if self.steady:
+            shapes |= {"filled": RegisterShape(self.entry.stages.bit_length(), 0), "filling": RegisterShape(1, 1)}
         for k in range(1, self.entry.stages + 1):
             shapes |= dict.fromkeys((f"integrator{k}_control0", f"comb{k}_control0"), RegisterShape(1, 0))
-            shapes |= dict.fromkeys(
-                (f"integrator{k}_control1", f"integrator{k}_control2", f"comb{k}_control1"), RegisterShape(1, None)
-            )
-            shapes |= dict.fromkeys((f"sum{k}", f"comb{k}", f"difference{k}"), RegisterShape(width, None))
+            counting = (f"integrator{k}_control2", f"comb{k}_control1") if self.steady else ()
+            shapes |= dict.fromkeys((f"integrator{k}_control1", *counting), RegisterShape(1, None))
+            shapes |= dict.fromkeys((f"sum{k}", f"comb{k}"), RegisterShape(width, None if self.steady else 0))
+            shapes[f"difference{k}"] = RegisterShape(width, None)
         shapes |= {"o_valid": RegisterShape(1, 0), "o_data": RegisterShape(width - self.entry.dropped, None)}
         flag_shapes = {"found": RegisterShape(flags, 0), "o_flags": RegisterShape(flags, None)}
         shapes |= flag_shapes if flags else {"rail": RegisterShape(1, 0), "o_rail": RegisterShape(1, None)}
@@ -222,7 +229,9 @@ class _Cic:
         code = tuple((start, after - 1) for start, after in pairwise(sorted(starts)))
         last, count = self.entry.factor - 1, 1 << self.entry.stages.bit_length()
         phase = ((0, 0), (1, last - 1), (last, last)) if last > 1 else BIT
-        ranges: dict[str, Ranges] = {CIC + "phase": phase, CIC + "filled": tuple((k, k) for k in range(count))}
+        ranges: dict[str, Ranges] = {CIC + "phase": phase}
+        if self.steady:
+            ranges[CIC + "filled"] = tuple((k, k) for k in range(count))
         if self.source.flags:
             ranges[CIC + "found"] = tuple((k, k) for k in range(1 << len(self.source.flags)))
             ranges |= dict.fromkeys(self.source.flags, BIT)
@@ -297,15 +306,19 @@ class _Cic:
 
     def ready(self, now: Logic) -> int:
         """Whether a sample would be accepted."""
-        return int(not self._bit(now, "filling") and not (self._completes(now) and self._bit(now, "waiting")))
+        return int(not self._filling(now) and not (self._completes(now) and self._bit(now, "waiting")))
+
+    def _filling(self, now: Logic) -> int:
+        """Whether the first sample still fills the decimator."""
+        return self._bit(now, "filling") if self.steady else 0
 
     def _enters(self, now: Logic) -> int:
         """Whether a sample goes in."""
-        return int(now.bit(self.source.valid) and (self._bit(now, "filling") or self.ready(now)))
+        return int(now.bit(self.source.valid) and (self._filling(now) or self.ready(now)))
 
     def _accepted(self, now: Logic) -> int:
         """Whether it is accepted as well."""
-        return int(self._enters(now) and not self._bit(now, "filling"))
+        return int(self._enters(now) and not self._filling(now))
 
     def _completes(self, now: Logic) -> int:
         """Whether it would complete a result."""
@@ -330,14 +343,18 @@ class _Cic:
 
     def _summed(self, now: Logic, stage: int, what: int) -> int:
         """Of the sample behind a sum: whether there is one, whether it completes a result, and whether that counts."""
+        if what == 2 and not self.steady:
+            return 1
         if stage:
             return self._bit(now, f"integrator{stage}_control{what}")
         if what == 2:
-            return 1 - self._bit(now, "filling")
+            return 1 - self._filling(now)
         return self._completes(now) if what else self._enters(now)
 
     def _combed(self, now: Logic, stage: int, what: int) -> int:
         """Of the sample behind a comb: whether there is one, and whether the result counts."""
+        if what and not self.steady:
+            return 1
         if stage:
             return self._bit(now, f"comb{stage}_control{what}")
         last = self.entry.stages

@@ -25,6 +25,9 @@ OF_INPUT = 2
 
 CLOCK, DATA, DEST = "aclk", "s_axis_tdata", "s_axis_tdest"
 
+REGISTERS = "s_axil_"
+"""Prefix of the ports of the register interface."""
+
 
 @dataclass(frozen=True)
 class CoreConnections:
@@ -169,12 +172,13 @@ def _entering(
 ) -> tuple[dict[str, str], list[str]]:
     """Return the inputs of a core that have one of some nets, in all their bits or extended; and those without."""
     wanted = (*whole, *extended)
-    sources = {name: _source(netlist, name) for name in sorted(netlist.inlets) if name.startswith(prefix)}
+    own = sorted(name for name in netlist.inlets if name.startswith(prefix))
+    sources = {name: _source(netlist, name) for name in own if not name.startswith(prefix + REGISTERS)}
     for source in (CLOCK, *wanted):
         names = [name for name, net in sources.items() if net == source]
         require(len(names) == 1, f"one port of the core must be {source}, not {len(names)}")
-        own, other = netlist.widths[names[0]], netlist.widths[source]
-        require(own == other or source in extended, f"{names[0]} must have {other} bits, as {source} has, not {own}")
+        bits, other = netlist.widths[names[0]], netlist.widths[source]
+        require(bits == other or source in extended, f"{names[0]} must have {other} bits, as {source} has, not {bits}")
     entering = {name: source for name, source in sources.items() if source in wanted}
     return entering, [name for name, source in sources.items() if source not in {CLOCK, *wanted}]
 

@@ -90,7 +90,8 @@ def decimated_entry(certificate: Certificate, behind: Certificate, graph: FlatGr
     whole = -int(-most // 1)
     total = error + half + following.error
     bounds = (step, zero, error, whole)
-    text = _averaged(certificate, bounds, alone) + _joined(bounds, half, total, behind, following, graph, taken)
+    text = _averaged(certificate, bounds, alone)
+    text += _joined(certificate, bounds, half, total, behind, following, graph, taken)
     claims.append(Claim("calibrated_input", _words(total), text))
     exact, late = "(averaged_input x)", "(fun n => averaged_input z (m + n)%nat)"
     return Entry(claims, "given", "(decimated x)", "(decimated_within x X)", exact, late, total, whole)
@@ -204,22 +205,51 @@ Qed.
 def _decimator(certificate: Certificate, behind: Certificate, port: PortEntry, alone: Certificate | None) -> Claim:
     entry, (code,) = certificate.decimation, behind.inputs
     assert entry is not None
-    signed = "true" if port.signed else "false"
-    ends = " ".join(number(end) for end in (port.lowest, port.highest, code.lowest, code.highest))
+    signed, codes, at = "true" if port.signed else "false", _codes(certificate), _result(certificate, "n")
+    low, high, *others = map(number, (port.lowest, port.highest, code.lowest, code.highest))
+    ends = " ".join((low, high, *others))
+    preceded = ""
+    if certificate.ideal.start is None:
+        preceded = f"""\
+Lemma preceded_within : forall x, inputs_within given x -> forall n, {low} <= {codes} n <= {high}.
+Proof.
+  intros x X. apply (preceded_holds decimator_ (fun c => {low} <= c <= {high})); [lia|exact (taken_within x X)].
+Qed.
+"""
     text = f"""\
 (* The decimator, and what the core takes of codes x of the inputs. *)
 Definition decimator_ : decimator := Decimator {entry.factor} {entry.stages} {entry.width} {entry.dropped} {signed}.
-Definition decimated (x : nat -> nat -> Z) (n p : nat) : Z := decimate decimator_ (taken_codes x) n.
+Definition decimated (x : nat -> nat -> Z) (n p : nat) : Z := decimate decimator_ {codes} {at}.
 Lemma decimator_is_fit : decimator_fits decimator_ {ends} = true.
 Proof. vm_cast_no_check (eq_refl true). Qed.
+{preceded}\
 Theorem decimated_within : forall x, inputs_within given x -> inputs_within ports (decimated x).
 Proof.
   intros x X n [|p] P.
-  - exact (decimate_within decimator_ {ends} (taken_codes x) decimator_is_fit (taken_within x X) n).
+  - exact (decimate_within decimator_ {ends} {codes} decimator_is_fit {_within(certificate)} {at}).
   - simpl in P. inversion P as [|q Q]. inversion Q.
 Qed.
 """
     return Claim("decimated_within", "what leaves the decimator is in the range of the core", text)
+
+
+# From zero, the samples of one more result come before the first sample, all of them 0: result n is the next one.
+
+
+def _codes(certificate: Certificate) -> str:
+    """Write what the decimator works on of inputs `x`."""
+    codes = "(taken_codes x)"
+    return codes if certificate.ideal.start is not None else f"(preceded decimator_ 0%Z {codes})"
+
+
+def _within(certificate: Certificate) -> str:
+    """Write the proof that this is in its range."""
+    return "(taken_within x X)" if certificate.ideal.start is not None else "(preceded_within x X)"
+
+
+def _result(certificate: Certificate, n: str) -> str:
+    """Write which of its results is number `n`."""
+    return n if certificate.ideal.start is not None else f"(S {n})"
 
 
 def _ahead(alone: Certificate, graph: FlatGraph, place: int, made: Calibration) -> list[Claim]:
@@ -246,6 +276,7 @@ _Bounds = tuple[Fraction, Fraction, Fraction, int]
 def _averaged(certificate: Certificate, bounds: _Bounds, alone: Certificate | None) -> str:
     """Write the exact input of the filter, and that the samples are near what it is the mean of."""
     step, zero, error, most = bounds
+    exact = _exact(certificate, zero)
     near = f"(Rabs (calibrated (x m) - ({real(step)} * IZR (taken_codes x m) + {real(zero)})) <= {real(error)})%R"
     if alone is None:
         low, high = certificate.inputs[0].lowest, certificate.inputs[0].highest
@@ -274,7 +305,8 @@ Qed.
     return f"""\
 {_calibrated("calibrated", formula(certificate))}\
 (* The exact input of the filter: means of that, as many in a row as the decimator has stages. *)
-Definition averaged_input (x : nat -> nat -> Z) : nat -> R := averaged decimator_ (fun m => calibrated (x m)).
+Definition averaged_input (x : nat -> nat -> Z) (n : nat) : R :=
+  averaged decimator_ {exact} {_result(certificate, "n")}.
 {unit}\
 Lemma calibrated_near : forall x, inputs_within given x -> forall m,
   {near} /\\ (Rabs (calibrated (x m)) <= IZR {most})%R.
@@ -285,7 +317,14 @@ Qed.
 """
 
 
+def _exact(certificate: Certificate, zero: Fraction) -> str:
+    """Write what the exact decimator works on of inputs `x`."""
+    exact = "(fun m => calibrated (x m))"
+    return exact if certificate.ideal.start is not None else f"(preceded decimator_ {real(zero)}%R {exact})"
+
+
 def _joined(
+    certificate: Certificate,
     bounds: _Bounds,
     half: Fraction,
     total: Fraction,
@@ -299,6 +338,14 @@ def _joined(
     (code,) = behind.inputs
     ends = " ".join(number(end) for end in (code.lowest, code.highest))
     lsb = Fraction(code.lsb / behind.output.lsb)
+    exact, codes, at = _exact(certificate, zero), _codes(certificate), _result(certificate, "m")
+    near = "(calibrated_near x X)"
+    if certificate.ideal.start is None:
+        holds = f"Rabs (c - ({real(step)} * IZR z + {real(zero)})) <= {real(error)} /\\ Rabs c <= IZR {most}"
+        both = f"(fun c z => ({holds})%R)"
+        near = (
+            f"(preceded_near decimator_ {both} {real(zero)}%R 0%Z _ _ ltac:(split; apply Rabs_le; split; lra) {near})"
+        )
     return f"""\
 {_calibrated("scaled_behind", following.physical)}\
 {_followed("behind_is_scaled", ("scaled_behind", "core", "ports"), following, 1, graph, taken)}\
@@ -306,14 +353,14 @@ Lemma decimator_step : ({real(step)} * IZR (2 ^ dropped decimator_) / IZR (gain_
 Proof. vm_compute (2 ^ dropped decimator_). vm_compute (gain_of decimator_). field. Qed.
 Lemma decimator_half : ({real(step)} * IZR (2 ^ dropped decimator_ / 2) / IZR (gain_of decimator_) = {real(half)})%R.
 Proof. vm_compute (2 ^ dropped decimator_ / 2). vm_compute (gain_of decimator_). field. Qed.
-Lemma averaged_is : forall x m, averaged_input x m = averaged decimator_ (fun i => calibrated (x i)) m.
+Lemma averaged_is : forall x m, averaged_input x m = averaged decimator_ {exact} {at}.
 Proof. reflexivity. Qed.
-Lemma decimated_is : forall x m, decimated x m 0%nat = decimate decimator_ (taken_codes x) m.
+Lemma decimated_is : forall x m, decimated x m 0%nat = decimate decimator_ {codes} {at}.
 Proof. reflexivity. Qed.
 Lemma scaled_from : forall c, scaled_behind c = ({real(lsb)} * IZR (c 0%nat) + {real(zero)})%R.
 Proof. intros c. unfold scaled_behind. cbv zeta. generalize (IZR (c 0%nat)). intros z. field. Qed.
 Lemma scaled_is : forall x m,
-  scaled_behind (decimated x m) = ({real(lsb)} * IZR (decimate decimator_ (taken_codes x) m) + {real(zero)})%R.
+  scaled_behind (decimated x m) = ({real(lsb)} * IZR (decimate decimator_ {codes} {at}) + {real(zero)})%R.
 Proof. intros x m. rewrite scaled_from, decimated_is. reflexivity. Qed.
 Theorem calibrated_input : forall x, inputs_within given x -> forall m,
   (Rabs (averaged_input x m - IZR (code core (decimated x) {taken} m) * {_units("core", taken)})
@@ -321,9 +368,9 @@ Theorem calibrated_input : forall x, inputs_within given x -> forall m,
 Proof.
   intros x X m. rewrite averaged_is.
   destruct (behind_is_scaled (decimated x) (decimated_within x X) m) as [A _]. rewrite scaled_is in A.
-  destruct (decimate_near decimator_ _ _ {ends} (taken_codes x) decimator_is_fit (taken_within x X)
-    (fun i => calibrated (x i)) {real(step)} {real(zero)} {real(error)} (IZR {most})
-    ltac:(lra) (calibrated_near x X) m) as [B C].
+  destruct (decimate_near decimator_ _ _ {ends} {codes} decimator_is_fit {_within(certificate)}
+    {exact} {real(step)} {real(zero)} {real(error)} (IZR {most})
+    ltac:(lra) {near} {at}) as [B C].
   rewrite decimator_step, decimator_half in B. split; [|exact C].
   apply (near_near _ _ _ _ _ _ B A). lra.
 Qed.

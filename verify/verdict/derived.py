@@ -19,6 +19,7 @@ from sosmith.verify.certificate_file import (
     PortEntry,
     StageEntry,
 )
+from sosmith.verify.decimation import samples_of_filter
 from sosmith.verify.graph import inputs_of
 from sosmith.verify.verdict.figures import Figure
 from sosmith.verify.verdict.operators import bits, operators
@@ -74,7 +75,7 @@ def settling_of(certificate: Certificate, rate: Fraction) -> dict[str, Any] | No
         return None
     return {
         "samples": samples,
-        "seconds": Figure(samples / rate),
+        "seconds": Figure(samples * samples_of_filter(certificate) / rate),
         "limit": Figure(certificate.output.lsb * _HALF),
     }
 

@@ -11,7 +11,7 @@ from sosmith.gen.filter.design import Filter
 from sosmith.gen.specification.specification import FilterSpec
 from sosmith.gen.word_lengths.decimation.calibration import calibration_before_decimator
 from sosmith.gen.word_lengths.quantize import gain_of
-from sosmith.gen.word_lengths.quantized import CALIBRATION, DECIMATION, Quantized
+from sosmith.gen.word_lengths.quantized import Quantized, counted
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.decimator import MAX_WIDTH, Decimator
 from sosmith.model.errors import ShortfallError
@@ -97,17 +97,7 @@ class PreStage:
 
     def counted(self, quantized: Quantized) -> Quantized:
         """Return the proven filter with the parts of decimator and calibration in its budget."""
-        budget = {DECIMATION: self.rounding, **quantized.budget} if self.rounding else quantized.budget
-        if self.calibration is None:
-            return replace(quantized, budget=budget, decimation=self.decimation)
-        return replace(
-            quantized,
-            polynomial=self.calibration.polynomial,
-            budget={CALIBRATION: self.input_error * self.gain, **budget},
-            input_error=self.input_error,
-            decimation=self.decimation,
-            calibration=self.calibration,
-        )
+        return counted(quantized, self.gain, self.decimation, self.decimator, self.calibration)
 
 
 def pre_stage_of(
@@ -118,6 +108,8 @@ def pre_stage_of(
     max_error: Fraction,
     polynomial: Polynomial | None = None,
     name: str = "calibration",
+    *,
+    steady: bool = True,
 ) -> tuple[PreStage | None, str]:
     """Choose the decimator before a filter.
 
@@ -137,6 +129,8 @@ def pre_stage_of(
         Calibration; None if the decimator takes the input itself, which then has the unit of the output.
     name : str
         Name of the core of the calibration.
+    steady : bool
+        Whether the first sample counts as if it had been there for ever.
 
     Returns
     -------
@@ -171,7 +165,8 @@ def pre_stage_of(
     gain = gain_of(filter_)
     before = calibration(gain)
     x = inputs[0] if before is None else before.datapath.output
-    decimator = _rounded(x, decimation, coarsest=gain * x.lsb / output.lsb / 2, allowed=allowed)
+    coarsest = gain * x.lsb / output.lsb / 2
+    decimator = replace(_rounded(x, decimation, coarsest=coarsest, allowed=allowed), steady=steady)
     rounding = gain * decimator.rounding / output.lsb
     if rounding > allowed * _LARGEST_SHARE:
         raise ShortfallError(

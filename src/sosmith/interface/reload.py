@@ -67,10 +67,11 @@ class Reload(View):
             rows.append(("filter", quantized.filter.describe))
         rows.append(("error bound", f"{float(bound):.3g}{unit} of {float(allowed):.3g}{unit} allowed"))
         rows.append(("headroom", f"{float(allowed - bound):.3g}{unit}, {float(100 * (1 - bound / allowed)):.1f} %"))
-        fades = f"{swap.samples:,} samples, {swap.samples / rate:.3g} s, until the bound holds again"
-        rows.append(("transient", fades if swap.samples else "none, the bound holds from the first sample"))
+        samples = swap.samples * quantized.samples_of_input
+        fades = f"{samples:,} samples, {samples / rate:.3g} s, until the bound holds again"
+        rows.append(("transient", fades if samples else "none, the bound holds from the first sample"))
         if core.architecture.restarts:
-            settling = core.quantized.settling
+            settling = core.quantized.settling_of_input
             flagged = f"from zero; it flags {settling:,} samples as settling, {settling / rate:.3g} s"
             rows.append(("the core restarts", flagged if settling else "in the steady state of its next sample"))
         if swap.use:

@@ -11,7 +11,7 @@ from tests.gen.designs import EXAMPLES
 
 from sosmith.gen.calibration.day_room import chebyshev, with_day_room
 from sosmith.gen.core import CoreDesign, design_core
-from sosmith.gen.reload.reload import ROOM, OtherSet, check_swap, other_set, parallel_bank
+from sosmith.gen.reload.reload import ROOM, OtherSet, check_swap, other_set
 from sosmith.gen.specification.specification import CalibrationSpec, load
 from sosmith.model.dataflow.graph import Op
 from sosmith.model.errors import ShortfallError
@@ -102,7 +102,7 @@ def test_hardware_that_limits_its_output_takes_a_curve_that_stays_within_its_ran
     ((_, low, high),) = plain.output_ranges
     assert limited.nodes[-1].low <= low < high <= limited.nodes[-1].high
     values = values_of(made, constants(design.datapath))
-    assert parallel_bank(design, swap.new_set) == packed(values, constants(design.datapath))
+    assert design.architecture.bank(swap.new_set.quantized.datapath, None) == packed(values, constants(design.datapath))
 
 
 def test_what_is_far_beyond_the_room_is_refused() -> None:

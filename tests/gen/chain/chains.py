@@ -54,11 +54,11 @@ def draw(seed: int) -> dict[str, Any]:
         rate /= stage.get("decimate", 1)
     options = random.Random(f"hardware of chain {seed}")
     start: dict[str, Any] = {}
-    if options.random() < 0.4 and not any(s["kind"] == "iir" and "decimate" in s for s in stages):
+    if options.random() < 0.4:
         start = {"start": "zero"}
     for stage in stages:
-        if "decimate" not in stage:
-            stage.update(options.choice([{}, {"protect": "detect"}, {"protect": "correct"}, {"reload": True}]))
+        guards: list[dict[str, Any]] = [{"protect": "detect"}, {"protect": "correct"}]
+        stage.update(options.choice([{}, {"reload": True}, *([] if "decimate" in stage else guards)]))
     bits, low = rng.randint(6, 16), rng.choice([0.0, -1.0])
     return {
         "name": f"chain{seed}",

@@ -79,7 +79,8 @@ def check_sines(chain: sosmith.Chain) -> None:
     assert gains.max() <= claimed * (1 + 1e-9)
     assert gains_at(chain, np.array([at / 64000]))[0] == pytest.approx(claimed, rel=2e-3)
     if "passband" in chain.folding:
-        edge = float(chain.core.edge or 0)
+        (folding,) = chain.core.foldings
+        edge = float(folding.edge or 0)
         distance = np.abs(frequencies * factor - np.round(frequencies * factor)) / factor
         passing = gains[(distance <= edge) & (np.round(frequencies * factor) >= 1)]
         assert passing.max() <= chain.folding["passband"][0] * (1 + 1e-9)

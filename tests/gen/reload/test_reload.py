@@ -19,7 +19,7 @@ from sosmith.gen.realizations.registry import REALIZATIONS
 from sosmith.gen.reload import reload
 from sosmith.gen.reload.other_constants import with_constants
 from sosmith.gen.reload.register_writes import bank_size, register_writes, reload_json
-from sosmith.gen.reload.reload import ADVICE, OtherSet, check_swap, other_set, own_set, parallel_bank, room_of, set_for
+from sosmith.gen.reload.reload import ADVICE, OtherSet, check_swap, other_set, own_set, room_of, set_for
 from sosmith.gen.specification.specification import load
 from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.gen.word_lengths.settling import samples_to_settle
@@ -173,7 +173,7 @@ def test_a_program_that_has_no_room_is_refused() -> None:
 def test_the_parallel_bank_holds_the_constants() -> None:
     hardware = hardware_in("parallel")
     made = other_set(hardware, ideal=moved(hardware, "0.95"))
-    words = parallel_bank(hardware, made)
+    words = hardware.architecture.bank(made.quantized.datapath, None)
     loadable = constants(hardware.datapath)
     values = dict(zip([constant.name for constant in loadable], unpacked(words, loadable), strict=True))
     expected = {

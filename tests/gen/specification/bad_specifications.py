@@ -637,22 +637,10 @@ BAD = [
         "not yet available: filter.decimate must be left out unless the filter is given by order and cutoff, not 2",
     ),
     (
-        "decimation with constants to be loaded",
-        CLOCK,
-        f"{CLOCK}\nreload = true\n{DECIMATED}",
-        "not yet available: hardware.reload must be false with filter.decimate, not true",
-    ),
-    (
         "decimation with protection",
         CLOCK,
         f'{CLOCK}\nprotect = "detect"\n{DECIMATED}',
         "not yet available: hardware.protect must be 'none' with filter.decimate, not 'detect'",
-    ),
-    (
-        "decimation from a start at zero",
-        CLOCK,
-        f'{CLOCK}\nstart = "zero"\n{DECIMATED}',
-        "not yet available: hardware.start must be 'steady' with filter.decimate, not 'zero'",
     ),
     (
         "decimation before on-line arithmetic",

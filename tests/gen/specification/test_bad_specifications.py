@@ -65,11 +65,11 @@ def test_rules_about_several_keys_are_told_all_at_once(tmp_path: Path) -> None:
         'name = "many"\nsample_rate = 1000.0\ninput.x = { bits = 8, range = [-1.0, 2.0], signed = true }\n'
         'filter = { family = "butterworth", kind = "lowpass", order = 2, cutoff = 600.0, decimate = 2 }\n'
         "output = { bits = 8, range = [-1.0, 1.0], signed = true, max_error = 0.001 }\n"
-        "hardware = { clock = 10.0, reload = true, multipliers = 3 }\n"
+        "hardware = { clock = 10.0, reload = true, samples_per_clock = 2 }\n"
     )
     with pytest.raises(SpecificationError) as refused:
         load(tmp_path / "spec.toml")
     first, *others = str(refused.value).splitlines()
     keys = [line.removeprefix(f"{tmp_path / 'spec.toml'}: ").split(maxsplit=1)[0] for line in (first, *others)]
     assert keys == ["input.x.range", "filter.cutoff", "output.max_error", "hardware.clock", "not"]
-    assert others[-1].startswith("  not yet available: hardware.reload must be false with filter.decimate")
+    assert others[-1].startswith("  not yet available: hardware.reload must be false with hardware.samples_per_clock")

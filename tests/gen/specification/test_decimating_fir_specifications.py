@@ -39,12 +39,6 @@ WRONG: list[tuple[str, str, Any, str]] = [
     ),
     (
         "hardware",
-        "reload",
-        True,
-        f"{LATER}hardware.reload must be false with an FIR filter that decimates, not true",
-    ),
-    (
-        "hardware",
         "protect",
         "detect",
         f"{LATER}hardware.protect must be 'none' with an FIR filter that decimates, not 'detect'",

@@ -127,8 +127,9 @@ def test_results_equal_the_model(
     assert seen.results == wanted
 
 
-def test_nothing_before_a_reset_counts() -> None:
-    made = decimator(4, 3, 2)
+@pytest.mark.parametrize("steady", [True, False])
+def test_nothing_before_a_reset_counts(steady: bool) -> None:
+    made = decimator(4, 3, 2, steady=steady)
     samples = samples_for(made, 3, 161)
     wanted = expected(made, samples, 3)
     assert run(made, samples, 3, len(wanted), pace=(0.8, 0.8), restart=54).results == wanted

@@ -82,16 +82,17 @@ def test_results_equal_the_model(factor: int, stages: int, dropped: int, signed:
     assert found == expected(made, codes)
 
 
-def test_nothing_before_a_reset_counts() -> None:
-    made = decimator(4, 3, 2)
+@pytest.mark.parametrize("steady", [True, False])
+def test_nothing_before_a_reset_counts(steady: bool) -> None:
+    made = decimator(4, 3, 2, steady=steady)
     codes = codes_for(made, 161, seed=1)
     found, _, _ = run(made, codes, valid=0.8, ready=0.8, restart=54)
     assert found == expected(made, codes)
 
 
-@pytest.mark.parametrize(("factor", "stages"), [(2, 3), (16, 2)])
-def test_its_clocks_are_those_stated(factor: int, stages: int) -> None:
-    made = decimator(factor, stages, 0)
+@pytest.mark.parametrize(("factor", "stages", "steady"), [(2, 3, True), (16, 2, True), (4, 2, False)])
+def test_its_clocks_are_those_stated(factor: int, stages: int, steady: bool) -> None:
+    made = decimator(factor, stages, 0, steady=steady)
     _, accepted, left = run(made, codes_for(made, 20 * factor + 1, seed=3))
     assert accepted[0] == reset_cycles(made)
     # A result leaves at the edge that ends the clock in which it was seen.

@@ -54,6 +54,19 @@ def test_results_are_moving_sums(factor: int, stages: int, signed: bool) -> None
     assert made.exact(codes).tolist() == convolved(made, codes.tolist())
 
 
+@pytest.mark.parametrize(("factor", "stages", "remembered"), [(2, 1, 1), (2, 5, 3), (4, 3, 3), (4, 4, 3), (16, 4, 4)])
+def test_from_zero_all_samples_before_count_as_zero(factor: int, stages: int, remembered: int) -> None:
+    made = replace(decimator(factor, stages), steady=False)
+    codes = np.random.default_rng(factor).integers(-128, 128, 500)
+    codes[0] = 127  # a sample that shows
+    taps, padded = made.impulse_response, [0] * stages * factor + codes.tolist()
+    wanted = np.convolve(padded, taps)[stages * factor : len(padded) : factor]
+    assert made.exact(codes).tolist() == wanted.tolist()
+    # Results that remember other samples before are as many as stated.
+    steady = replace(made, steady=True).exact(codes)
+    assert (steady != made.exact(codes)).nonzero()[0].tolist() == [*range(remembered)]
+
+
 @pytest.mark.parametrize("dropped", [0, 1, 5, 6])
 def test_one_rounding_to_nearest_follows(dropped: int) -> None:
     made = decimator(dropped=dropped)
@@ -117,8 +130,11 @@ def test_a_datapath_behind_a_decimator() -> None:
     assert together[:, 0].tolist() == datapath.compute(codes).tolist()
 
 
-def test_the_c_model_takes_samples_at_the_higher_rate(tmp_path: Path) -> None:
-    datapath = decimated()
+@pytest.mark.parametrize("steady", [True, False])
+def test_the_c_model_takes_samples_at_the_higher_rate(steady: bool, tmp_path: Path) -> None:
+    made = decimated()
+    assert made.decimator is not None
+    datapath = replace(made, decimator=replace(made.decimator, steady=steady))
     compiler = shutil.which("cc") or shutil.which("gcc")
     assert compiler is not None
     (tmp_path / "lowpass.h").write_text(c_header(datapath), encoding="utf-8")

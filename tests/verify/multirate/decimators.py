@@ -30,6 +30,8 @@ class Case(NamedTuple):
     channels: int = 1
     core: str = "filter"
     wide: bool = False
+    start: str = "steady"
+    reload: bool = False
 
     @property
     def text(self) -> str:
@@ -56,6 +58,8 @@ max_error = {self.error}
 [hardware]
 architecture = "{self.architecture}"
 realization = "df1"
+start = "{self.start}"
+reload = {str(self.reload).lower()}
 """
 
 
@@ -69,6 +73,7 @@ class Instrument(NamedTuple):
     channels: int = 1
     core: str = "instrument"
     output_bits: int = 10
+    start: str = "steady"
 
     @property
     def text(self) -> str:
@@ -94,6 +99,7 @@ unit = "mm"
 max_error = {'"faithful"' if self.output_bits == 10 else 0.01}
 [hardware]
 architecture = "{self.architecture}"
+start = "{self.start}"
 """
 
 

@@ -83,8 +83,8 @@ def test_sentences() -> None:
     )
     rejected("reg waiting = 1'h0;", "reg waiting = 1'h1;", "decimator.waiting must be 0 before the first clock, not 1")
     rejected(
-        "assign i_ready = not_filling_3 & not_waiting_and_completes;",
-        "assign i_ready = not_filling_3;",
+        "assign i_ready = not_filling_2 & not_waiting_and_completes;",
+        "assign i_ready = not_filling_2;",
         "s_axis_tready must be what a decimator has there with decimator.filling = 0, decimator.phase = 0, "
         "decimator.waiting = 1, not another value",
     )

@@ -50,6 +50,12 @@ hardware = { realization = "df1" }
 """
 """A filter behind a decimator."""
 
+
+def from_zero(text: str) -> str:
+    """Return one of these specifications with a start from zero."""
+    return text.replace("hardware = {", 'hardware = { start = "zero",')
+
+
 DOWNSAMPLED = """
 name = "downsampled"
 sample_rate = 1.0

@@ -21,6 +21,7 @@ from tests.verify.rocq.small import (
     checked,
     coarse,
     designed,
+    from_zero,
     library,
     needs_coqc,
     small,
@@ -245,7 +246,11 @@ def test_a_theorem_that_cannot_be_written_is_asked_for_and_rejected(monkeypatch:
 
 @needs_coqc
 @pytest.mark.slow
-@pytest.mark.parametrize("text", [SETTLING, DECIMATED, BOTH], ids=["from zero", "decimated", "calibrated, decimated"])
+@pytest.mark.parametrize(
+    "text",
+    [SETTLING, DECIMATED, BOTH, from_zero(DECIMATED), from_zero(BOTH)],
+    ids=["from zero", "decimated", "calibrated, decimated", "decimated, from zero", "both, from zero"],
+)
 def test_a_start_from_zero_and_a_decimator(text: str, tmp_path: Path) -> None:
     made = designed(text)
     names = {claim.name for claim in theorems(made).claims}

@@ -243,5 +243,12 @@ Proof.
   - apply Rabs_le. apply (means_between _ F). intros k. unfold from_first, after. destruct (k <? 0); apply abs_between, H.
 Qed.
 End Decimated.
+
+(* What holds of the past and of all that follows holds of both. *)
+Lemma preceded_near {A B : Type} d (P : A -> B -> Prop) p q u v : P p q -> (forall m, P (u m) (v m)) ->
+  forall m, P (preceded d p u m) (preceded d q v m).
+Proof. intros H N m. unfold preceded. destruct (Nat.ltb m (factor d)); [exact H|apply N]. Qed.
+Lemma preceded_holds {A : Type} d (P : A -> Prop) p u : P p -> (forall m, P (u m)) -> forall m, P (preceded d p u m).
+Proof. intros H N m. unfold preceded. destruct (Nat.ltb m (factor d)); [exact H|apply N]. Qed.
 Lemma near_near a b c d e f : (Rabs (a - b) <= d -> Rabs (b - c) <= e -> d + e <= f -> Rabs (a - c) <= f)%R.
 Proof. intros A B F. replace (a - c)%R with ((a - b) + (b - c))%R by ring. eapply Rle_trans; [apply Rabs_triang|]. lra. Qed.

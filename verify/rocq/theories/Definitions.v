@@ -128,6 +128,9 @@ Definition decimate (d : decimator) (u : nat -> Z) (n : nat) : Z :=
 Definition mean (count : nat) (u : signal) : signal := fun k => (taps (repeat 1%Z count) u k / IZR (Z.of_nat count))%R.
 Definition averaged (d : decimator) (u : nat -> R) (n : nat) : R :=
   Nat.iter (stages d) (mean (factor d)) (from_first u) (Z.of_nat (n * factor d)).
+(* From zero, one value is there for ever before the first: it comes `factor` times, and the result of that is left out. *)
+Definition preceded {A : Type} (d : decimator) (past : A) (u : nat -> A) (n : nat) : A :=
+  if Nat.ltb n (factor d) then past else u (n - factor d)%nat.
 
 (* 6. A filter of which every R-th result leaves: the first sample goes in so many times before it counts. *)
 Definition filled (count : nat) (x : nat -> nat -> Z) : nat -> nat -> Z := fun n => x (n - count)%nat.

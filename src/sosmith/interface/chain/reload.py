@@ -59,7 +59,8 @@ class ChainReload(View):
 
     def tables(self) -> list[Table]:
         """Return the bound of the chain with the set, and what the swap takes."""
-        stage, samples = self._swap.stage, self._swap.swap.samples
+        stage, swap = self._swap.stage, self._swap.swap
+        samples = swap.samples * swap.new_set.quantized.samples_of_input
         seconds = samples / float(stage.spec.rate)
         fades = f"{samples:,} samples of the stage, {seconds:.3g} s; what it has put into later stages fades there"
         rows = [
