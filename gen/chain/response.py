@@ -22,10 +22,11 @@ from fractions import Fraction
 from functools import lru_cache
 from math import gcd, prod
 
-from flint import acb, acb_poly, arb, ctx, fmpq_poly
+from flint import arb, ctx, fmpq_poly
 
 from sosmith.gen.filter.exact_form import Exact
 from sosmith.gen.filter.largest_gain import CLOSE, Factor, Peak, gain_of_sections, largest, smallest
+from sosmith.gen.filter.tangents import Tangents
 from sosmith.gen.proof.nodes import polynomial
 from sosmith.gen.proof.peak_gain import Drive, extent
 from sosmith.gen.proof.response import Response
@@ -190,7 +191,7 @@ def gains_in_passband(segment: Segment, edge: Fraction) -> tuple[Peak, Peak]:
     with ctx.workprec(_PRECISION):
         gain = _Gain(segment)
     band = (Fraction(0), edge)
-    return smallest(gain.least, band, CLOSE), largest(gain, [band], CLOSE)
+    return smallest(gain.least, band, CLOSE), largest(gain.most, [band], CLOSE)
 
 
 def bands_into_passband(factor: int, edge: Fraction) -> list[tuple[Fraction, Fraction]]:
@@ -199,63 +200,19 @@ def bands_into_passband(factor: int, edge: Fraction) -> list[tuple[Fraction, Fra
     return [(centre - edge, min(centre + edge, _HALF)) for centre in centres if centre - edge < _HALF]
 
 
-class _Taps:
-    """Taps ``b_k`` of a filter, by what is known of ``V(w) = sum b_k e**(-i (k - c) w)`` near an angle.
-
-    The centre c takes the delay off, with which V would turn much faster. Within r of w, V is at most
-    ``|V''| r**2 / 2 + C r**3 / 6`` away from its tangent, ``C = sum |b_k| |k - c|**3``, whose magnitude is the largest
-    at an end. In a stop band, V'' is small like V.
-    """
-
-    def __init__(self, taps: Sequence[Fraction]) -> None:
-        centre = Fraction(len(taps) - 1, 2)
-        self._value = acb_poly([ball(tap) for tap in taps])
-        self._slope = acb_poly([ball(tap * (k - centre)) for k, tap in enumerate(taps)])
-        self._most = ball(sum(map(abs, taps), Fraction(0)))
-        self._bend = acb_poly([ball(tap * (k - centre) ** 2) for k, tap in enumerate(taps)])
-        self._third = ball(sum((abs(tap * (k - centre) ** 3) for k, tap in enumerate(taps)), Fraction(0)))
-
-    def on(self, low: Fraction, high: Fraction) -> Factor:
-        """Say what is known of the magnitude on an interval of frequencies."""
-        u = acb(ball(-(low + high))).exp_pi_i()
-        value = self._value(u)
-        if low == high:
-            return Factor(abs(value), abs(value), arb("inf"))
-        reach = arb.pi() * ball(high - low)
-        turn = self._slope(u) * acb(0, 1) * reach
-        tangent = abs(value + turn).max(abs(value - turn)) + self._beside(u, reach)
-        return Factor(abs(value), tangent.min(self._most), arb("inf"))
-
-    def below(self, low: Fraction, high: Fraction) -> tuple[arb, arb]:
-        """Return the magnitude in the middle of an interval, and one below which it is nowhere there."""
-        u = acb(ball(-(low + high))).exp_pi_i()
-        value = self._value(u)
-        reach = arb.pi() * ball(high - low)
-        turn = self._slope(u) * acb(0, 1) * reach
-        least = abs(value) - abs(turn)
-        along = value.real * turn.real + value.imag * turn.imag
-        if abs(along) > turn.real**2 + turn.imag**2:  # the tangent comes nearest to 0 at an end
-            least = abs(value + turn).min(abs(value - turn))
-        return abs(value), least - self._beside(u, reach)
-
-    def _beside(self, u: acb, reach: arb) -> arb:
-        """Bound how far the value is from its tangent at u, within an angle."""
-        return abs(self._bend(u)) * reach**2 / 2 + self._third * reach**3 / 6
-
-
 class _Gain:
     """What is known of the gain of a segment on an interval of frequencies, in units of its highest rate."""
 
     def __init__(self, segment: Segment) -> None:
-        self._taps: list[tuple[_Taps, int]] = []
+        self._taps: list[tuple[Tangents, int]] = []
         self._poles: list[tuple[Exact, int]] = []
-        self._under: list[tuple[_Taps, int]] = []
+        self._under: list[tuple[Tangents, int]] = []
         self._share = ball(Fraction(1, segment.rise))
         for part, step in zip(segment.parts, segment.spreads, strict=True):
             for numerator, denominator in part.sections:
-                self._taps.append((_Taps(numerator), step))
+                self._taps.append((Tangents(numerator), step))
                 if len(denominator) > 1:
-                    self._under.append((_Taps(denominator), step))
+                    self._under.append((Tangents(denominator), step))
                     self._poles.append((((Fraction(1),), denominator), step))
 
     def __call__(self, low: Fraction, high: Fraction) -> Factor:
@@ -268,11 +225,24 @@ class _Gain:
 
     def least(self, low: Fraction, high: Fraction) -> tuple[arb, arb]:
         """Return the gain in the middle of an interval, and one below which it is nowhere there."""
-        middle, least = self._share, self._share
-        for taps, step in self._taps:
-            own, below = taps.below(low * step, high * step)
-            middle, least = middle * own, least * below.nonnegative_part()
-        for taps, step in self._under:
-            factor = taps.on(low * step, high * step)
-            middle, least = middle / factor.middle, least / factor.everywhere
-        return middle, least
+        middle, spread = self._logarithm(low, high)
+        return middle, middle * (-spread).exp() if spread.is_finite() else arb(0)
+
+    def most(self, low: Fraction, high: Fraction) -> Factor:
+        """Say what is known of the gain, best where it is far from 0."""
+        middle, spread = self._logarithm(low, high)
+        return Factor(middle, middle * spread.exp(), arb("inf")) if spread.is_finite() else self(low, high)
+
+    def _logarithm(self, low: Fraction, high: Fraction) -> tuple[arb, arb]:
+        """Return the gain in the middle, and by how much its logarithm differs from there at most.
+
+        Slopes of sections cancel each other, which bounds of each by itself would not know.
+        """
+        middle, change, off = self._share, arb(0), arb(0)
+        for factors, sign in ((self._taps, 1), (self._under, -1)):
+            for taps, step in factors:
+                found = taps.logarithm(low * step, high * step)
+                if found is None:
+                    return self(low, high).middle, arb("inf")
+                middle, change, off = middle * found[0] ** sign, change + sign * found[1], off + found[2]
+        return middle, abs(change) + off
