@@ -16,6 +16,7 @@ from typing import Any
 
 from sosmith.gen.chain.automatic.asked import check_factor, check_kinds, limits_in
 from sosmith.gen.chain.automatic.limits import KEYS, LIMITS, Limits
+from sosmith.gen.chain.automatic.structures import MAX_STAGES
 from sosmith.gen.specification.choices import AUTO, FIR_FAMILIES, MAX_DECIMATION, MAX_DOWNSAMPLING, MAX_TAPS
 from sosmith.gen.specification.combinations import check_chain
 from sosmith.gen.specification.specification import STAGE, Specification, from_tree, parsed, text_of, to_json
@@ -37,9 +38,6 @@ from sosmith.model.suggestion import did_you_mean
 
 MAX_FACTOR = 1 << 12
 """Most samples for each result, and results for each sample: the response is computed at the highest rate."""
-
-MAX_STAGES = 8
-"""Most stages of a chain."""
 
 _EDGES = ("passband_edge", "stopband_edge", "passband_loss", "stopband_loss")
 _OF_ONE = ("architecture", "realization", "multipliers", "protect", "reload", "reload_lock")

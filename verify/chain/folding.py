@@ -106,7 +106,7 @@ def _check_least(gain: _Gain, claim: LargestEntry, band: Band) -> None:
         if not left:
             return
         low, high = left.pop()
-        if gain.beyond(low, high, least):
+        if gain.stays(low, high, least, -1):
             continue
         middle = (low + high) / 2
         there = gain.at(middle)
@@ -149,12 +149,12 @@ def _check(
         f"{what} must be that at {float(claim.at):.6g} of the sample rate, {float(reached):.6g}, or little more, "
         f"not {float(claim.gain):.6g}",
     )
-    most, left = arb(_fmpq(claim.gain)), list(bands)
+    most, left, is_close = arb(_fmpq(claim.gain)), list(bands), excess == _CLOSE
     for _ in range(_MOST_PARTS):
         if not left:
             return
         low, high = left.pop()
-        if gain.within(low, high, most):
+        if gain.within(low, high, most) or (is_close and gain.stays(low, high, most, 1)):
             continue
         middle = (low + high) / 2
         there = gain.at(middle)
@@ -193,6 +193,14 @@ class _Polynomial:
         beside = abs(self._second(u)) * angle**2 / 2 + self._third * angle**3 / 6
         return self._taps(u), acb(0, -1) * self._moment(u) * angle, beside
 
+    def around_closely(self, frequency: Fraction, reach: arb) -> tuple[acb, acb, arb, arb]:
+        """Return the same, and a bound on the second derivative there, times the square of the reach."""
+        u, angle = acb(_ball(-2 * frequency * self.step)).exp_pi_i(), reach * self.step
+        bend = abs(self._second(u))
+        beside = bend * angle**2 / 2 + self._third * angle**3 / 6
+        curve = (bend + self._third * angle) * angle**2
+        return self._taps(u), acb(0, -1) * self._moment(u) * angle, beside, curve
+
 
 class _Gain:
     """The gain of parts one behind the other, of one of the images."""
@@ -230,17 +238,25 @@ class _Gain:
             below *= least
         return bool(above <= most * below)
 
-    def beyond(self, low: Fraction, high: Fraction, least: arb) -> bool:
-        """Say whether the gain is shown to be at least `least` between two frequencies."""
+    def stays(self, low: Fraction, high: Fraction, bound: arb, sign: int) -> bool:
+        """Say whether the gain is shown to be at most `bound` between two frequencies; at least, with the sign -1.
+
+        By its logarithm, of which slopes of sections cancel each other; where the gain is far from 0.
+        """
         middle, reach = (low + high) / 2, arb.pi() * _ball(high - low)
-        below, above = arb(1) / self._images, arb(1)
-        for each in self._over:
-            value, change, beside = each.around(middle, reach)
-            below *= (abs(value) - abs(change) - beside).nonnegative_part()
-        for each in self._under:
-            value, change, beside = each.around(middle, reach)
-            above *= abs(value + change).max(abs(value - change)) + beside
-        return bool(below >= least * above)
+        value, slope, rest = arb(1) / self._images, arb(0), arb(0)
+        for polynomials, power in ((self._over, 1), (self._under, -1)):
+            for each in polynomials:
+                own, change, beside, curve = each.around_closely(middle, reach)
+                size = abs(own)
+                least = size - abs(change) - beside
+                if not least > 0:
+                    return False
+                value *= size**power
+                slope += power * (own.real * change.real + own.imag * change.imag) / size**2
+                rest += (curve / least + ((abs(change) + curve) / least) ** 2) / 2
+        spread = abs(slope) + rest
+        return bool(value * spread.exp() <= bound if sign > 0 else value * (-spread).exp() >= bound)
 
 
 def _ball(value: Fraction) -> arb:

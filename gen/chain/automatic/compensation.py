@@ -46,11 +46,11 @@ def compensating(
     before : callable
         The gain P at frequencies of shape (n,), in units of the rate.
     edge, stop : float
-        Edges of the pass band and the stop band, in units of the rate.
+        Edges of the pass band and the stop band, in units of the rate; 1/2 for no stop band.
     losses : (float, float)
         In dB: P times the own gain is from -losses[0] to 0 in the pass band, the own at most -losses[1] in the other.
     """
-    found, length = None, min(expected, MAX_TAPS)
+    found, length = None, min(max(expected, 3), MAX_TAPS)
     while found is None and length <= min(expected + _STEPS, MAX_TAPS):
         found = _designed(length, before, edge, stop, losses)
         length += 1
@@ -143,7 +143,9 @@ def _extremes(errors: Array, most: int) -> npt.NDArray[np.int64]:
 
 
 def _bands(points: int, edge: float, stop: float) -> tuple[Array, Array]:
-    """Return frequencies in both bands, with their ends."""
+    """Return frequencies in both bands, with their ends; a stop band from 1/2 on is none."""
+    if stop >= 0.5:
+        return np.linspace(0, edge, points), np.zeros(0)
     share = edge / (edge + 0.5 - stop)
     inside = max(16, round(points * share))
     return np.linspace(0, edge, inside), np.linspace(stop, 0.5, max(16, points - inside))
@@ -164,5 +166,5 @@ def _keeps(
     inner = np.array([float(tap) for tap in taps[: (length + 1) // 2]][::-1])
     inner[1 if length % 2 else 0 :] *= 2
     passed = before(band) * (_cosines(length, band) @ inner)
-    stopped = np.abs(_cosines(length, out) @ inner)
-    return bool(passed.min() >= 1 - 2 * ripple and passed.max() <= 1 and stopped.max() <= rest)
+    stopped = np.abs(_cosines(length, out) @ inner).max(initial=0)
+    return bool(passed.min() >= 1 - 2 * ripple and passed.max() <= 1 and stopped <= rest)

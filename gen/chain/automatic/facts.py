@@ -15,7 +15,7 @@ def looked_table(design: ChainDesign, choice: Choice) -> Table:
     note = "Cost: LUT4, and what multipliers and memory take of the FPGA's as LUT4"
     if device.multipliers:
         note += f", {round(device.logic_cells / device.multipliers):,} for a multiplier"
-    note += "; ≈ is expected, without a design."
+    note += "; a row with ≈ is what is expected, without a design."
     title = f"{design.name}: structures, for an {device.title}"
     return Table(title, rows, head, numbers=(1, 2, 3, 4), notes=(note,))
 
@@ -24,5 +24,5 @@ def _cost(each: Looked) -> tuple[str, ...]:
     """Return what it takes, with a sign where it was not designed."""
     if each.cost is None or each.weighed is None:
         return ("",) * 4
-    about = "" if each.designed else "≈ "
-    return tuple(f"{about}{round(value):,}" for value in (*each.cost, each.weighed))
+    luts, *others = (f"{round(value):,}" for value in (*each.cost, each.weighed))
+    return (luts if each.designed else f"≈ {luts}", *others)

@@ -34,6 +34,9 @@ _SPARE = 0.05
 _MOST_DROOP = 3.0
 """Largest droop of CIC filters, in dB, that the last stage makes up for."""
 
+_FEW_TAPS = 9
+"""How many taps a filter is expected to have that has no stop band."""
+
 _MOST_ORDER = 12
 _COEFFICIENT_BITS = 4
 """Bits of the largest coefficient beyond those of the output."""
@@ -112,10 +115,14 @@ BLOCK_RAM_BITS = {"SB_RAM40_4K": 4096, "DP16KD": 18432, "SDPB": 16384}
 
 
 class Problem(NamedTuple):
-    """Why a structure is out of question: how many times more it needs than there is, and the same in words."""
+    """Why a structure is out of question: how many times more it needs than there is, and the same in words.
+
+    `estimated` says that this is only expected.
+    """
 
     times: float
     text: str
+    estimated: bool = False
 
 
 @dataclass(kw_only=True)
@@ -248,8 +255,13 @@ def _plan_filters(made: Plan, wanted: Wanted, droop: float) -> None:
         if stage.kind == "halfband":
             stage.edge = max(stage.rate / 2 - stage.stop, stage.edge)
             stage.stop = stage.rate / 2 - stage.edge
+        if is_last and stage.factor == 1 and stage.kind == "fir":  # what is left to stop is above its rate
+            stage.stop, stage.taps = stage.rate / 2, _FEW_TAPS
+            if not made.compensates:
+                made.against(Problem(math.inf, "nothing is left for the last filter to do"))
+            continue
         if not stage.edge < stage.stop < stage.rate / 2 or stage.loss <= 0:
-            made.against(Problem(math.inf, "its bands overlap"))
+            made.against(Problem(math.inf, "bands of its filters overlap"))
             continue
         stage.taps = _length(stage, wanted)
         if stage.kind != "iir" and stage.taps > MAX_TAPS:
@@ -258,6 +270,7 @@ def _plan_filters(made: Plan, wanted: Wanted, droop: float) -> None:
                     stage.taps / MAX_TAPS,
                     f"too long: {stage.taps} taps at {_hertz(stage.rate)}, of at most {MAX_TAPS}, which stop some "
                     f"{_reached(stage):.0f} dB",
+                    estimated=True,
                 )
             )
 
@@ -298,6 +311,7 @@ def _check_clocks(made: Plan, wanted: Wanted) -> None:
                     needed / max(there, 1),
                     f"too slow: {count(needed, 'clock')} for each result at {results}, of {there:,}; a clock of "
                     f"{clock} would do",
+                    estimated=True,
                 )
             )
 

@@ -14,6 +14,9 @@ from sosmith.gen.specification.choices import MAX_TAPS
 
 _EXACT = Context(prec=200, traps=[Inexact])
 _SHORTENED = Context(prec=12, rounding=ROUND_FLOOR)
+_ELLIPTIC = {"family": "elliptic", "architecture": "folded", "realization": "df1_ef1"}
+"""Of an IIR filter; all realizations and architectures would take minutes to compare."""
+
 _LOSS = Decimal("0.00001")
 _SHORT = {"cic": "cic", "halfband": "half", "fir": "fir", "iir": "iir", "every": "every"}
 
@@ -56,7 +59,7 @@ def _edges(stage: Planned, wanted: Wanted) -> dict[str, Any]:
     edges = {"passband_edge": -_below(-stage.edge)}
     if stage.kind != "halfband":
         edges["stopband_edge"] = _below(stage.stop)
-    family = {"family": "elliptic"} if stage.kind == "iir" else {}
+    family = _ELLIPTIC if stage.kind == "iir" else {}
     return {**family, **edges, "passband_loss": _rounded(stage.loss), "stopband_loss": _rounded(wanted.stopband_loss)}
 
 

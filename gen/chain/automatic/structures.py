@@ -10,10 +10,13 @@ from typing import NamedTuple
 
 from sosmith.gen.specification.choices import MAX_DOWNSAMPLING
 
+MAX_STAGES = 8
+"""Most stages of a chain."""
+
 _MOST_CIC, _MOST_FIR = 2, 3
 """Most CIC and FIR filters in a row; half-band filters between them are as many as there can be."""
 
-_TITLES = {"cic": "CIC", "halfband": "half-band", "fir": "FIR", "iir": "IIR", "every": "1 of"}
+_TITLES = {"cic": "CIC", "halfband": "half-band", "fir": "FIR", "iir": "IIR"}
 
 
 class Step(NamedTuple):
@@ -40,17 +43,21 @@ class Structure:
         return prod(step.factor for step in self.steps)
 
     def __str__(self) -> str:
-        """Say what it is, with the factors of all but half-band filters: CIC 16, 2 half-bands, FIR 2."""
+        """Say what it is, with the factors of all but half-band filters: CIC 16, 2 half-bands, FIR 2.
+
+        An IIR filter has that of the stage behind it, which takes its results apart.
+        """
         texts = []
-        for step, same in groupby(self.steps):
+        for step, same in groupby(step for step in self.steps if step.kind != "every"):
             number = len(list(same))
             title = _TITLES[step.kind] if number == 1 else f"{number} {_TITLES[step.kind]}s"
-            texts.append(title if step.kind in {"halfband", "iir"} else f"{title} {step.factor}")
+            factor = self.steps[-1].factor if step.kind == "iir" else step.factor
+            texts.append(title if step.kind == "halfband" or factor == 1 else f"{title} {factor}")
         return ", ".join(texts)
 
 
 def structures(factor: int) -> Iterator[Structure]:
-    """Return the structures that decimate by `factor`.
+    """Return the structures that decimate by `factor`, of at most `MAX_STAGES` stages.
 
     CIC filters first, as they cost least where samples are many, FIR filters that take any factor, half-band filters,
     and an FIR filter, which makes the pass band; or an IIR filter in its place.
@@ -58,8 +65,12 @@ def structures(factor: int) -> Iterator[Structure]:
     Examples
     --------
     >>> [str(each) for each in structures(4)][:4]
-    ['FIR 4', '2 FIRs 2', 'half-band, FIR 2', 'half-band, IIR, 1 of 2']
+    ['FIR 4', '2 FIRs 2', 'half-band, FIR 2', 'half-band, IIR 2']
     """
+    return (each for each in _structures(factor) if len(each.steps) <= MAX_STAGES)
+
+
+def _structures(factor: int) -> Iterator[Structure]:
     for cics in _powers(factor, _MOST_CIC):
         after_cic = factor // prod(cics)
         first = tuple(Step("cic", each) for each in cics)
