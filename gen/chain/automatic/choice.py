@@ -191,7 +191,7 @@ class _Search:
                 continue
             if found and expected > max(_UNSURE * found[0][0], min(cost for _, cost in found)):
                 return
-            self.progress(f"designing {each.plan.structure}")
+            self.progress(str(each.plan.structure))
             self._design_one(each)
             if each.cost is not None:
                 found.append((expected, each.cost.weighed(self.device)))
@@ -202,7 +202,11 @@ class _Search:
             candidate.plan.against(tables)
             return
         try:
-            design = design_stages(self._written(tables), board=self.board, progress=lambda step: None)
+            design = design_stages(
+                self._written(tables),
+                board=self.board,
+                progress=lambda step: self.progress(f"{candidate.plan.structure}: {step}"),
+            )
         except (ShortfallError, SpecificationError) as error:
             candidate.plan.against(Problem(1.0, str(error).removeprefix(f"{self.spec.base.path}: ")))
             return
@@ -226,7 +230,7 @@ class _Search:
         designed = [each for each in candidates if each.cost is not None and each.plan.problem is None]
         for each in sorted(designed, key=self._weighed):
             assert each.design is not None
-            self.progress(f"proving {each.plan.structure}")
+            self.progress(f"{each.plan.structure}: limits of the whole")
             excess = each.design.excess
             if not excess:
                 return each
