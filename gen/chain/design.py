@@ -206,40 +206,12 @@ class ChainDesign:
     @cached_property
     def foldings(self) -> tuple[Folding, ...]:
         """What each segment makes of a sine at other frequencies; empty if no stage changes the rate."""
-        segments = segments_of(self.parts)
-        return tuple(self._folding(each) for each in segments if each.rise > 1 or each.factor > 1)
-
-    def _folding(self, segment: Segment) -> Folding:
-        edge = None if self.spec.edge is None else self.spec.edge / self.spec.base.sample_rate / segment.highest
-        if edge is not None and 2 * edge * max(segment.rise, segment.factor) > 1:
-            edge = None
-        passing = None if edge is None else gain_into_passband(segment, edge)
-        kept = None if self.spec.limits is None else self._kept(segment, self.spec.limits)
-        return Folding(segment=segment, anywhere=folding_gain(segment), edge=edge, passing=passing, kept=kept)
-
-    def _kept(self, segment: Segment, limits: Limits) -> Kept:
-        rate = self.spec.base.sample_rate
-        least, most = gains_in_passband(segment, limits.passband_edge / rate)
-        stop = None if limits.stopband_edge is None else limits.stopband_edge / rate
-        return Kept(least=least, most=most, stop=stop, stopped=None if stop is None else gain_from(segment, stop))
+        return foldings_of(self.spec, self.parts)
 
     @property
     def excess(self) -> tuple[str, ...]:
         """Which limits the chain does not keep to, a phrase for each; nothing if it keeps to all, or has none."""
-        limits = self.spec.limits
-        if limits is None:
-            return ()
-        (folding,) = self.foldings
-        kept, passing = folding.kept, folding.passing
-        assert kept is not None
-        assert passing is not None
-        return why_not(
-            limits,
-            least=below_on_grid(kept.least.gain),
-            most=on_grid(kept.most.gain),
-            passing=on_grid(passing.gain),
-            stopped=None if kept.stopped is None else on_grid(kept.stopped.gain),
-        )
+        return excess_of(self.spec.limits, self.foldings)
 
     @property
     def carried_flags(self) -> int:
@@ -301,6 +273,44 @@ class ChainDesign:
             status = status | np.stack(columns, axis=1)
             status[: self.settling] |= np.uint8(1 << Flag.SETTLING)
         return results, status
+
+
+def foldings_of(spec: ChainSpec, parts: Sequence[Part]) -> tuple[Folding, ...]:
+    """Return what each segment of parts makes of a sine at other frequencies."""
+    segments = [each for each in segments_of(parts) if each.rise > 1 or each.factor > 1]
+    return tuple(_folding(spec, each) for each in segments)
+
+
+def _folding(spec: ChainSpec, segment: Segment) -> Folding:
+    edge = None if spec.edge is None else spec.edge / spec.base.sample_rate / segment.highest
+    if edge is not None and 2 * edge * max(segment.rise, segment.factor) > 1:
+        edge = None
+    passing = None if edge is None else gain_into_passband(segment, edge)
+    kept = None if spec.limits is None else _kept(segment, spec.limits, spec.base.sample_rate)
+    return Folding(segment=segment, anywhere=folding_gain(segment), edge=edge, passing=passing, kept=kept)
+
+
+def _kept(segment: Segment, limits: Limits, rate: Fraction) -> Kept:
+    least, most = gains_in_passband(segment, limits.passband_edge / rate)
+    stop = None if limits.stopband_edge is None else limits.stopband_edge / rate
+    return Kept(least=least, most=most, stop=stop, stopped=None if stop is None else gain_from(segment, stop))
+
+
+def excess_of(limits: Limits | None, foldings: Sequence[Folding]) -> tuple[str, ...]:
+    """Say which limits gains do not keep to, as they stand in a certificate."""
+    if limits is None:
+        return ()
+    (folding,) = foldings
+    kept, passing = folding.kept, folding.passing
+    assert kept is not None
+    assert passing is not None
+    return why_not(
+        limits,
+        least=below_on_grid(kept.least.gain),
+        most=on_grid(kept.most.gain),
+        passing=on_grid(passing.gain),
+        stopped=None if kept.stopped is None else on_grid(kept.stopped.gain),
+    )
 
 
 def design_chain(spec: ChainSpec, *, board: Board | None = None, progress: Progress = lambda step: None) -> ChainDesign:

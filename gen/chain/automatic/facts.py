@@ -16,7 +16,7 @@ def looked_table(design: ChainDesign, choice: Choice) -> Table:
     if device.multipliers:
         note += f", {round(device.logic_cells / device.multipliers):,} for a multiplier"
     note += "; a row with ≈ is what is expected, without a design."
-    title = f"{design.name}: structures, for an {device.title}"
+    title = f"{design.name}: structures, for the {device.title}"
     return Table(title, rows, head, numbers=(1, 2, 3, 4), notes=(note,))
 
 

@@ -76,7 +76,7 @@ def test_the_same_request_gives_the_same_stages(chosen: sosmith.Chain) -> None:
 
 def test_the_table_says_why_others_were_not_taken(chosen: sosmith.Chain) -> None:
     table = chosen.tables()[0]
-    assert table.title == "rx: structures, for an ECP5 LFE5U-25F"
+    assert table.title == "rx: structures, for the ECP5 LFE5U-25F"
     verdicts = [row[-1] for row in map(tuple, table.rows)]
     assert verdicts[0] == "taken"
     assert any(re.fullmatch(r"dearer, \d\.\d\d ×", verdict) for verdict in verdicts)

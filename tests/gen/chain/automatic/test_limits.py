@@ -153,3 +153,21 @@ def test_a_gain_of_nothing_in_the_pass_band_is_refused() -> None:
     tree["limits"] = {"passband_edge": 500.0, "passband_loss": 20.0, "stopband_loss": 1.0}
     with pytest.raises(ShortfallError, match=r"passband_loss: a gain of 0, not at most 20 dB"):
         sosmith.design_chain(tree)
+
+
+def test_other_coefficients_of_a_stage_keep_to_the_limits_too() -> None:
+    mixing = {"name": "mix", "kind": "fir", "taps": [0.3, 0.6, 0.3], "reload": True}
+    tree = copy.deepcopy(GIVEN)
+    tree["stage"] = [GIVEN["stage"][0], mixing, GIVEN["stage"][1]]
+    tree["limits"] |= {"passband_loss": 0.15}
+    tree["output"] |= {"range": [-2.0, 2.0], "max_error": 0.02}
+    chain = sosmith.design_chain(tree)
+    tree["stage"][1] = mixing | {"taps": [0.25, 0.625, 0.25]}
+    assert chain.reload(tree, reset=True).stage == "mix"
+    tree["stage"][1] = mixing | {"taps": [0.3, 0.1, 0.3]}
+    with pytest.raises(ShortfallError) as refused:
+        chain.reload(tree, reset=True)
+    assert str(refused.value).endswith(
+        "the limits of the chain must be kept with the set, and are not: passband_loss: 0.159 dB, not at most 0.15 dB: "
+        "nothing is to be loaded"
+    )
