@@ -128,7 +128,7 @@ class _Search:
             input_bits=base.inputs[0].bits,
             output_bits=base.output.bits,
             between_bits=_between(spec),
-            exact_bits=base.output.bits - math.floor(math.log2(base.max_error / base.output.lsb)),
+            exact_bits=max(1, base.output.bits - math.floor(math.log2(base.max_error / base.output.lsb))),
         )
 
     @property
@@ -273,7 +273,7 @@ def _between(spec: ChainSpec) -> int:
     base = spec.base
     (port,) = base.inputs
     reach = max(abs(port.zero + port.lsb * code) for code in (port.lowest, port.highest + 1))
-    return math.ceil(math.log2(reach / base.max_error)) + _FINER
+    return max(2, math.ceil(math.log2(reach / base.max_error)) + _FINER)
 
 
 def _closest(plans: Sequence[Plan]) -> str:
