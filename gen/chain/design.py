@@ -16,7 +16,8 @@ from math import prod
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.gen.chain.automatic.limits import Limits, why_not
+from sosmith.gen.chain.automatic.limits import Limits
+from sosmith.gen.chain.automatic.losses import why_not
 from sosmith.gen.chain.rates import Pattern, Rate, gathered, pattern_of
 from sosmith.gen.chain.response import (
     Part,

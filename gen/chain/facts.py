@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from fractions import Fraction
 
-from sosmith.gen.chain.automatic.limits import loss_of
+from sosmith.gen.chain.automatic.losses import loss_of
 from sosmith.gen.chain.design import ChainDesign, Folding, Kept
 from sosmith.gen.chain.response import Segment
 from sosmith.gen.core import CoreDesign
