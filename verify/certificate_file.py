@@ -42,6 +42,11 @@ def on_grid(value: Fraction) -> Fraction:
     return Fraction(math.floor(value * 2**_GRID_BITS + Fraction(1, 2**_GRID_BITS)) + 1, 2**_GRID_BITS)
 
 
+def below_on_grid(value: Fraction) -> Fraction:
+    """Largest multiple of ``2**-64`` that is less than `value` by more than ``2**-128``."""
+    return -on_grid(-value)
+
+
 def _rational(value: object) -> object:
     if isinstance(value, Fraction):
         return value

@@ -16,8 +16,20 @@ from math import prod
 import numpy as np
 import numpy.typing as npt
 
+from sosmith.gen.chain.automatic.limits import Limits
+from sosmith.gen.chain.automatic.losses import why_not
 from sosmith.gen.chain.rates import Pattern, Rate, gathered, pattern_of
-from sosmith.gen.chain.response import Part, Segment, cic, folding_gain, gain_into_passband, peak_gain, segments_of
+from sosmith.gen.chain.response import (
+    Part,
+    Segment,
+    cic,
+    folding_gain,
+    gain_from,
+    gain_into_passband,
+    gains_in_passband,
+    peak_gain,
+    segments_of,
+)
 from sosmith.gen.chain.specification import ANY_INPUT, ANY_OUTPUT, ChainSpec, StageSpec
 from sosmith.gen.core import CoreDesign, design_core, polynomial_of, response_of
 from sosmith.gen.filter.design import Filter
@@ -32,7 +44,7 @@ from sosmith.model.dataflow.status import Flag
 from sosmith.model.errors import ShortfallError, SpecificationError
 from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
-from sosmith.verify.certificate_file import on_grid
+from sosmith.verify.certificate_file import below_on_grid, on_grid
 
 _MAX_BITS = 32
 """Widest port between stages."""
@@ -120,12 +132,35 @@ class Folding:
         Upper edge of the pass band in these units; None if no stage states one, or it is above half a rate.
     passing : Peak or None
         Largest gain of what went in, or comes out, in the pass band; None without one.
+    kept : Kept or None
+        What a chain with limits is held against; None without them.
     """
 
     segment: Segment
     anywhere: Peak
     edge: Fraction | None
     passing: Peak | None
+    kept: Kept | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Kept:
+    """Gains of a chain with limits; frequencies are in units of the highest rate.
+
+    Attributes
+    ----------
+    least, most : Peak
+        Smallest and largest gain in the pass band.
+    stop : Fraction or None
+        Where the stop band begins; None if only aliases into the pass band count.
+    stopped : Peak or None
+        Largest gain from there on.
+    """
+
+    least: Peak
+    most: Peak
+    stop: Fraction | None
+    stopped: Peak | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -173,15 +208,12 @@ class ChainDesign:
     @cached_property
     def foldings(self) -> tuple[Folding, ...]:
         """What each segment makes of a sine at other frequencies; empty if no stage changes the rate."""
-        segments = segments_of(self.parts)
-        return tuple(self._folding(each) for each in segments if each.rise > 1 or each.factor > 1)
+        return foldings_of(self.spec, self.parts)
 
-    def _folding(self, segment: Segment) -> Folding:
-        edge = None if self.spec.edge is None else self.spec.edge / self.spec.base.sample_rate / segment.highest
-        if edge is not None and 2 * edge * max(segment.rise, segment.factor) > 1:
-            edge = None
-        passing = None if edge is None else gain_into_passband(segment, edge)
-        return Folding(segment=segment, anywhere=folding_gain(segment), edge=edge, passing=passing)
+    @property
+    def excess(self) -> tuple[str, ...]:
+        """Which limits the chain does not keep to, a phrase for each; nothing if it keeps to all, or has none."""
+        return excess_of(self.spec.limits, self.foldings)
 
     @property
     def carried_flags(self) -> int:
@@ -245,6 +277,44 @@ class ChainDesign:
         return results, status
 
 
+def foldings_of(spec: ChainSpec, parts: Sequence[Part]) -> tuple[Folding, ...]:
+    """Return what each segment of parts makes of a sine at other frequencies."""
+    segments = [each for each in segments_of(parts) if each.rise > 1 or each.factor > 1]
+    return tuple(_folding(spec, each) for each in segments)
+
+
+def _folding(spec: ChainSpec, segment: Segment) -> Folding:
+    edge = None if spec.edge is None else spec.edge / spec.base.sample_rate / segment.highest
+    if edge is not None and 2 * edge * max(segment.rise, segment.factor) > 1:
+        edge = None
+    passing = None if edge is None else gain_into_passband(segment, edge)
+    kept = None if spec.limits is None else _kept(segment, spec.limits, spec.base.sample_rate)
+    return Folding(segment=segment, anywhere=folding_gain(segment), edge=edge, passing=passing, kept=kept)
+
+
+def _kept(segment: Segment, limits: Limits, rate: Fraction) -> Kept:
+    least, most = gains_in_passband(segment, limits.passband_edge / rate)
+    stop = None if limits.stopband_edge is None else limits.stopband_edge / rate
+    return Kept(least=least, most=most, stop=stop, stopped=None if stop is None else gain_from(segment, stop))
+
+
+def excess_of(limits: Limits | None, foldings: Sequence[Folding]) -> tuple[str, ...]:
+    """Say which limits gains do not keep to, as they stand in a certificate."""
+    if limits is None:
+        return ()
+    (folding,) = foldings
+    kept, passing = folding.kept, folding.passing
+    assert kept is not None
+    assert passing is not None
+    return why_not(
+        limits,
+        least=below_on_grid(kept.least.gain),
+        most=on_grid(kept.most.gain),
+        passing=on_grid(passing.gain),
+        stopped=None if kept.stopped is None else on_grid(kept.stopped.gain),
+    )
+
+
 def design_chain(spec: ChainSpec, *, board: Board | None = None, progress: Progress = lambda step: None) -> ChainDesign:
     """Design the stages of a chain, so that the whole keeps to the error that is allowed.
 
@@ -253,8 +323,18 @@ def design_chain(spec: ChainSpec, *, board: Board | None = None, progress: Progr
     SpecificationError
         If a stage breaks a rule.
     ShortfallError
-        If no formats meet the specification.
+        If no formats meet the specification, or the whole does not keep to its limits.
     """
+    chain = design_stages(spec, board=board, progress=progress)
+    if spec.limits is not None:
+        progress("limits of the whole")
+        if excess := chain.excess:
+            raise ShortfallError(f"the limits of the chain must be kept, and are not: {'; '.join(excess)}")
+    return chain
+
+
+def design_stages(spec: ChainSpec, *, board: Board | None, progress: Progress) -> ChainDesign:
+    """Design the stages of a chain, without a look at the limits of the whole; errors are those of `design_chain`."""
     return _Budget(spec, board, progress).designed()
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from fractions import Fraction
 
-from sosmith.gen.chain.design import ChainDesign, Folding
+from sosmith.gen.chain.automatic.losses import loss_of
+from sosmith.gen.chain.design import ChainDesign, Folding, Kept
 from sosmith.gen.chain.response import Segment
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.facts.design_tables import ErrorUnit
@@ -20,7 +21,27 @@ def chain_tables(design: ChainDesign) -> list[Table]:
     if design.settling:
         tables.append(_start(design))
     tables += [_folding(design, each) for each in design.foldings]
+    tables += [_kept(design, each.kept) for each in design.foldings if each.kept is not None]
     return tables
+
+
+def _kept(design: ChainDesign, kept: Kept) -> Table:
+    """Say how the gain from end to end keeps to the limits of the whole."""
+    rate, limits = design.spec.base.sample_rate, design.spec.limits
+    assert limits is not None
+    most = kept.most.gain
+    droop = loss_of(kept.least.gain, most)
+    rows = [
+        Fact("Largest gain", _decibels(kept.most), sentence=f"reached at {_frequency(kept.most.at * rate)}"),
+        Fact("Smallest gain", _decibels(kept.least), sentence=f"reached at {_frequency(kept.least.at * rate)}"),
+        Fact("Droop and ripple", decibels(droop), sentence=f"at most {float(limits.passband_loss):g} dB asked"),
+    ]
+    (folding,) = design.foldings
+    for what, peak in (("Aliases into the pass band", folding.passing), ("In the stop band", kept.stopped)):
+        if peak is not None:
+            asked = f"at least {float(limits.stopband_loss):g} dB below the largest gain asked"
+            rows.append(Fact(what, decibels(-loss_of(peak.gain, most)), sentence=asked))
+    return Table(f"Pass band of the whole, up to {_frequency(limits.passband_edge)}, proven", rows)
 
 
 def _stages(design: ChainDesign) -> Table:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from sosmith.gen.chain.c_model import chain_header, chain_source
-from sosmith.gen.chain.design import ChainDesign, Folding
+from sosmith.gen.chain.design import ChainDesign, Folding, Kept
 from sosmith.gen.chain.top import chain_interface, top_text
 from sosmith.gen.filter.largest_gain import Peak
 from sosmith.gen.output.certificate import certificate, port_entry
@@ -17,11 +17,12 @@ from sosmith.gen.output.generate import generated
 from sosmith.gen.output.manifest import stream_entry
 from sosmith.gen.version import __version__
 from sosmith.model.text_files import to_json, write_files
-from sosmith.verify.certificate_file import Certificate, FileEntry, entries_text, on_grid
+from sosmith.verify.certificate_file import Certificate, FileEntry, below_on_grid, entries_text, on_grid
 from sosmith.verify.chain.chain_file import (
     ChainCertificate,
     ChainStageEntry,
     FoldingEntry,
+    KeptEntry,
     LargestEntry,
     sealed_chain,
 )
@@ -60,7 +61,8 @@ def chain_texts(design: ChainDesign, progress: Progress = lambda step: None) -> 
         f"{name}.h": chain_header(design),
     }
     certified = entries_text(_certified(design, claims, texts, own))
-    return {**own, f"{name}.certificate.json": certified, **texts}
+    written = {f"{name}.toml": design.spec.text} if design.spec.is_written else {}
+    return {**own, f"{name}.certificate.json": certified, **written, **texts}
 
 
 def chain_manifest(design: ChainDesign) -> dict[str, Any]:
@@ -165,6 +167,16 @@ def _folding(folding: Folding) -> FoldingEntry:
         anywhere=_largest(folding.anywhere),
         edge=folding.edge,
         passing=None if folding.passing is None else _largest(folding.passing),
+        kept=None if folding.kept is None else _kept(folding.kept),
+    )
+
+
+def _kept(kept: Kept) -> KeptEntry:
+    return KeptEntry(
+        least=LargestEntry(gain=below_on_grid(kept.least.gain), at=kept.least.at),
+        most=_largest(kept.most),
+        stop=kept.stop,
+        stopped=None if kept.stopped is None else _largest(kept.stopped),
     )
 
 

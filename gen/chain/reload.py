@@ -9,7 +9,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 
-from sosmith.gen.chain.design import ChainDesign, StageDesign, gains_to_the_end, parts_of, reach_behind
+from sosmith.gen.chain.design import (
+    ChainDesign,
+    StageDesign,
+    excess_of,
+    foldings_of,
+    gains_to_the_end,
+    parts_of,
+    reach_behind,
+)
 from sosmith.gen.chain.response import Part, peak_gain
 from sosmith.gen.chain.specification import ChainSpec
 from sosmith.gen.quantity import quantity
@@ -53,7 +61,7 @@ def reload_chain(design: ChainDesign, wanted: ChainSpec, *, reset: bool) -> Chai
     SpecificationError
         If anything else differs, or the stage cannot be loaded.
     ShortfallError
-        If the set does not fit the stage, a port behind it, or the error allowed.
+        If the set does not fit the stage, a port behind it, the error allowed, or the limits of the whole.
     """
     k = _changed(design, wanted)
     stage, spec, base = design.stages[k], wanted.stages[k], wanted.base
@@ -74,6 +82,13 @@ def reload_chain(design: ChainDesign, wanted: ChainSpec, *, reset: bool) -> Chai
             f"the chain must keep its error within {allowed} with the set, and is proven to {reached} only: nothing is "
             "to be loaded"
         )
+    if wanted.limits is not None:
+        excess = excess_of(wanted.limits, foldings_of(wanted, [part for each in parts for part in each]))
+        if excess:
+            raise ShortfallError(
+                f"the limits of the chain must be kept with the set, and are not: {'; '.join(excess)}: nothing is to "
+                "be loaded"
+            )
     return ChainSwap(stage=stage, swap=swap, bound=bound)
 
 

@@ -19,12 +19,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 from math import gcd, prod
 
-from flint import acb, acb_poly, arb, ctx, fmpq_poly
+from flint import arb, ctx, fmpq_poly
 
 from sosmith.gen.filter.exact_form import Exact
-from sosmith.gen.filter.largest_gain import Factor, Peak, gain_of_sections, largest
+from sosmith.gen.filter.largest_gain import CLOSE, Factor, Peak, gain_of_sections, largest, smallest
+from sosmith.gen.filter.tangents import Tangents
 from sosmith.gen.proof.nodes import polynomial
 from sosmith.gen.proof.peak_gain import Drive, extent
 from sosmith.gen.proof.response import Response
@@ -122,6 +124,7 @@ def peak_gain(parts: Sequence[Part]) -> Fraction:
     return prod((_peak_gain(segment) for segment in segments_of(parts)), start=Fraction(1))
 
 
+@lru_cache(maxsize=64)  # while word lengths are searched for, the response stays
 def _peak_gain(segment: Segment) -> Fraction:
     """Largest sum of the magnitudes of a phase of a segment's response, rounded up a little."""
     rise = segment.rise
@@ -178,49 +181,38 @@ def _largest(segment: Segment, bands: Sequence[tuple[Fraction, Fraction]]) -> Pe
     return largest(gain, bands)
 
 
+def gain_from(segment: Segment, stop: Fraction) -> Peak:
+    """Largest gain from the frequency `stop` on."""
+    return _largest(segment, [(stop, _HALF)])
+
+
+def gains_in_passband(segment: Segment, edge: Fraction) -> tuple[Peak, Peak]:
+    """Smallest and largest gain at frequencies up to `edge`, each to a millionth."""
+    with ctx.workprec(_PRECISION):
+        gain = _Gain(segment)
+    band = (Fraction(0), edge)
+    return smallest(gain.least, band, CLOSE), largest(gain.most, [band], CLOSE)
+
+
 def bands_into_passband(factor: int, edge: Fraction) -> list[tuple[Fraction, Fraction]]:
     """Bands that fold to frequencies up to `edge`, both in units of the rate before decimation by `factor`."""
     centres = (Fraction(k, factor) for k in range(1, factor // 2 + 1))
     return [(centre - edge, min(centre + edge, _HALF)) for centre in centres if centre - edge < _HALF]
 
 
-class _Taps:
-    """Taps ``b_k`` of a filter, by what is known of ``V(w) = sum b_k e**(-i (k - c) w)`` near an angle.
-
-    The centre c takes the delay off, with which V would turn much faster. Within r of w, V is at most ``C r**2 / 2``
-    away from its tangent, ``C = sum |b_k| (k - c)**2``, whose magnitude is the largest at an end.
-    """
-
-    def __init__(self, taps: Sequence[Fraction]) -> None:
-        centre = Fraction(len(taps) - 1, 2)
-        self._value = acb_poly([ball(tap) for tap in taps])
-        self._slope = acb_poly([ball(tap * (k - centre)) for k, tap in enumerate(taps)])
-        self._most = ball(sum(map(abs, taps), Fraction(0)))
-        self._curvature = ball(sum((abs(tap) * (k - centre) ** 2 for k, tap in enumerate(taps)), Fraction(0)))
-
-    def on(self, low: Fraction, high: Fraction) -> Factor:
-        """Say what is known of the magnitude on an interval of frequencies."""
-        u = acb(ball(-(low + high))).exp_pi_i()
-        value = self._value(u)
-        if low == high:
-            return Factor(abs(value), abs(value), arb("inf"))
-        reach = arb.pi() * ball(high - low)
-        turn = self._slope(u) * acb(0, 1) * reach
-        tangent = abs(value + turn).max(abs(value - turn)) + self._curvature * reach**2 / 2
-        return Factor(abs(value), tangent.min(self._most), arb("inf"))
-
-
 class _Gain:
     """What is known of the gain of a segment on an interval of frequencies, in units of its highest rate."""
 
     def __init__(self, segment: Segment) -> None:
-        self._taps: list[tuple[_Taps, int]] = []
+        self._taps: list[tuple[Tangents, int]] = []
         self._poles: list[tuple[Exact, int]] = []
+        self._under: list[tuple[Tangents, int]] = []
         self._share = ball(Fraction(1, segment.rise))
         for part, step in zip(segment.parts, segment.spreads, strict=True):
             for numerator, denominator in part.sections:
-                self._taps.append((_Taps(numerator), step))
+                self._taps.append((Tangents(numerator), step))
                 if len(denominator) > 1:
+                    self._under.append((Tangents(denominator), step))
                     self._poles.append((((Fraction(1),), denominator), step))
 
     def __call__(self, low: Fraction, high: Fraction) -> Factor:
@@ -230,3 +222,27 @@ class _Gain:
         for section, step in self._poles:
             product = product.times(gain_of_sections([section], low * step, high * step))
         return product
+
+    def least(self, low: Fraction, high: Fraction) -> tuple[arb, arb]:
+        """Return the gain in the middle of an interval, and one below which it is nowhere there."""
+        middle, spread = self._logarithm(low, high)
+        return middle, middle * (-spread).exp() if spread.is_finite() else arb(0)
+
+    def most(self, low: Fraction, high: Fraction) -> Factor:
+        """Say what is known of the gain, best where it is far from 0."""
+        middle, spread = self._logarithm(low, high)
+        return Factor(middle, middle * spread.exp(), arb("inf")) if spread.is_finite() else self(low, high)
+
+    def _logarithm(self, low: Fraction, high: Fraction) -> tuple[arb, arb]:
+        """Return the gain in the middle, and by how much its logarithm differs from there at most.
+
+        Slopes of sections cancel each other, which bounds of each by itself would not know.
+        """
+        middle, change, off = self._share, arb(0), arb(0)
+        for factors, sign in ((self._taps, 1), (self._under, -1)):
+            for taps, step in factors:
+                found = taps.logarithm(low * step, high * step)
+                if found is None:
+                    return self(low, high).middle, arb("inf")
+                middle, change, off = middle * found[0] ** sign, change + sign * found[1], off + found[2]
+        return middle, abs(change) + off

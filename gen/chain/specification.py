@@ -7,13 +7,16 @@ about a filter is that of a filter alone, and what is here is about stages besid
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from decimal import Context, Decimal, Inexact
 from fractions import Fraction
 from math import prod
 from pathlib import Path
 from typing import Any
 
+from sosmith.gen.chain.automatic.asked import check_factor, check_kinds, limits_in
+from sosmith.gen.chain.automatic.limits import KEYS, LIMITS, Limits
+from sosmith.gen.chain.automatic.structures import MAX_STAGES
 from sosmith.gen.specification.choices import AUTO, FIR_FAMILIES, MAX_DECIMATION, MAX_DOWNSAMPLING, MAX_TAPS
 from sosmith.gen.specification.combinations import check_chain
 from sosmith.gen.specification.specification import STAGE, Specification, from_tree, parsed, text_of, to_json
@@ -36,9 +39,6 @@ from sosmith.model.suggestion import did_you_mean
 MAX_FACTOR = 1 << 12
 """Most samples for each result, and results for each sample: the response is computed at the highest rate."""
 
-MAX_STAGES = 8
-"""Most stages of a chain."""
-
 _EDGES = ("passband_edge", "stopband_edge", "passband_loss", "stopband_loss")
 _OF_ONE = ("architecture", "realization", "multipliers", "protect", "reload", "reload_lock")
 """Keys of ``[hardware]`` that a stage can have of its own."""
@@ -51,6 +51,7 @@ _KEYS: dict[str, tuple[str, ...]] = {
     "fir": ("family", "band", *_EDGES, "taps", "taps_file", "decimate", "interpolate"),
     "halfband": ("passband_edge", "passband_loss", "stopband_loss", "decimate", "interpolate"),
     "cic": ("order", "decimate", "interpolate"),
+    AUTO: ("decimate", *KEYS),
 }
 """Keys of a stage by its kind, beside those of all."""
 
@@ -63,8 +64,11 @@ _RISING = tuple(kind for kind, keys in _KEYS.items() if "interpolate" in keys)
 _TAKEN = "flags"
 """What a module of the chain itself is called behind its name."""
 
-_TOP = ("name", "sample_rate", "channels", "input", STAGE, "output", "hardware")
+_TOP = ("name", "sample_rate", "channels", "input", STAGE, LIMITS, "output", "hardware")
 _WIRE = {"sos": [[1, 0, 0, 1, 0, 0]]}
+_ANY_DECIMATOR = {"filter": {"taps": [Decimal(1)], "decimate": 2}}
+"""Stands for the stages that will be chosen where rules about the hardware are checked."""
+
 _EXACT = Context(prec=200, traps=[Inexact])
 
 
@@ -195,12 +199,26 @@ class ChainSpec:
         TOML.
     stages : tuple of StageSpec
         In the order of the samples.
+    limits : Limits or None
+        What is asked of the whole.
+    is_written : bool
+        Whether the stages were chosen for one of the kind auto, so that nobody has the text yet.
+    tree : mapping
+        The file as read, with every float as a decimal number.
     """
 
     base: Specification
     source: dict[str, Any]
     text: str
     stages: tuple[StageSpec, ...]
+    limits: Limits | None = None
+    is_written: bool = False
+    tree: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)
+
+    @property
+    def is_automatic(self) -> bool:
+        """Whether the stages have to be chosen first, for the one of the kind auto."""
+        return self.stages[0].kind == AUTO
 
     @property
     def name(self) -> str:
@@ -224,7 +242,9 @@ class ChainSpec:
 
     @property
     def edge(self) -> Fraction | None:
-        """Upper edge of the chain's pass band, in Hz: the lowest that a stage states; None if none does."""
+        """Upper edge of the pass band, in Hz: that of the limits, or the lowest of a stage; None without one."""
+        if self.limits is not None:
+            return self.limits.passband_edge
         return min((stage.edge for stage in self.stages if stage.edge is not None), default=None)
 
 
@@ -286,7 +306,7 @@ def _checked(tree: dict[str, Any], path: Path, text: str | None) -> ChainSpec:
     if not 1 <= len(stages) <= MAX_STAGES:
         raise UnfitError(f"a list of 1 to {MAX_STAGES} tables [[stage]]", f"{len(stages)} of them", where=STAGE)
     kinds = [_kind(stage, k) for k, stage in enumerate(stages)]
-    common = {key: value for key, value in tree.items() if key != STAGE}
+    common = {key: value for key, value in tree.items() if key not in {STAGE, LIMITS}}
     if kinds[0] == "polynomial":
         common["calibration"] = {key: stages[0][key] for key in _KEYS["polynomial"] if key in stages[0]}
     base = from_tree(common | {"filter": _WIRE}, path)
@@ -311,11 +331,16 @@ def _checked(tree: dict[str, Any], path: Path, text: str | None) -> ChainSpec:
         raise together(findings)
     _check_names([stage.name for stage in read])
     _check_factors(read)
+    check_kinds(kinds)
     chain = ChainSpec(
         base=base,
         source={key: to_json(value) for key, value in tree.items()},
         text=text if text is not None else toml_text(tree),
         stages=tuple(read),
+        limits=limits_in(
+            tree, base.sample_rate, prod(each.factor for each in read), rises=any(each.rise > 1 for each in read)
+        ),
+        tree=tree,
     )
     _check_steps(chain)
     for k, one in enumerate(chain.stages):
@@ -348,7 +373,7 @@ def _kind(stage: Mapping[str, Any], k: int) -> str:
 
 def _stage(table: Mapping[str, Any], kind: str, k: int, rate: Fraction) -> StageSpec:
     where = f"stage[{k}]"
-    known = (*_COMMON, *_KEYS[kind])
+    known = (*(_COMMON if kind != AUTO else _COMMON[:2]), *_KEYS[kind])
     for key, value in table.items():
         if key == "interpolate" and kind not in _RISING:
             raise UnfitError(
@@ -404,11 +429,17 @@ def _factor(table: Mapping[str, Any], kind: str, where: str) -> int:
             where=f"{where}.decimate",
         )
     if "decimate" not in table:
+        if kind == AUTO:
+            raise UnfitError(f"a whole number from 2 to {MAX_FACTOR}", "missing", where=f"{where}.decimate")
         return 1
+    most = {"iir": MAX_DECIMATION, AUTO: MAX_FACTOR}.get(kind, MAX_DOWNSAMPLING)
     try:
-        return whole(2, MAX_DECIMATION if kind == "iir" else MAX_DOWNSAMPLING)(table["decimate"])
+        factor = whole(2, most)(table["decimate"])
     except UnfitError as unfit:
         raise unfit.inside(f"{where}.decimate") from None
+    if kind == AUTO:
+        check_factor(factor, f"{where}.decimate")
+    return factor
 
 
 def _rise(table: Mapping[str, Any], where: str) -> int:
@@ -448,6 +479,8 @@ def _tables(table: Mapping[str, Any], kind: str, where: str, rate: Fraction, fac
     decimate = {"decimate": factor} if factor > 1 else {}
     if kind == "polynomial":
         return {"calibration": {key: table[key] for key in _KEYS[kind] if key in table}, "filter": _WIRE}
+    if kind == AUTO:
+        return _ANY_DECIMATOR
     if kind == "gain":
         if "factor" not in table:
             raise UnfitError("a number other than 0", "missing", where=f"{where}.factor")

@@ -148,6 +148,11 @@ def on_board(architecture: Architecture, board: Board) -> Architecture:
     )
 
 
+def luts_of(found: Mapping[str, float], architecture: str, family: str) -> float:
+    """Return the LUT4 that quantities of an architecture, by its name, come to in a family of FPGAs."""
+    return total(found, _fitted()["factors"][architecture][family]["luts"])
+
+
 def total(found: Mapping[str, float], factors: Mapping[str, float]) -> float:
     """Return the sum of quantities times their factors."""
     return sum(amount * factors.get(name, 0.0) for name, amount in found.items())

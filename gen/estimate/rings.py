@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
+from typing import NamedTuple
 
 from sosmith.gen.architectures.folded_fir import FoldedFir
 from sosmith.gen.estimate.graphs import clamp
@@ -18,31 +20,93 @@ _CONTROL, _STATES = 75, 19
 """LUT4 and flip-flops of what moves samples and results, as synthesis of four cores for an ECP5 has them."""
 
 
+class Rings(NamedTuple):
+    """What determines how large the hardware is, but for the limits of its output.
+
+    Attributes
+    ----------
+    words, data_bits : int
+        Samples that a ring holds, and bits of one.
+    pair_bits, pairs : int
+        Bits of the sum of two samples, or of one, and whether samples are added in pairs.
+    factor_bits, sum_bits : int
+        Bits of a coefficient, and of the sum of all products.
+    output_bits, flags : int
+        Bits and flags of a result.
+    channels : int
+    last_step : int
+        Number of the clock at which the sum is complete.
+    codes : sequence of int
+        The words of the table of steps.
+    """
+
+    words: int
+    data_bits: int
+    pair_bits: int
+    pairs: bool
+    factor_bits: int
+    sum_bits: int
+    output_bits: int
+    flags: int
+    channels: int
+    last_step: int
+    codes: Sequence[int]
+
+
 def of_rings(architecture: FoldedFir, device: Device) -> Quantities:
     """Count the rings, the table of steps, the multiplier, the sum, and what moves samples."""
     plan, datapath = architecture.plan, architecture.datapath
     (port,), graph = datapath.inputs, datapath.stages[-1].graph
-    channels, place = channel_bits(architecture.channels), (plan.words - 1).bit_length()
-    rings, pair, factor = 1 + plan.pairs, plan.pair_bits(port), plan.factor_bits
-    total = graph.nodes[graph.inputs[0]].width + 1
-    made: Quantities = Counter(
-        {"logic": _CONTROL, "registers": _STATES, "counters": place + plan.last_step.bit_length(), "channels": channels}
+    place, factor = (plan.words - 1).bit_length(), plan.factor_bits
+    rings = Rings(
+        words=plan.words,
+        data_bits=port.bits,
+        pair_bits=plan.pair_bits(port),
+        pairs=plan.pairs,
+        factor_bits=factor,
+        sum_bits=graph.nodes[graph.inputs[0]].width + 1,
+        output_bits=datapath.output.bits,
+        flags=flags_of(datapath),
+        channels=architecture.channels,
+        last_step=plan.last_step,
+        codes=[(step.coefficient & ((1 << factor) - 1)) << place | step.first for step in plan.steps],
     )
-    for _ in range(rings):
-        made += of_memory(device, plan.words * architecture.channels, port.bits)
-        made["sums"] += place
-    codes = [(step.coefficient & ((1 << factor) - 1)) << place | step.first for step in plan.steps]
-    made += of_rom(device, codes, factor + rings * place)
-    made += of_product(Product(Multiplication(Operand(pair, signed=True), Operand(factor, signed=True))), device)
-    made["sums"] += total + pair * plan.pairs
-    made["registers"] += (
-        pair + pair + factor + total + datapath.output.bits + flags_of(datapath) + 2 * port.bits * (channels > 0)
-    )
+    made = of_size(rings, device)
     last = graph.nodes[graph.outputs[0]]
     if last.op is Op.CLAMP:
         made += clamp(last, graph.nodes[last.operands[0]])
     made += of_inputs(datapath.inputs, datapath.calibrated)
     made["compared"] += 2 * datapath.output.bits * bool(datapath.wear)
-    if channels:
-        made += of_memory(device, architecture.channels, 2 + place + datapath.samples_per_result.bit_length())
+    if rings.channels > 1:
+        made += of_memory(device, rings.channels, 2 + place + datapath.samples_per_result.bit_length())
+    return made
+
+
+def of_size(rings: Rings, device: Device) -> Quantities:
+    """Count all but the limits of the output, what looks at the input, and the places of several channels."""
+    channels, place = channel_bits(rings.channels), (rings.words - 1).bit_length()
+    factor, count = rings.factor_bits, 1 + rings.pairs
+    made: Quantities = Counter(
+        {
+            "logic": _CONTROL,
+            "registers": _STATES,
+            "counters": place + rings.last_step.bit_length(),
+            "channels": channels,
+        }
+    )
+    for _ in range(count):
+        made += of_memory(device, rings.words * rings.channels, rings.data_bits)
+        made["sums"] += place
+    made += of_rom(device, rings.codes, factor + count * place)
+    operands = Multiplication(Operand(rings.pair_bits, signed=True), Operand(factor, signed=True))
+    made += of_product(Product(operands), device)
+    made["sums"] += rings.sum_bits + rings.pair_bits * rings.pairs
+    made["registers"] += (
+        2 * rings.pair_bits
+        + factor
+        + rings.sum_bits
+        + rings.output_bits
+        + rings.flags
+        + 2 * rings.data_bits * (channels > 0)
+    )
     return made

@@ -44,6 +44,7 @@ _MARGINS = 64  # parts of the losses by which a mask is narrowed around the filt
 _GRID = 2048  # frequencies up to half the sample rate at which given sections are evaluated
 _ROUGH = 64  # bits with which the largest of these gains are looked for
 _NEARLY = 1 + 2**-50  # gains this near to each other may round to one double
+_DECIDED = 1e-6  # relative distance from half the largest gain beyond which doubles say on which side a gain is
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -285,8 +286,18 @@ def _fir(spec: FilterSpec, taps: Sequence[Fraction], fs: Fraction) -> Filter:
     """Return the filter with given taps; they stay as they are, so that equal ones stay equal."""
     row = fir_row(taps)
     doubles = tuple(float(value) for value in row)
-    kind, _ = evaluate(lambda: _kind_and_reference([doubles]))
-    return _filter(spec, fs, FIR, kind, (doubles,), given_form([row]), order=len(taps) - 1)
+    return _filter(spec, fs, FIR, _kind_of(doubles), (doubles,), given_form([row]), order=len(taps) - 1)
+
+
+def _kind_of(row: tuple[float, ...]) -> str:
+    """Return the kind of taps as `_kind_and_reference` does; from doubles, where their errors cannot change it."""
+    gains = np.abs(np.fft.rfft(row[: len(row) // 2], 2 * _GRID))[:_GRID]
+    dc, nyquist, top = gains[0], gains[-1], gains.max()
+    if top and all(abs(gain / top - 0.5) > _DECIDED for gain in (dc, nyquist)):
+        if dc >= top / 2:
+            return "bandstop" if nyquist >= top / 2 else "lowpass"
+        return "highpass" if nyquist >= top / 2 else "bandpass"
+    return evaluate(lambda: _kind_and_reference([row]))[0]
 
 
 def _designed(spec: FilterSpec, fs: Fraction) -> tuple[Fraction, ...]:

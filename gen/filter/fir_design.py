@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from functools import lru_cache
 from itertools import pairwise
@@ -39,6 +39,9 @@ _SPARE = 2.0**-20
 
 _MISSES = 2
 """Lengths in a row that do not keep to the losses, after which no shorter one is tried: odd and even ones differ."""
+
+_DENSITY = 16
+"""What scipy takes for `grid_density`."""
 
 _POINTS = 1 << 14
 """Frequencies up to half the sample rate at which the largest gain is looked for."""
@@ -134,7 +137,18 @@ def _edges_and_gains(mask: LossMask) -> tuple[list[float], list[float], list[flo
 
 def _equiripple(length: int, mask: LossMask) -> Array:
     edges, gains, weights = _edges_and_gains(mask)
-    return np.asarray(signal.remez(length, edges, gains, weight=weights, fs=1.0), dtype=np.float64)
+    density = _density(edges)
+    taps = signal.remez(length, edges, gains, weight=weights, fs=1.0, grid_density=density)
+    return np.asarray(taps, dtype=np.float64)
+
+
+def _density(edges: Sequence[float]) -> int:
+    """Return frequencies for each coefficient of the exchange, so many that bands that are narrow have enough.
+
+    With fewer than a filter has coefficients, scipy's exchange writes where it must not.
+    """
+    width = sum(high - low for low, high in zip(edges[::2], edges[1::2], strict=True))
+    return max(_DENSITY, math.ceil(2 / width)) if width < 2 / _DENSITY else _DENSITY
 
 
 def _least_squares(length: int, mask: LossMask) -> Array:
@@ -155,7 +169,8 @@ def _kaiser(length: int, mask: LossMask) -> Array:
 def _halfband(length: int, mask: LossMask) -> Array:
     ((_, edge),) = mask.passbands
     taps = np.zeros(length)
-    taps[::2] = signal.remez((length + 1) // 2, [0, 2 * float(edge)], [1], fs=1.0) / 2
+    bands = [0.0, 2 * float(edge)]
+    taps[::2] = signal.remez((length + 1) // 2, bands, [1], fs=1.0, grid_density=_density(bands)) / 2
     taps[length // 2] = 0.5
     return taps
 

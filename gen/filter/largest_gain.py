@@ -29,6 +29,9 @@ from sosmith.model.arithmetic.correct_rounding import ball, evaluate, nearest_mu
 TOLERANCE = Fraction(1, 1 << 10)
 """Share by which a bound exceeds a gain that is reached."""
 
+CLOSE = Fraction(1, 1 << 20)
+"""The same where gains in a pass band are compared, in dB some millionths."""
+
 _PRECISION = 192
 """Bits of the balls."""
 
@@ -36,6 +39,7 @@ _GAIN_BITS = 192
 """Fraction bits of bounds."""
 
 _HALF = Fraction(1, 2)
+_NOTHING = 2.0**-30
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,7 +128,11 @@ class LargestGain:
         return filter_ if band is None else _cic(self._factor, self._stages, band, low, high).times(filter_)
 
 
-def largest(gain_on: Callable[[Fraction, Fraction], Factor], bands: Sequence[tuple[Fraction, Fraction]]) -> Peak:
+def largest(
+    gain_on: Callable[[Fraction, Fraction], Factor],
+    bands: Sequence[tuple[Fraction, Fraction]],
+    tolerance: Fraction = TOLERANCE,
+) -> Peak:
     """Bound the largest gain on any of some intervals, at least one, by branch and bound.
 
     Parameters
@@ -133,13 +141,15 @@ def largest(gain_on: Callable[[Fraction, Fraction], Factor], bands: Sequence[tup
         Says what is known of the gain on an interval, at the present precision of FLINT.
     bands : sequence of (Fraction, Fraction)
         The intervals.
+    tolerance : Fraction
+        Share by which the bound may exceed a gain that is reached.
     """
     with ctx.workprec(_PRECISION):
         at, best = bands[0][0], arb(0)
         open_: list[tuple[float, Fraction, Fraction, arb]] = [(-math.inf, *band, arb("inf")) for band in bands]
         while True:
             _, start, end, most = heappop(open_)
-            if most <= best * ball(1 + TOLERANCE):
+            if most <= best * ball(1 + tolerance):
                 break
             middle = (start + end) / 2
             for one, other in ((start, middle), (middle, end)):
@@ -150,9 +160,45 @@ def largest(gain_on: Callable[[Fraction, Fraction], Factor], bands: Sequence[tup
                 heappush(open_, (-float(bound), one, other, bound))
 
     def gain() -> Fraction:
-        return nearest_multiple(gain_on(at, at).middle * ball(1 + TOLERANCE), _GAIN_BITS)
+        return nearest_multiple(gain_on(at, at).middle * ball(1 + tolerance), _GAIN_BITS)
 
     return Peak(at=at, gain=evaluate(gain) + Fraction(1, 1 << _GAIN_BITS))
+
+
+def smallest(
+    gain_on: Callable[[Fraction, Fraction], tuple[arb, arb]], band: tuple[Fraction, Fraction], tolerance: Fraction
+) -> Peak:
+    """Bound the smallest gain on an interval from below, by branch and bound; one below `_NOTHING` counts as 0.
+
+    Parameters
+    ----------
+    gain_on : callable
+        Returns the gain in the middle of an interval, and a bound from below on all of it.
+    band : (Fraction, Fraction)
+        The interval.
+    tolerance : Fraction
+        Share by which the bound may be below a gain that is reached.
+    """
+    with ctx.workprec(_PRECISION):
+        at, best = band[0], arb("inf")
+        open_: list[tuple[float, Fraction, Fraction, arb]] = [(-math.inf, *band, arb("-inf"))]
+        while True:
+            _, start, end, least = heappop(open_)
+            if best < _NOTHING:
+                return Peak(at=at, gain=Fraction(0))
+            if least >= best * ball(1 - tolerance):
+                break
+            middle = (start + end) / 2
+            for one, other in ((start, middle), (middle, end)):
+                reached, bound = gain_on(one, other)
+                if reached.upper() < best:
+                    at, best = (one + other) / 2, reached.upper()
+                heappush(open_, (float(bound.lower()), one, other, bound.lower()))
+
+    def gain() -> Fraction:
+        return nearest_multiple(gain_on(at, at)[0] * ball(1 - tolerance), _GAIN_BITS)
+
+    return Peak(at=at, gain=evaluate(gain) - Fraction(1, 1 << _GAIN_BITS))
 
 
 @lru_cache(maxsize=16)

@@ -51,12 +51,26 @@ class LargestEntry(Entry):
     at: Rational
 
 
+class KeptEntry(Entry):
+    """Gains of a chain that has limits: `least` and `most` in its pass band, and the largest from `stop` on.
+
+    `least` is one below which none is, and where it is said to be reached, hardly more is. `stop` and `stopped` are
+    None where only aliases into the pass band have a limit.
+    """
+
+    least: LargestEntry
+    most: LargestEntry
+    stop: Rational | None = None
+    stopped: LargestEntry | None = None
+
+
 class FoldingEntry(Entry):
     """What comes out of some stages at another frequency than it went in; none interpolates behind one that decimates.
 
     Together they interpolate by `rise`, then decimate by `factor`. Frequencies are in units of the rate between.
     `anywhere` bounds the gain of images and aliases, from half the lower one of both other rates on. `passing` bounds
-    that of what comes in, or out, at a frequency up to `edge`; both are None without a pass band.
+    that of what comes in, or out, at a frequency up to `edge`; both are None without a pass band. `kept` is None in a
+    chain without limits.
     """
 
     rise: Annotated[int, Field(strict=True, ge=1, le=1 << 20)]
@@ -64,6 +78,7 @@ class FoldingEntry(Entry):
     anywhere: LargestEntry
     edge: Rational | None = None
     passing: LargestEntry | None = None
+    kept: KeptEntry | None = None
 
 
 class ChainCertificate(Entry):

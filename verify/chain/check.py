@@ -376,9 +376,12 @@ def _scope(
         scope[name] = _together({stage: each.scope[name] for stage, each in stages.items()})
     gains = "each stage's error and its gain to the end bound the whole, and no port between stages limits what passes"
     folds = "; no alias or image has more than the gains that are claimed" if chain.folding else ""
+    if any(entry.kept is not None for entry in chain.folding):
+        folds += "; gains in the pass band lie between those that are claimed"
     chained = {"chain": ScopePart(State.PROVEN, gains + folds)}
     if specified:
-        chained["stages"] = ScopePart(State.PROVEN, "each stage is the one that the words of the chain ask for")
+        kept = ", and the whole keeps to its limits" if "pass band" in folds else ""
+        chained["stages"] = ScopePart(State.PROVEN, f"each stage is the one that the words of the chain ask for{kept}")
     if with_files:
         chained["top"] = ScopePart(
             State.PROVEN,

@@ -13,6 +13,7 @@ from typing import Any
 
 from sosmith.verify.certificate_file import Certificate
 from sosmith.verify.chain.chain_file import ChainCertificate
+from sosmith.verify.chain.limits import check_chosen, check_limits, is_automatic, limits_of
 from sosmith.verify.chain.responses import taps_in_turn
 from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.specified.filter_table import read_filter_table
@@ -44,9 +45,13 @@ def check_words(chain: ChainCertificate, text: str, groups: Groups) -> None:
     RejectedError
         If one is not.
     """
-    require(text == chain.specification, "the specification must have the text in the certificate of the chain")
     try:
-        _check(chain, words_of(text), groups)
+        asked, own = words_of(text), words_of(chain.specification)
+        if is_automatic(asked):
+            check_chosen(asked, own)
+        else:
+            require(text == chain.specification, "the specification must have the text in the certificate of the chain")
+        _check(chain, own, groups)
     except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
         raise RejectedError(f"the specification must be valid and complete, not: {error!r}") from None
 
@@ -79,7 +84,11 @@ def _check(chain: ChainCertificate, tree: Mapping[str, Any], groups: Groups) -> 
             own = words_of(about_of(cores[0]).specification)
             _same(f"the {table} of stage {stage['name']}", _plain(own[table]), _plain(_table(stage, rate)))
         rate = rate * rise / stage.get("decimate", 1)
-    _check_edges(chain, stages, first)
+    if (limits := limits_of(tree)) is not None:
+        check_limits(chain.folding, limits, first)
+    else:
+        require(all(entry.kept is None for entry in chain.folding), "a chain without limits must claim none")
+    _check_edges(chain, stages, first, None if limits is None else limits.passband_edge)
 
 
 def _check_core(
@@ -124,21 +133,31 @@ def _check_taps(stage: Mapping[str, Any], cores: Sequence[Certificate], rate: Fr
     )
 
 
-def _check_edges(chain: ChainCertificate, stages: Sequence[Mapping[str, Any]], rate: Fraction) -> None:
-    """Check that the pass band ends at the lowest edge of the low-pass filters, where that comes out as itself."""
-    ends = [
-        stated_number(stage.get("passband_edge", stage.get("cutoff")))
-        for stage in stages
-        if stage["kind"] in _WITH_EDGES
-        and stage.get("band", "lowpass") == "lowpass"
-        and ("passband_edge" in stage or "cutoff" in stage)
-    ]
+def _check_edges(
+    chain: ChainCertificate, stages: Sequence[Mapping[str, Any]], rate: Fraction, edge_of_limits: Fraction | None
+) -> None:
+    """Check that the pass band ends at that of the limits, or the lowest edge of the low-pass filters.
+
+    That counts where it comes out as itself.
+    """
+    ends = [edge_of_limits] if edge_of_limits is not None else _ends(stages)
     for entry in chain.folding:
         highest = rate * entry.rise
         lowest = min(rate, highest / entry.factor)
         edge = min(ends) / highest if ends and 2 * min(ends) <= lowest else None
         _same("the edge of the pass band, in units of the highest rate,", entry.edge, edge)
         rate = highest / entry.factor
+
+
+def _ends(stages: Sequence[Mapping[str, Any]]) -> list[Fraction]:
+    """Return the edges of the low-pass filters."""
+    return [
+        stated_number(stage.get("passband_edge", stage.get("cutoff")))
+        for stage in stages
+        if stage["kind"] in _WITH_EDGES
+        and stage.get("band", "lowpass") == "lowpass"
+        and ("passband_edge" in stage or "cutoff" in stage)
+    ]
 
 
 def _table(stage: Mapping[str, Any], rate: Fraction) -> dict[str, Any]:

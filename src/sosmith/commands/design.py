@@ -92,6 +92,9 @@ def design_command(
     inputs, the clock is that of the slowest path by OpenSTA. This is before layout: wires take no area and no time. The
     cells are in Debian's packages qflow-tech-osu018 and qflow-tech-osu035, OpenSTA in opensta.
 
+    For a chain with a stage of the kind auto, the first table has the structures that were looked at, their costs for
+    the board or an ECP5, and why they were not taken.
+
     \b
         sosmith design my.toml
         sosmith design my.toml --details --plot my.svg
@@ -153,7 +156,7 @@ def generate_command(
     """Write SystemVerilog, RTLIL, a manifest, a certificate and a bit-true C model for SPEC.
 
     Prints the paths of the files to stdout, one per line. Two runs write identical files. For a chain of stages,
-    the files of each stage are written as well.
+    the files of each stage are written as well, and its specification where the stages were chosen.
 
     \b
         sosmith generate my.toml -o my_core

@@ -101,7 +101,7 @@ REFUSED: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
     ),
     "kind": (
         stage(0, kind="fft"),
-        "stage[0].kind must be one of polynomial, gain, iir, fir, halfband, cic, not 'fft'",
+        "stage[0].kind must be one of polynomial, gain, iir, fir, halfband, cic, auto, not 'fft'",
     ),
     "polynomial": (
         stage(1, kind="polynomial", passband_edge=None, passband_loss=None, stopband_loss=None),
@@ -119,7 +119,7 @@ REFUSED: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
     ),
     "no kind": (
         stage(0, kind=None),
-        "stage[0].kind must be one of polynomial, gain, iir, fir, halfband, cic, not missing",
+        "stage[0].kind must be one of polynomial, gain, iir, fir, halfband, cic, auto, not missing",
     ),
     "no order": (stage(0, order=None), "stage[0].order must be given for a CIC filter, not missing"),
     "cic by 3": (
@@ -185,8 +185,8 @@ REFUSED: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
     },
     "filter": (
         lambda tree: tree.update(filter={"taps": [1.0]}),
-        "filter must be left out with [[stage]], which takes name, sample_rate, channels, input, stage, output, "
-        "hardware, not a table",
+        "filter must be left out with [[stage]], which takes name, sample_rate, channels, input, stage, limits, "
+        "output, hardware, not a table",
     ),
     "none": (lambda tree: tree.update(stage=[]), "stage must be a list of 1 to 8 tables [[stage]], not 0 of them"),
     "flags": (

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from sosmith.gen.chain.automatic.choice import Choice, choose_stages
+from sosmith.gen.chain.automatic.facts import looked_table
 from sosmith.gen.chain.design import ChainDesign, Folding
 from sosmith.gen.chain.design import design_chain as design_stages
 from sosmith.gen.chain.facts import chain_tables
@@ -65,6 +67,9 @@ class Chain(View):
 
     core: ChainDesign = field(repr=False)
     """The design in the form of the inner packages."""
+
+    choice: Choice | None = field(default=None, repr=False)
+    """What was looked at before the stages were chosen; None for a chain whose stages were given."""
 
     @property
     def specification(self) -> ChainSpecification:
@@ -123,6 +128,21 @@ class Chain(View):
         and aliases in it. Both are proven; empty for a chain that does not interpolate.
         """
         return self._peaks([each for each in self.core.foldings if each.segment.rise > 1])
+
+    @property
+    def passband(self) -> tuple[float, float] | None:
+        """Smallest and largest gain in the pass band, proven; None for a chain without limits."""
+        kept = [each.kept for each in self.core.foldings if each.kept is not None]
+        return (float(kept[0].least.gain), float(kept[0].most.gain)) if kept else None
+
+    @property
+    def structures(self) -> list[dict[str, Any]]:
+        """What was looked at to choose the stages, the cheapest first; empty for a chain whose stages were given.
+
+        Each has `structure`, `luts`, `multipliers`, `memory_bits` (None if it is out of question), whether these are
+        those of a design or expected, `designed`, and the `verdict`.
+        """
+        return [] if self.choice is None else [each.as_dict() for each in self.choice.looked]
 
     def _peaks(self, foldings: Sequence[Folding]) -> dict[str, tuple[float, float]]:
         """Return the largest gains of several parts of the chain."""
@@ -355,7 +375,8 @@ class Chain(View):
 
     def tables(self, *, details: bool = False) -> list[Table]:
         """Return what `sosmith design` shows: stages, error budget and aliasing; with `details` each stage's own."""
-        tables = chain_tables(self.core)
+        tables = [] if self.choice is None else [looked_table(self.core, self.choice)]
+        tables += chain_tables(self.core)
         if details:
             for stage in self.stages:
                 tables += stage.tables()
@@ -364,9 +385,13 @@ class Chain(View):
     def as_dict(self) -> dict[str, Any]:
         """Return the `manifest`, `folding` and `images`."""
         peaks = {"folding": self.folding, "images": self.images}
-        return self.manifest | {
+        gains: dict[str, Any] = {
             key: {name: {"gain": gain, "at": at} for name, (gain, at) in found.items()} for key, found in peaks.items()
         }
+        if self.passband is not None:
+            gains["passband"] = dict(zip(("least", "most"), self.passband, strict=True))
+        looked = {} if self.choice is None else {"structures": self.structures}
+        return self.manifest | gains | looked
 
     @property
     def _first(self) -> Any:
@@ -393,6 +418,9 @@ def design_chain(
 ) -> Chain:
     """Design a chain: the formats between stages and each stage by itself; and prove the end-to-end error.
 
+    For a stage of the kind auto, the stages are chosen first: `Chain.structures` says among which, and
+    `Chain.specification` has those that were chosen.
+
     Parameters
     ----------
     specification : ChainSpecification, path or mapping
@@ -407,9 +435,12 @@ def design_chain(
     SpecificationError
         If a stage breaks a rule, or there is no such board.
     ShortfallError
-        If no word lengths meet the allowed error.
+        If no word lengths meet the allowed error, or no stages the limits of the whole.
     """
     spec = specification if isinstance(specification, ChainSpecification) else ChainSpecification.load(specification)
     target = None if board is None else find_board(board)
     with falling_short(spec.checked.base.path):
+        if spec.checked.is_automatic:
+            choice = choose_stages(spec.checked, board=target, progress=lambda step: progress(step, 0, 0))
+            return Chain(choice.design, choice)
         return Chain(design_stages(spec.checked, board=target, progress=lambda step: progress(step, 0, 0)))
