@@ -140,7 +140,6 @@ def test_limits_that_cannot_be_met_are_refused_with_what_comes_closest(
     ("hardware", "sentence"),
     [
         ({"protect": "detect"}, "hardware.protect must be 'none' with an FIR filter that decimates, not 'detect'"),
-        ({"reload": True}, "hardware.reload must be false with an FIR filter that decimates, not true"),
         ({"multipliers": 0}, "hardware.multipliers must be 'auto' with an FIR filter that decimates, not 0"),
     ],
 )
