@@ -117,7 +117,7 @@ Fixpoint summed (w : Z) (u : nat -> Z) (n : nat) : Z := (u n + match n with O =>
 Definition differed (w : Z) (u : nat -> Z) (n : nat) : Z := (u (S n) - u n) mod 2 ^ w.
 Definition word (d : decimator) (z : Z) : Z :=
   if signed d then (z + 2 ^ (width d - 1)) mod 2 ^ width d - 2 ^ (width d - 1) else z mod 2 ^ width d.
-(* First the sums take the first sample `stages * factor` times more. *)
+(* First the sums take the first sample `stages * factor` times more; from zero, all are `preceded` by `factor` zeros. *)
 Definition decimate (d : decimator) (u : nat -> Z) (n : nat) : Z :=
   let entering k := u (k - stages d * factor d)%nat in
   let sums := Nat.iter (stages d) (summed (width d)) entering in
@@ -128,9 +128,7 @@ Definition decimate (d : decimator) (u : nat -> Z) (n : nat) : Z :=
 Definition mean (count : nat) (u : signal) : signal := fun k => (taps (repeat 1%Z count) u k / IZR (Z.of_nat count))%R.
 Definition averaged (d : decimator) (u : nat -> R) (n : nat) : R :=
   Nat.iter (stages d) (mean (factor d)) (from_first u) (Z.of_nat (n * factor d)).
-(* From zero, one value is there for ever before the first: it comes `factor` times, and the result of that is left out. *)
-Definition preceded {A : Type} (d : decimator) (past : A) (u : nat -> A) (n : nat) : A :=
-  if Nat.ltb n (factor d) then past else u (n - factor d)%nat.
+Definition preceded {A} (d : decimator) (past : A) u n : A := if Nat.ltb n (factor d) then past else u (n - factor d)%nat.
 
 (* 6. A filter of which every R-th result leaves: the first sample goes in so many times before it counts. *)
 Definition filled (count : nat) (x : nat -> nat -> Z) : nat -> nat -> Z := fun n => x (n - count)%nat.
