@@ -22,6 +22,7 @@ def test_the_numerics_are_what_the_benchmark_writes() -> None:
     assert (result.returncode, result.stderr) == (0, "")
 
 
+@pytest.mark.slow
 def test_the_numerics_show_a_refusal_as_such(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*_: object) -> Stage:
         raise ShortfallError("it must fit, and does not")

@@ -13,6 +13,8 @@ from sosmith.instrument.paper.comparison import LABELS
 from sosmith.instrument.paper.document import paper_files
 from sosmith.instrument.paper.figures import read_paper_figures
 
+pytestmark = pytest.mark.slow  # everything of the paper is computed anew
+
 DOCS = Path(__file__).parents[2] / "docs"
 
 
@@ -25,12 +27,10 @@ def files() -> dict[str, str]:
     return paper_files(read_paper_figures())
 
 
-@pytest.mark.slow
 def test_the_document_is_what_the_command_writes(files: dict[str, str]) -> None:
     assert (DOCS / "paper.md").read_text(encoding="utf-8") == files["paper.md"]
 
 
-@pytest.mark.slow
 def test_the_pictures_are_what_the_command_draws(files: dict[str, str]) -> None:
     drawn = {name: text for name, text in files.items() if name != "paper.md"}
     there = {path.relative_to(DOCS).as_posix() for path in (DOCS / "images").glob("paper_*")}
@@ -42,7 +42,6 @@ def test_the_document_shows_its_pictures(files: dict[str, str]) -> None:
     assert [name for name in files if name != "paper.md" and f"]({name})" not in files["paper.md"]] == []
 
 
-@pytest.mark.slow
 def test_o_writes_document_and_pictures(tmp_path: Path, files: dict[str, str]) -> None:
     result = run("-o", str(tmp_path / "ours.md"))
     assert (result.exit_code, result.stdout) == (0, "")

@@ -159,6 +159,7 @@ def test_several_samples_are_refused_on_a_board() -> None:
     assert identity(designed(), "", baud=1_000_000, clock=48e6).architecture == "parallel"
 
 
+@pytest.mark.slow
 def test_manifest_and_pins_tell_how_samples_lie_in_a_beat() -> None:
     made = designed(2, pipeline="plain")
     facts = core_facts(made)

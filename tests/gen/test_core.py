@@ -83,7 +83,7 @@ def test_what_is_dropped_could_not_win(
     assert made.datapath == every.datapath
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("architecture", ["folded", "serial"])
 def test_programs_have_an_objective_of_their_own(spec: Specification, architecture: str) -> None:
     asked = in_architecture(architecture, spec)

@@ -43,7 +43,7 @@ def test_no_error_exceeds_the_bound(seed: int) -> None:
     assert one == results[:, 0].tolist()
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", CASES)
 def test_certificate_and_files_are_proven(seed: int, tmp_path: Path) -> None:
     drawn = draw(seed)

@@ -30,6 +30,7 @@ def test_it_is_proven_with_its_files(folder: Path) -> None:
     assert certificate.entries.claims.online is not None
 
 
+@pytest.mark.slow
 def test_one_without_claims_on_its_units_is_rejected(folder: Path, tmp_path: Path) -> None:
     read = read_certificate(folder / "audio_lowpass.certificate.json")
     without = read.model_copy(update={"claims": read.claims.model_copy(update={"online": None})})

@@ -135,6 +135,7 @@ def test_a_target_may_be_left_out_or_read_again(
     assert message in refused.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("typed", ["", "\n", "\n\n"])
 def test_an_end_of_the_input_leaves_the_store_as_it_was(port: str, typed: str) -> None:
     before = Path("calibration.db").read_bytes()

@@ -156,6 +156,7 @@ def test_the_rate_that_it_could_do_is_never_rounded_up(clock: str, rate: str, mo
         Budget(clock=Fraction(clock), sample_rate=Fraction(rate), channels=12).check(architecture)
 
 
+@pytest.mark.slow
 def test_a_realization_that_cannot_be_folded_is_refused() -> None:
     datapath = example_design("audio_lowpass.toml", realization="normal").datapath
     with pytest.raises(

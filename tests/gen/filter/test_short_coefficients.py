@@ -102,6 +102,7 @@ def test_the_gains_keep_to_the_mask(case: Case) -> None:
             assert sampled.max() * (1 - 1e-6) <= most <= high
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize("case", CASES, ids=NAMES)
 def test_the_coefficients_are_exact_and_short(case: Case) -> None:
     designed = design(spec(case), 1)

@@ -76,6 +76,7 @@ def test_there_are_no_more_blocks_than_needed(name: str) -> None:
     assert after < target < before
 
 
+@pytest.mark.slow
 def test_responses_that_take_turns_each_have_nodes(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of eight, neighbours of four places far from the beginning would miss half, however precise they are."""
     monkeypatch.setattr(nodes, "_MOST_BITS", 2000)

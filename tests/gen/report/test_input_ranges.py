@@ -57,6 +57,7 @@ def test_a_tone_of_full_scale_passes_without_a_word(design: sosmith.Design, tmp_
     assert _report(design, "worst_case", tmp_path).summary["notes"] == []
 
 
+@pytest.mark.slow
 def test_codes_at_the_ends_are_told_with_their_share(design: sosmith.Design, tmp_path: Path) -> None:
     half = 2 ** (BITS - 1)
     codes = np.clip(np.round(2 * half * TONE), -half, half - 1).astype(int)

@@ -510,6 +510,7 @@ def test_references_inside_the_page_lead_somewhere(built: tuple[str, Path, dict[
     assert len(identifiers) == len(set(identifiers))
 
 
+@pytest.mark.sweep(1)
 def test_every_colour_of_a_figure_follows_the_page(built: tuple[str, Path, dict[str, Any]]) -> None:
     """No colour of its own, which would vanish on a dark page; nothing left of the placeholders."""
     content = (built[1] / "report.html").read_text(encoding="utf-8")

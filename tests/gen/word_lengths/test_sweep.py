@@ -182,7 +182,7 @@ def stimuli(quantized: Quantized, seed: int) -> Iterator[np.ndarray]:
     yield np.repeat(heights, min(settle, 200_000))
 
 
-@pytest.mark.sweep(4)
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("numbered", ALL, indirect=True)
 def test_no_input_exceeds_the_certificate(numbered: tuple[int, Quantized]) -> None:
     number, quantized = numbered
@@ -210,7 +210,7 @@ def test_there_are_enough_lattices() -> None:
     assert sum(map(is_lattice, [*DESIGNS, *LATTICES])) >= 40
 
 
-@pytest.mark.sweep(4)
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("numbered", ALL, indirect=True)
 def test_no_value_leaves_its_proven_range(numbered: tuple[int, Quantized]) -> None:
     """The exact interpreter checks every node on the worst case of the whole filter, its end and then noise."""

@@ -35,6 +35,8 @@ from sosmith.instrument.paper.vehicle_comparison import run_comparison
 from sosmith.model.polynomial import EQUATION_5A
 from sosmith.model.reference.accuracy import accuracy_percent
 
+pytestmark = pytest.mark.slow  # everything of the paper is computed anew
+
 FIGURES = read_paper_figures()
 
 
@@ -65,7 +67,6 @@ def ours(part: Part, quantity: str) -> float:
     return float(value)
 
 
-@pytest.mark.slow
 def test_everything_that_differs_is_explained(parts: dict[str, Part]) -> None:
     assert [part.title for part in parts.values() for c in part.comparisons if c.explanation == UNEXPLAINED] == []
 
@@ -237,7 +238,6 @@ def test_a_wrong_figure_in_the_data_changes_a_label(
     assert changed.count(REPRODUCED) < parts[title].count(REPRODUCED)
 
 
-@pytest.mark.slow
 def test_no_figure_of_the_data_is_left_out() -> None:
     """Each printed figure has a part in the document: with another one, it reads otherwise."""
     text = markdown(FIGURES)

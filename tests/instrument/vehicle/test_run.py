@@ -281,6 +281,7 @@ def test_clearance_is_blind_to_rigid_motion() -> None:
     assert row == pytest.approx(np.zeros((1, 6)), abs=1e-12)
 
 
+@pytest.mark.slow
 def test_in_the_curve_wheelsets_yaw_in_their_frames(motion: Motion) -> None:
     """Between axles that stay parallel the track turns: relative yaw is what the link springs allow."""
     k = 1500

@@ -24,7 +24,7 @@ def written(datapath: Datapath, folder: Path) -> str:
     return datapath.name
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("example", ["audio_lowpass", "flange_wear_bench"])
 def test_no_conversion_is_left_to_the_compiler(example: str, tmp_path: Path) -> None:
     datapath = example_design(f"{example}.toml").datapath

@@ -154,6 +154,7 @@ def test_every_rule_is_broken_and_named(outcomes: list[list[Any]]) -> None:
             assert failure is None if sentence is None else str(failure).startswith(sentence), (case, failure)
 
 
+@pytest.mark.slow
 def test_a_sound_core_gives_what_was_sent(outcomes: list[list[Any]]) -> None:
     rng = np.random.default_rng(3)
     tdest, tdata = rng.integers(0, 4, SAMPLES).tolist(), ((rng.integers(0, 2**16, SAMPLES) + 3) % 2**16).tolist()

@@ -35,7 +35,7 @@ CASES = [
 ]
 
 
-@pytest.mark.sweep(3)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("case", CASES)
 def test_a_decimator_is_proven(case: Case | Instrument) -> None:
     _, made = designed(case)

@@ -35,6 +35,7 @@ def test_flags_are_proven(spec: str, channels: int) -> None:
     assert rejection(stated(core(spec, channels)), core(spec, channels).text) == ""
 
 
+@pytest.mark.slow
 def test_other_codes_are_rejected() -> None:
     worn = core(STEADY_INSTRUMENT + WORN)
     ((warning, critical),) = worn.design.datapath.wear

@@ -53,6 +53,7 @@ def test_the_decimator_is_a_row_of_the_budget() -> None:
     assert made.quantized.bound == sum(made.quantized.budget.values())
 
 
+@pytest.mark.slow
 def test_facts_for_programs() -> None:
     made = locomotive()
     tree = manifest(core_facts(made))
