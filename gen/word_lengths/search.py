@@ -215,12 +215,18 @@ class Search:
         return self._closer(choice, more=self._objective.negligible)
 
     def _closely_trimmed(self, choice: Choice, allowed: float) -> Choice:
-        """Trim a trimmed choice further: by what is closer and costs nothing, as long as there is any."""
+        """Trim a trimmed choice further: by what is closer and costs nothing, as long as there is any.
+
+        Where no format fits, all sizes are infinite and say of no step what it saves: nothing is gained then.
+        """
         while True:
             closer = self._closer(choice)
             if closer is choice:
                 return choice
-            choice = self._trimmed_once(closer, allowed)
+            trimmed = self._trimmed_once(closer, allowed)
+            if (self.size(trimmed), self.error(trimmed)) >= (self.size(choice), self.error(choice)):
+                return choice
+            choice = trimmed
 
     def _trimmed_once(self, start: Choice, allowed: float, *, calibration: bool = True) -> Choice:
         choice, error, size = start, self.error(start), self.size(start)
