@@ -157,7 +157,7 @@ READERS: dict[str, Callable[[Path], Any]] = {
 }
 
 
-@pytest.mark.sweep(8)
+@pytest.mark.sweep(5)
 @pytest.mark.parametrize("reader", READERS)
 @pytest.mark.parametrize("name", TABLES)
 def test_tables(name: str, reader: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

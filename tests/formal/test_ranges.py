@@ -69,6 +69,7 @@ def proven_section(bits: int, y_frac: int) -> DirectForm1:
     return stage
 
 
+@pytest.mark.slow
 def test_a_resonator_stays_in_its_range(tmp_path: Path) -> None:
     assert prove(StatedRanges(resonator(-7, 5).stages[0]), tmp_path) == "PASS"
 

@@ -65,6 +65,7 @@ class RestartRules(StreamRules):
         super().state(m)
 
 
+@pytest.mark.slow
 def test_a_parallel_core_begins_anew(tmp_path: Path) -> None:
     assert prove(RestartRules(broken(core, "swap.may.eq(parts.empty)", "swap.may.eq(parts.empty)")), tmp_path) == "PASS"
 

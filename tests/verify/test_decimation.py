@@ -70,7 +70,7 @@ def test_bits_may_be_dropped_behind_a_decimator_and_before_an_input_stage(tmp_pa
     assert [*verify(read(tree_of(made))).budget] == [*made.quantized.budget]
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("architecture", ["folded", "serial"])
 def test_the_program_is_proven_from_the_text(architecture: str, tmp_path: Path) -> None:
     made = locomotive(architecture=architecture)

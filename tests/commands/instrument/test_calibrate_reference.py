@@ -145,6 +145,7 @@ def test_an_end_of_the_input_leaves_the_store_as_it_was(port: str, typed: str) -
     assert len(list(Path().glob("calibration*"))) == 1
 
 
+@pytest.mark.slow
 def test_an_interruption_leaves_the_store_as_it_was(port: str) -> None:
     before = Path("calibration.db").read_bytes()
     command = ["env", "--default-signal=INT", sys.executable, "-m", "sosmith.cli", "calibrate", *live(port)]

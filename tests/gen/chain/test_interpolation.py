@@ -121,6 +121,7 @@ def test_the_gain_in_the_pass_band_is_that_of_the_filter(up: sosmith.Chain) -> N
     assert given == pytest.approx(2.75 / 2, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_the_c_model_computes_what_the_design_does(up: sosmith.Chain, tmp_path: Path) -> None:
     compiler = shutil.which("cc") or shutil.which("gcc")
     if compiler is None:

@@ -245,7 +245,7 @@ def test_responses_over_different_denominators_are_added(pair: tuple[str, str], 
     assert abs(found.magnitude - total) <= found.uncertainty < total / 2**30
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["one pole", "slow and fast", "every other sample is zero"])
 def test_how_far_a_response_exceeds_what_is_still_to_come_of_another(name: str) -> None:
     under = DENOMINATORS[name]

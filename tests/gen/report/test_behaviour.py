@@ -194,6 +194,7 @@ def test_settling_is_shaded(words: str) -> None:
     assert "date not given" in shaded
 
 
+@pytest.mark.slow
 def test_evidence_is_named_with_digests(words: str) -> None:
     for row in (f"specification wear.toml {'s' * 64}", f"certificate wear.certificate.json {'2' * 64}"):
         assert row in words

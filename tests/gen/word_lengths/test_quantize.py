@@ -85,7 +85,7 @@ def test_designs_stay_within_their_bound(kind: str, order: int, cutoff: float, r
     quantized.datapath.compute_exact(codes[6000:9000])  # raises if a value leaves its range
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("core", ["filter", "calibration", "instrument"])
 def test_parts_of_the_instrument(core: str) -> None:
     quantized = example_design("flange_wear_bench.toml", core=core).quantized

@@ -312,7 +312,7 @@ def test_limits_tell_where_flanges_and_friction_would_act(motion: Motion) -> Non
     assert -0.009 < small.beyond_flange[0] < 0
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("level", ["low", "high"])
 def test_the_model_holds_over_random_irregularities_of_a_straight_track(level: str) -> None:
     straight = tangent_track(replace(GIVEN.track, irregularity=0.0))

@@ -53,6 +53,7 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {name: (folder / name).read_bytes() for name in FILES}
 
 
+@pytest.mark.slow
 def test_figures_are_those_of_the_design(found: sosmith.Exploration) -> None:
     point = found.points[3]
     assert point["changes"] == {"hardware.realization": "df1", "output.max_error": 0.004, "output.bits": 10}

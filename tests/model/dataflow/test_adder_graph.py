@@ -38,6 +38,7 @@ def levels(adders: tuple[Adder, ...]) -> dict[int, int]:
     return dict(zip((1, *(adder.multiple for adder in adders)), found, strict=True))
 
 
+@pytest.mark.slow
 @given(st.lists(CONSTANTS, min_size=1, max_size=2), st.integers(-1000, 1000))
 def test_every_constant_is_a_shifted_sum(constants: list[int], operand: int) -> None:
     adders = adder_graph(tuple(constants))

@@ -205,6 +205,7 @@ EDITS = [
 ]  # fmt: skip
 
 
+@pytest.mark.sweep(60)
 @pytest.mark.parametrize(("name", "old", "new", "what"), [edit for edit in EDITS if edit[3]], ids=lambda each: None)
 def test_what_computes_something_else_is_refused(
     name: str, old: str, new: str, what: str, model: Callable[[str], Model]

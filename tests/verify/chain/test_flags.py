@@ -116,7 +116,7 @@ def test_a_chain_from_zero_with_protection_and_registers_is_proven(written: Path
     assert "hardware with protection against upsets is not proven" in proof.missing["hardware"].why
 
 
-@pytest.mark.sweep(3)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("file", "old", "new", "sentence"),
     [

@@ -85,6 +85,7 @@ def test_a_claim_that_does_not_follow_is_refused(
         proven(folder, spec=False)
 
 
+@pytest.mark.sweep(4)
 @pytest.mark.parametrize(
     ("file", "old", "new", "sentence"),
     [

@@ -8,6 +8,7 @@ from sosmith.verify.multirate.cic import check_decimator
 ONE, MANY = Case(reload=True, hold=False), Case(reload=True, channels=3, architecture="folded")
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("case", [ONE, MANY])
 def test_registers_of_the_core_are_those_of_the_whole(case: Case) -> None:
     check_decimator(written(case), designed(case)[1], case.channels)

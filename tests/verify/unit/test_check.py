@@ -324,6 +324,7 @@ def _named(core: Unit, old: str, new: str, sentence: str) -> None:
     assert re.fullmatch(sentence, said), said
 
 
+@pytest.mark.sweep(20)
 @pytest.mark.parametrize("kind", FOLDED_BREAKS)
 def test_each_break_of_a_folded_unit_is_named(kind: str) -> None:
     _named(unit(STEADY), *FOLDED_BREAKS[kind])

@@ -53,6 +53,7 @@ def test_another_tool_reads_ports_and_buses(name: str, tmp_path: Path) -> None:
     assert {bus.name for bus in read.busInterfaces.busInterface} == {pin.bus for pin in pins if pin.bus}
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("name", SPECIFICATIONS)
 def test_every_pin_is_mapped_to_its_signal_in_the_bus(name: str) -> None:
     """In the tree itself: ipyxact leaves the maps out."""

@@ -46,6 +46,7 @@ def test_no_input_exceeds_the_bound(scenario: str) -> None:
     assert 0.5 * bound < worst_error(made, trace.codes) <= bound
 
 
+@pytest.mark.slow
 def test_random_codes_and_constants_stay_within_the_bound() -> None:
     made = whole()
     rng = np.random.default_rng(5)

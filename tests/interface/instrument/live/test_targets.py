@@ -33,7 +33,7 @@ def board_of(design: sosmith.Design, clock: Time, voltages: Any, core: Any = Non
     return Board.on(ModelLine(GaugingDevice(design, clock.monotonic, voltages, core, **changes)))
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("gain", [1.0, 0.9])
 def test_the_voltage_before_the_sensor_is_read(gain: float, tmp_path: Path) -> None:
     """A filter whose gain at zero frequency is not 1 is undone as well."""
