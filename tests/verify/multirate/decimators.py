@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator
 from functools import cache
+from types import ModuleType
 from typing import NamedTuple
 
 import pytest
@@ -123,9 +124,13 @@ def check_rejected(case: Case | Instrument, text: str, sentence: str | None = No
         check_decimator(text, certificate, case.channels)
 
 
-def check_rejected_as_made(case: Case | Instrument) -> None:
-    """Check that the verifier rejects what a core is written as now, with its hardware broken."""
+def check_rejected_as_made(
+    case: Case | Instrument, patch: pytest.MonkeyPatch, module: ModuleType, name: str, wrong: type
+) -> None:
+    """Check that the verifier rejects what a core is written as with `wrong` hardware, a class of a module."""
     made, _ = designed(case)
+    written(case)  # kept as it is right
+    patch.setattr(module, name, wrong)
     check_rejected(case, to_verilog(to_rtlil(made.architecture.component(), made.datapath.name)))
 
 

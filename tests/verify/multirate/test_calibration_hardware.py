@@ -149,6 +149,6 @@ BROKEN = [
 @pytest.mark.sweep(1)
 @pytest.mark.parametrize(("right", "wrong"), [pytest.param(*case, id=subject) for subject, *case in BROKEN])
 def test_hardware_that_is_wrong_is_rejected(right: str, wrong: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    written(CASES[0])  # what is right, before anything is broken
-    monkeypatch.setattr(hardware, "DecimatedCore", broken(hardware, right, wrong).DecimatedCore)
-    check_rejected_as_made(CASES[0])
+    check_rejected_as_made(
+        CASES[0], monkeypatch, hardware, "DecimatedCore", broken(hardware, right, wrong).DecimatedCore
+    )

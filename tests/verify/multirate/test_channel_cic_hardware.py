@@ -117,17 +117,15 @@ ROUNDED = Case(signed=False, output_bits=9, cutoff=20, error=0.02, hold=False, a
     ],
 )
 def test_hardware_that_is_wrong_is_rejected(right: str, wrong: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    written(ROUNDED)  # what is right, before anything is broken
-    monkeypatch.setattr(top, "ChannelDecimator", broken(hardware, right, wrong).ChannelDecimator)
-    check_rejected_as_made(ROUNDED)
+    check_rejected_as_made(
+        ROUNDED, monkeypatch, top, "ChannelDecimator", broken(hardware, right, wrong).ChannelDecimator
+    )
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("right", "wrong"), [pytest.param(*case, id=subject) for subject, *case in BROKEN_AROUND])
 def test_wires_that_are_wrong_are_rejected(right: str, wrong: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    written(SMALL)  # what is right, before anything is broken
-    monkeypatch.setattr(top, "DecimatedCore", broken(top, right, wrong).DecimatedCore)
-    check_rejected_as_made(SMALL)
+    check_rejected_as_made(SMALL, monkeypatch, top, "DecimatedCore", broken(top, right, wrong).DecimatedCore)
 
 
 @pytest.mark.slow

@@ -108,6 +108,6 @@ def test_sentences() -> None:
 @pytest.mark.sweep(2)
 @pytest.mark.parametrize(("right", "wrong"), [pytest.param(*case, id=subject) for subject, *case in BROKEN])
 def test_hardware_that_is_wrong_is_rejected(right: str, wrong: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    written(CASES[2][0])  # what is right, before anything is broken
-    monkeypatch.setattr(hardware, "DecimatedCore", broken(hardware, right, wrong).DecimatedCore)
-    check_rejected_as_made(CASES[2][0])
+    check_rejected_as_made(
+        CASES[2][0], monkeypatch, hardware, "DecimatedCore", broken(hardware, right, wrong).DecimatedCore
+    )

@@ -66,14 +66,14 @@ BROKEN = [
 
 @pytest.mark.parametrize(("right", "wrong"), [pytest.param(*case, id=subject) for subject, *case in BROKEN])
 def test_hardware_that_is_wrong_is_rejected(right: str, wrong: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(decimator, "CicDecimator", broken(decimator, right, wrong).CicDecimator)
-    check_rejected_as_made(ONE)
+    check_rejected_as_made(ONE, monkeypatch, decimator, "CicDecimator", broken(decimator, right, wrong).CicDecimator)
 
 
 def test_states_of_channels_that_have_not_started_are_zero(monkeypatch: pytest.MonkeyPatch) -> None:
     right, wrong = "state.eq(Mux(started, read.data, 0))", "state.eq(read.data)"
-    monkeypatch.setattr(decimator, "ChannelDecimator", broken(channel_decimator, right, wrong).ChannelDecimator)
-    check_rejected_as_made(CASES[2])
+    check_rejected_as_made(
+        CASES[2], monkeypatch, decimator, "ChannelDecimator", broken(channel_decimator, right, wrong).ChannelDecimator
+    )
 
 
 def with_flags(made: CoreDesign, samples: int) -> Certificate:
