@@ -45,9 +45,10 @@ def _designs(run_folder: Path) -> Path:
 
 def _read(place: Path) -> tuple[list[str], Any] | None:
     try:
-        return pickle.loads(place.read_bytes())  # type: ignore[no-any-return]
+        kept: tuple[list[str], Any] = pickle.loads(place.read_bytes())
     except FileNotFoundError:
         return None
+    return kept
 
 
 def _write(place: Path, kept: tuple[list[str], Any]) -> None:

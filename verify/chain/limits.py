@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from decimal import Decimal
 from fractions import Fraction
 from math import prod
 from typing import Any
@@ -18,6 +17,7 @@ from flint import arb, ctx, fmpq
 from sosmith.verify.chain.chain_file import FoldingEntry
 from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.specified.stated_specification import stated_number
+from sosmith.verify.specified.words import with_fractions
 
 _KEYS = ("passband_edge", "passband_loss", "stopband_loss", "stopband_edge")
 _AUTO = "auto"
@@ -118,15 +118,5 @@ def check_chosen(asked: Mapping[str, Any], own: Mapping[str, Any]) -> None:
 
 
 def _same(what: str, own: Any, asked: Any) -> None:
-    require(_plain(own) == _plain(asked), f"{what} must be as the specification says, {asked}, not {own}")
-
-
-def _plain(value: Any) -> Any:
-    """Return a tree with every number as a fraction."""
-    if isinstance(value, Mapping):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_plain(item) for item in value]
-    if isinstance(value, int | Decimal) and not isinstance(value, bool):
-        return Fraction(value)
-    return value
+    same = with_fractions(own) == with_fractions(asked)
+    require(same, f"{what} must be as the specification says, {asked}, not {own}")

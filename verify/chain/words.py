@@ -7,7 +7,6 @@ own. The certificate of the stage is held against that specification by the veri
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from decimal import Decimal
 from fractions import Fraction
 from typing import Any
 
@@ -19,7 +18,7 @@ from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.specified.filter_table import read_filter_table
 from sosmith.verify.specified.fir_mask import keeps_to_losses
 from sosmith.verify.specified.stated_specification import CALIBRATED, stated_number, stated_port
-from sosmith.verify.specified.words import words_of
+from sosmith.verify.specified.words import with_fractions, words_of
 from sosmith.verify.verdict.generated_files import about_of
 
 _TABLES = ("name", "sample_rate", "channels", "input", "output", "calibration", "filter", "hardware")
@@ -82,7 +81,8 @@ def _check(chain: ChainCertificate, tree: Mapping[str, Any], groups: Groups) -> 
             _check_taps(stage, cores, rate * rise)
         else:
             own = words_of(about_of(cores[0]).specification)
-            _same(f"the {table} of stage {stage['name']}", _plain(own[table]), _plain(_table(stage, rate)))
+            wanted = with_fractions(_table(stage, rate))
+            _same(f"the {table} of stage {stage['name']}", with_fractions(own[table]), wanted)
         rate = rate * rise / stage.get("decimate", 1)
     if (limits := limits_of(tree)) is not None:
         check_limits(chain.folding, limits, first)
@@ -104,7 +104,7 @@ def _check_core(
     wanted = {"clock": hardware.get("clock", _CLOCK)}
     for keys, words in ((_OF_ALL, hardware), (_OF_ONE, stage)):
         wanted |= {key: words[key] for key in keys if key in words}
-    _same(f"the hardware of {what}", _plain(own.get("hardware", {})), _plain(wanted))
+    _same(f"the hardware of {what}", with_fractions(own.get("hardware", {})), with_fractions(wanted))
     others = [key for key in own if key not in _TABLES]
     require(not others, f"the specification of {what} must be without {', '.join(others)}")
 
@@ -191,17 +191,6 @@ def _moving_sums(factor: int, order: int) -> list[Fraction]:
                 longer[k + shift] += tap / factor
         taps = longer
     return taps
-
-
-def _plain(value: Any) -> Any:
-    """Return a tree with every number as a fraction."""
-    if isinstance(value, Mapping):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_plain(item) for item in value]
-    if isinstance(value, int | Decimal) and not isinstance(value, bool):
-        return Fraction(value)
-    return value
 
 
 def _same(what: str, proven: object, stated: object) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Mapping
 from decimal import Decimal
+from fractions import Fraction
 from typing import Any
 
 from sosmith.verify.graph import RejectedError, require
@@ -35,3 +36,14 @@ def table_of(tree: Mapping[str, Any], key: str) -> Mapping[str, Any]:
     table = tree.get(key, {})
     require(isinstance(table, dict), f"{key} of the specification must be a table")
     return dict(table)
+
+
+def with_fractions(value: Any) -> Any:
+    """Return a tree with every number as a fraction."""
+    if isinstance(value, Mapping):
+        return {key: with_fractions(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [with_fractions(item) for item in value]
+    if isinstance(value, int | Decimal) and not isinstance(value, bool):
+        return Fraction(value)
+    return value
