@@ -13,6 +13,10 @@ BREAKS = {
         r"assign v1_clear1 = clear & clear_channel;",
         "assign v1_clear1 = clear & channel2;",
     ),
+    "the words are cleared at different clocks": (
+        r"assign v1_clear1 = clear & clear_channel;",
+        "assign v1_clear1 = advance & clear_channel;",
+    ),
     "what is written counts while another word is cleared": (
         r"assign v1_write = (\w+) & \w+;",
         r"assign v1_write = \1 & \1;",
