@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar
@@ -212,19 +213,24 @@ class Architecture(ABC):
         return products_from_adders(self.graphs, None, self.blocks.bits)
 
     @property
+    def _sized(self) -> tuple[Sequence[Graph], Sequence[frozenset[int]]]:
+        """What is computed at a clock, and its products by constants that are made of adders."""
+        return self.graphs, self.adders
+
+    @property
     def cost(self) -> Cost:
         """Operators before synthesis, where a program would run as if each had its own hardware; no decimator's.
 
         Those of a calibration before a decimator are among them, unless that alone has a program.
         """
-        own = cost_of_graphs(self.graphs, self.adders)
+        own = cost_of_graphs(*self._sized)
         apart = self.calibration is None or (self.program is None and self.calibration.program is not None)
         return own if self.calibration is None or apart else self.calibration.cost.beside(own)
 
     @property
     def multiplier_blocks(self) -> int:
         """Multiplier blocks that it takes, without what stands before a decimator."""
-        sizes = cost_of_graphs(self.graphs, self.adders).multiplications
+        sizes = cost_of_graphs(*self._sized).multiplications
         return sum(product.blocks_of(self.blocks.bits) for product in sizes)
 
     @property

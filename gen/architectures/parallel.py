@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 from sosmith.gen.architectures.architecture import Architecture
 from sosmith.gen.architectures.blocks import NO_LIMIT, Blocks
+from sosmith.gen.architectures.look_ahead_products import products_for
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.specification.combinations import PARALLEL
 from sosmith.gen.word_lengths.cost import products_from_adders, scalings
 from sosmith.gen.word_lengths.objective import FEW_ADDERS, SMALL_AREA, Objective
 from sosmith.hdl.plan import parallel_clocks
+from sosmith.hdl.plan.look_ahead import Products, in_pieces
 from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.dataflow.graph import Graph
 from sosmith.model.reload.constants import with_room
 
 if TYPE_CHECKING:
@@ -41,10 +45,23 @@ class Parallel(Architecture):
 
     @cached_property
     def adders(self) -> tuple[frozenset[int], ...]:
-        """Products by constants that are made of adders, by stage: all with look-ahead, none with constants to load."""
-        if self.look_ahead:
-            return tuple(map(scalings, self.graphs))
+        """Products by constants that are made of adders, by stage: none with constants to load."""
+        if self.products is not None:
+            return self.products.adders
         return products_from_adders(self.graphs, None if self.reload else self.blocks.available, self.blocks.bits)
+
+    @cached_property
+    def products(self) -> Products | None:
+        """How products by constants are made with look-ahead; None without."""
+        return products_for(self.graphs, self.blocks) if self.look_ahead else None
+
+    @cached_property
+    def _sized(self) -> tuple[Sequence[Graph], Sequence[frozenset[int]]]:
+        """What is computed at a clock, with products in pieces as multiplier blocks take them; which adders make."""
+        if self.products is None:
+            return super()._sized
+        pieces = in_pieces(self.graphs, self.products)
+        return [graph for graph, _ in pieces], [scalings(graph) - blocks for graph, blocks in pieces]
 
     @cached_property
     def built(self) -> Datapath:
@@ -59,8 +76,7 @@ class Parallel(Architecture):
     @property
     def _latency_cycles(self) -> int:
         if self._is_block:
-            lanes = self.samples_per_clock
-            return parallel_clocks.block_latency_cycles(self.datapath, lanes, look_ahead=self.look_ahead)
+            return parallel_clocks.block_latency_cycles(self.datapath, self.samples_per_clock, self.products)
         return parallel_clocks.latency_cycles(self.built, self.channels, protect=self.protect, adders=self.adders)
 
     @property
@@ -74,16 +90,14 @@ class Parallel(Architecture):
     @property
     def clock_estimate(self) -> float:
         """Estimate of the highest clock for one channel, on an ECP5, in Hz."""
-        lanes = self.samples_per_clock
-        return parallel_clocks.clock_estimate(self.datapath, lanes, look_ahead=self.look_ahead)
+        return parallel_clocks.clock_estimate(self.datapath, self.samples_per_clock, self.products)
 
     def _core(self, *, before: bool = False) -> Component:
         from sosmith.hdl.cores.block import BlockCore  # only what makes hardware loads Amaranth
         from sosmith.hdl.cores.parallel import Core
 
         if self._is_block:
-            adders = () if self.look_ahead else self.adders
-            return BlockCore(self.datapath, self.samples_per_clock, look_ahead=self.look_ahead, adders=adders)
+            return BlockCore(self.datapath, self.samples_per_clock, products=self.products, adders=self.adders)
         return Core(
             self.built.behind_decimator,
             self.channels,
@@ -108,6 +122,6 @@ class Parallel(Architecture):
             return ""
         products = f"{count} product{'s' * (count > 1)} by constants made of adders"
         if self.look_ahead:
-            return f"; its {products}, with registers between them"
+            return f"; {products}, with registers between them"
         blocks = "without multiplier blocks" if not there else f"with at most {there} multiplier blocks"
         return f"; {blocks}, {products}"

@@ -18,7 +18,7 @@ from sosmith.gen.specification import combinations
 from sosmith.gen.specification.choices import AUTO
 from sosmith.gen.specification.specification import Specification
 from sosmith.gen.word_lengths.decimation.decimator import PreStage
-from sosmith.gen.word_lengths.objective import FEW_ADDERS
+from sosmith.gen.word_lengths.objective import FEW_ADDERS, FewSums
 from sosmith.gen.word_lengths.other_realization import with_realization
 from sosmith.gen.word_lengths.quantize import Plan, least_size, plan, prove
 from sosmith.gen.word_lengths.quantized import Quantized
@@ -266,13 +266,14 @@ class Search:
         ShortfallError
             If no sections with look-ahead meet the specification.
         """
+        objective = FEW_ADDERS if self.budget.adders else FewSums(self.budget.blocks.bits)
         best: Candidate | None = None
         fastest = 0.0
         refused = ShortfallError("look-ahead must have more samples than a beat, and responses that are not too long")
         for samples, realization in LOOK_AHEAD.items():
             if samples <= self.budget.samples_per_clock:
                 continue
-            planned = self._plan_of(realization.name).under(FEW_ADDERS)
+            planned = self._plan_of(realization.name).under(objective)
             if planned.is_long and not patient:
                 continue
             try:

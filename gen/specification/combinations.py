@@ -262,9 +262,6 @@ _APART: dict[tuple[Option, Option], Refusal] = {
     (FIR_DECIMATE, LOOK_AHEAD): Refusal(Verdict.NO_USE, "it has no recursion"),
     (FIR_DECIMATE, NO_MULTIPLIERS): LATER,
     (LOOK_AHEAD, RELOAD): _FIXED,
-    (LOOK_AHEAD, FEW_MULTIPLIERS): Refusal(
-        Verdict.REFUSED, "all its products by constants are made of adders", only="'auto' or 0"
-    ),
     (RELOAD, FEW_MULTIPLIERS): Refusal(
         Verdict.REFUSED, "which products take blocks follows from coefficients, and these change"
     ),

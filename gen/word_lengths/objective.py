@@ -8,7 +8,16 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Protocol
 
-from sosmith.gen.word_lengths.cost import LUTS_OF_A_BLOCK, MULTIPLIER_BITS, area_by_digits, area_of, cost_of, scalings
+from sosmith.gen.word_lengths.cost import (
+    LUTS_OF_A_BLOCK,
+    MULTIPLIER_BITS,
+    area_by_digits,
+    area_of,
+    cost_of,
+    cost_of_graphs,
+    scalings,
+)
+from sosmith.hdl.plan.block_products import with_blocks
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.folding.fold import columns_of, program
 from sosmith.model.dataflow.folding.values import FoldingError
@@ -23,6 +32,10 @@ _AREAS_OF_AN_INSTRUCTION = 4096
 Far more than one instruction is worth: it decides between steps that save no instruction yet. Shorter words lead to
 those that do. Without it, the program of flange_wear_locomotive is some steps longer.
 """
+
+_LUTS_FOR_A_PIECE = 40
+"""LUT4 that a block for a piece of a product counts as: about what its sum with the other pieces takes. A core with
+look-ahead needs about as many blocks as a small FPGA has."""
 
 _WORDS, _ACCUMULATOR_BITS = Fraction(1, 1 << 16), Fraction(1, 1 << 24)
 """Weights of a word of memory and a bit of the accumulator: they decide between programs of the same length."""
@@ -152,6 +165,50 @@ class FewAdders:
 
 FEW_ADDERS = FewAdders()
 """For the parallel architecture without multiplier blocks."""
+
+
+@dataclass(frozen=True)
+class FewSums:
+    """Estimated area of the parallel architecture with look-ahead, whose products take multiplier blocks in pieces.
+
+    Attributes
+    ----------
+    bits : int
+        Bits of each operand of a block, signed.
+    """
+
+    bits: int
+
+    best = "the smallest estimated area"
+    beyond = "more in multiplier blocks alone"
+    unsuited = "not for this filter"
+    hopeless = SmallArea.hopeless
+    negligible = 0.0
+    few_digits = False
+    floors_products = True
+
+    @property
+    def factor_bits(self) -> int:
+        """Bits of a block: what a constant has beyond takes an adder."""
+        return self.bits
+
+    def of_graph(self, graph: Graph) -> float:
+        """Return the area of the graph's operators, in LUT4: of sums, and a little for each block."""
+        split, pieces = with_blocks(graph, scalings(graph), self.bits)
+        cost = cost_of_graphs([split], [scalings(split) - pieces])
+        return cost.luts + _LUTS_FOR_A_PIECE * cost.multiplier_blocks
+
+    def of_datapath(self, datapath: Datapath) -> float:
+        """Return the area of all operators."""
+        return sum(self.of_graph(stage.graph) for stage in datapath.stages)
+
+    def least(self, graphs: Sequence[Graph]) -> float:
+        """Return 0: every constant may turn out to be a power of two."""
+        return 0
+
+    def size_text(self, datapath: Datapath) -> str:
+        """Return the area in words."""
+        return f"{self.of_datapath(datapath):,.0f} LUT4 with a multiplier block counted as {_LUTS_FOR_A_PIECE}"
 
 
 @dataclass(frozen=True)

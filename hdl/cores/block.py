@@ -22,7 +22,7 @@ from typing import TypeVar
 
 from amaranth.hdl import Cat, Const, Module, Value
 
-from sosmith.hdl.plan.look_ahead import plans
+from sosmith.hdl.plan.look_ahead import Products, plans
 from sosmith.hdl.plan.parallel_clocks import block_depths
 from sosmith.hdl.plan.unfolding import unfolded_stages
 from sosmith.hdl.shell.pipeline import Sample, delayed, through
@@ -49,8 +49,9 @@ class BlockCore(Shell):
         What it computes.
     lanes : int
         Samples of a beat.
-    look_ahead : bool
-        Whether loops that go back several samples are pipelined through the samples between.
+    products : Products or None
+        With look-ahead, how products by constants are made: loops that go back several samples are pipelined through
+        the samples between. None without.
     adders : sequence of collection of int
         Without look-ahead: products by constants that are made of adders, by unfolded stage and node.
 
@@ -65,10 +66,10 @@ class BlockCore(Shell):
         datapath: Datapath,
         lanes: int = 1,
         *,
-        look_ahead: bool = False,
+        products: Products | None = None,
         adders: Sequence[Collection[int]] = (),
     ) -> None:
-        self.look_ahead = look_ahead
+        self.products = products
         self.stages = unfolded_stages(datapath, lanes)
         self.adders = adders or [()] * len(self.stages)
         super().__init__(datapath, lanes=lanes)
@@ -83,7 +84,7 @@ class BlockCore(Shell):
         stages = self._components(m, advance)
         codes = [code for tdata in samples for code in self.codes(tdata)]
         beat, codes = through(m, stages, Sample(self.s_axis_tvalid), codes)
-        depth = sum(block_depths(self.datapath, self.lanes, look_ahead=self.look_ahead))
+        depth = sum(block_depths(self.datapath, self.lanes, self.products))
         status = delayed(m, advance, Cat(self.status_of_inputs(tdata) for tdata in samples), depth, "status")
         results = []
         for k in range(self.lanes):
@@ -121,10 +122,9 @@ class BlockCore(Shell):
     def _components(self, m: Module, advance: Value) -> list[LookAheadStage | PipelinedStage]:
         """Make the hardware of the stages."""
         components: list[LookAheadStage | PipelinedStage]
-        if self.look_ahead:
-            components = [
-                LookAheadStage(stage.name, plan) for stage, plan in zip(self.stages, plans(self.stages), strict=True)
-            ]
+        if self.products is not None:
+            planned = plans(self.stages, self.products)
+            components = [LookAheadStage(stage.name, plan) for stage, plan in zip(self.stages, planned, strict=True)]
         else:
             components = [
                 PipelinedStage(stage, adders=adders) for stage, adders in zip(self.stages, self.adders, strict=True)

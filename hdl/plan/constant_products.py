@@ -18,16 +18,21 @@ True
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from sosmith.model.dataflow.adder_graph import adder_graph, by_operand, multiple_range, odd_part
 from sosmith.model.dataflow.graph import Graph, GraphBuilder, Op, Wire
 
 
-def with_sums(graph: Graph) -> Graph:
-    """Return the graph with each product by a constant but 0 made of sums, and of a product by a power of two."""
+def with_sums(graph: Graph, apart: Collection[int] = ()) -> Graph:
+    """Return the graph with each product by a constant but 0 made of sums, and of a product by a power of two.
+
+    Those in `apart` stay as they are.
+    """
     g = GraphBuilder()
-    scaled = [index for index, node in enumerate(graph.nodes) if node.op is Op.SCALE and node.parameter]
+    scaled = [
+        index for index, node in enumerate(graph.nodes) if node.op is Op.SCALE and node.parameter and index not in apart
+    ]
     groups = {index: group for group in by_operand(graph, scaled) for index in group[1]}
     multiples: dict[int, dict[int, Wire]] = {}
     wires: list[Wire] = []

@@ -5,21 +5,31 @@ A loop that uses only values of T, 2T, .. samples ago is T loops that never meet
 samples of T channels do (`sosmith.hdl.plan.interleaving`). The loop then has T clocks. What no loop reaches has as many
 pipeline stages as it likes; its delays are registers that move with every sample.
 
-Products by constants are sums (`sosmith.hdl.plan.constant_products`), between which pipeline stages may end. All stages
-of a core get pipeline stages of the time that its slowest loop needs: shorter ones would take registers for nothing.
+Products by constants are sums (`sosmith.hdl.plan.constant_products`), between which pipeline stages may end, or pieces
+for multiplier blocks (`sosmith.hdl.plan.block_products`). A pipeline stage ends behind each block, so that its own
+register takes the product. All stages of a core get pipeline stages of the time that its slowest loop needs: shorter
+ones would take registers for nothing.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
+from sosmith.hdl.plan.block_products import is_product, with_blocks
 from sosmith.hdl.plan.constant_products import with_sums
-from sosmith.hdl.plan.pipeline import ADDITION, NO_LOGIC, loop_delays, operation_time
-from sosmith.hdl.plan.reassociation import reassociated
+from sosmith.hdl.plan.pipeline import (
+    ADDITION,
+    NO_LOGIC,
+    REGISTERED_MULTIPLICATION,
+    loop_delays,
+    operation_time,
+    recursive,
+)
+from sosmith.hdl.plan.reassociation import with_places
 from sosmith.model.dataflow.graph import Graph, GraphBuilder, Op, Wire
 from sosmith.model.dataflow.structure import Stage
 
@@ -59,30 +69,73 @@ class TurnPlan:
         return max((end - self.pipeline_stages[i] + reading + 1 for i, end in self.writes.items()), default=1)
 
 
-def plans(stages: Sequence[Stage]) -> tuple[TurnPlan, ...]:
+@dataclass(frozen=True)
+class Products:
+    """How the products by constants of a core with look-ahead are made.
+
+    Attributes
+    ----------
+    adders : tuple of frozenset of int
+        Those that are made of adders, by stage and node.
+    block_bits : int
+        Bits of each operand, signed, of the multiplier blocks that the others take.
+    """
+
+    adders: tuple[frozenset[int], ...]
+    block_bits: int
+
+    @classmethod
+    def of_adders(cls, stages: Sequence[Stage]) -> Products:
+        """Make all of adders."""
+        scaled = (
+            frozenset(index for index, node in enumerate(stage.graph.nodes) if node.op is Op.SCALE and node.parameter)
+            for stage in stages
+        )
+        return cls(tuple(scaled), 2)
+
+
+def plans(stages: Sequence[Stage], products: Products) -> tuple[TurnPlan, ...]:
     """Plan the pipeline stages of all stages of a core."""
-    return _plans(tuple(stage.graph for stage in stages))
+    return _plans(tuple(stage.graph for stage in stages), products)
 
 
-def period(stages: Sequence[Stage]) -> int:
+def in_pieces(graphs: Sequence[Graph], products: Products) -> list[tuple[Graph, frozenset[int]]]:
+    """Return the graphs with products in pieces as multiplier blocks take them, and which nodes these are."""
+    return [
+        _in_pieces(graph, adders, products.block_bits) for graph, adders in zip(graphs, products.adders, strict=True)
+    ]
+
+
+def period(stages: Sequence[Stage], products: Products) -> int:
     """Return the time of the pipeline stages in `plans`, in units of `operation_time`."""
-    return _period(tuple(stage.graph for stage in stages))
+    return _period(_all_turned(tuple(stage.graph for stage in stages), products))
+
+
+_Turned = tuple[Graph, int, frozenset[int]]
+"""A graph with sums, whose loops have one DELAY for all samples that take turns; their number; the DELAYs."""
 
 
 @lru_cache(maxsize=16)
-def _plans(graphs: tuple[Graph, ...]) -> tuple[TurnPlan, ...]:
-    longest = _period(graphs)
-    return tuple(_spread(*_turned(graph), longest) for graph in graphs)
+def _plans(graphs: tuple[Graph, ...], products: Products) -> tuple[TurnPlan, ...]:
+    turned = _all_turned(graphs, products)
+    longest = _period(turned)
+    return tuple(_spread(*each, longest) for each in turned)
+
+
+def _all_turned(graphs: tuple[Graph, ...], products: Products) -> tuple[_Turned, ...]:
+    bits = products.block_bits
+    return tuple(_turned(graph, adders, bits) for graph, adders in zip(graphs, products.adders, strict=True))
 
 
 @lru_cache(maxsize=16)
-def _period(graphs: tuple[Graph, ...]) -> int:
+def _period(all_turned: tuple[_Turned, ...]) -> int:
     longest = ADDITION
-    for graph in graphs:
-        turned, turns, loops = _turned(graph)
+    for graph, turns, loops in all_turned:
+        if any(map(is_product, graph.nodes)):
+            longest = max(longest, REGISTERED_MULTIPLICATION)
         if loops:
             tried = itertools.count(longest)
-            longest = next(time for time in tried if _spread(turned, turns, loops, time).distance <= turns)
+            longest = next(time for time in tried if _spread(graph, turns, loops, time).distance <= turns)
     return longest
 
 
@@ -91,13 +144,19 @@ def _reading(turns: int) -> int:
     return 1 if turns > 1 else 0
 
 
+def _in_pieces(graph: Graph, adders: Collection[int], bits: int) -> tuple[Graph, frozenset[int]]:
+    graph, places = with_places(graph)
+    made = {places[index] for index in adders}
+    return with_blocks(graph, [index for index in range(len(graph.nodes)) if index not in made], bits)
+
+
 @lru_cache(maxsize=64)
-def _turned(graph: Graph) -> tuple[Graph, int, frozenset[int]]:
-    """Return a graph with sums, whose loops have one DELAY for all samples that take turns; their number; the DELAYs.
+def _turned(graph: Graph, adders: frozenset[int], bits: int) -> _Turned:
+    """Return a graph whose loops take turns, with sums for products in `adders` and pieces for blocks otherwise.
 
     Its nodes are in the order of computation also where they depend on a DELAY of no loop.
     """
-    graph = with_sums(reassociated(graph))
+    graph = with_sums(*_in_pieces(graph, adders, bits))
     nodes, loops = graph.nodes, loop_delays(graph)
     roots = {i: graph.undelayed(i) for i in loops}
     used = {i for index, node in enumerate(nodes) if index not in loops for i in node.operands} | {*graph.outputs}
@@ -150,15 +209,28 @@ _Moment = tuple[int, int]
 def _spread(graph: Graph, turns: int, loops: frozenset[int], longest: int) -> TurnPlan:
     """Plan with pipeline stages of the time `longest`; an operation that takes longer has one of its own.
 
+    A register follows each block, but in loops that have no clock for it.
+    """
+    products = frozenset(index for index, node in enumerate(graph.nodes) if is_product(node))
+    plan = _spread_with(graph, turns, loops, longest, products)
+    return plan if plan.distance <= turns else _spread_with(graph, turns, loops, longest, products - recursive(graph))
+
+
+def _spread_with(graph: Graph, turns: int, loops: frozenset[int], longest: int, registered: frozenset[int]) -> TurnPlan:
+    """Plan with a register behind each product in `registered`.
+
     As `sosmith.hdl.plan.interleaving.schedule`, it finds the earliest moment of each value first, and then computes
     each as late as the outputs and the states' next values allow. The pipeline stage of a delay in no loop is that of
     what it delays.
     """
     nodes = graph.nodes
-    times = [min(operation_time(graph, node, powers=True), longest) for node in nodes]
-    early = _earliest(graph, loops, times, longest, _reading(turns))
+    times = [
+        min(REGISTERED_MULTIPLICATION if index in registered else operation_time(graph, node, powers=True), longest)
+        for index, node in enumerate(nodes)
+    ]
+    early = _earliest(graph, loops, times, longest, _reading(turns), registered)
     depth = max(stage for stage, _ in early) + 1
-    planned = _latest(graph, loops, times, longest, early, depth)
+    planned = _latest(graph, loops, times, longest, early, depth, registered)
     for index, node in enumerate(nodes):
         if node.op in {Op.INPUT, Op.CONSTANT}:
             planned[index] = 0
@@ -168,7 +240,9 @@ def _spread(graph: Graph, turns: int, loops: frozenset[int], longest: int) -> Tu
     return TurnPlan(graph, turns, loops, tuple(planned), writes, depth)
 
 
-def _earliest(graph: Graph, loops: frozenset[int], times: list[int], longest: int, reading: int) -> list[_Moment]:
+def _earliest(
+    graph: Graph, loops: frozenset[int], times: list[int], longest: int, reading: int, registered: frozenset[int]
+) -> list[_Moment]:
     """Return the earliest moment at which each value can be there."""
     early: list[_Moment] = []
     for index, node in enumerate(graph.nodes):
@@ -179,12 +253,19 @@ def _earliest(graph: Graph, loops: frozenset[int], times: list[int], longest: in
         else:
             stage, time = max(early[i] for i in node.operands)
             took = times[index]
-            early.append((stage, time + took) if time + took <= longest else (stage + 1, took))
+            stage, time = (stage, time + took) if time + took <= longest else (stage + 1, took)
+            early.append((stage, longest if index in registered else time))
     return early
 
 
 def _latest(
-    graph: Graph, loops: frozenset[int], times: list[int], longest: int, early: list[_Moment], depth: int
+    graph: Graph,
+    loops: frozenset[int],
+    times: list[int],
+    longest: int,
+    early: list[_Moment],
+    depth: int,
+    registered: frozenset[int],
 ) -> list[int]:
     """Return the latest pipeline stage in which each value can begin to be computed."""
     nodes = graph.nodes
@@ -195,6 +276,8 @@ def _latest(
         if index in sources:
             late[index] = min(late[index], (early[index][0], longest))
         (stage, time), took = late[index], times[index]
+        if index in registered and time < longest:
+            stage, time = stage - 1, longest
         start = (stage, time - took) if time >= took else (stage - 1, longest - took)
         planned[index] = start[0]
         for i in () if index in loops else nodes[index].operands:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 
 from sosmith.hdl.plan.interleaving import Schedule, schedule
-from sosmith.hdl.plan.look_ahead import period, plans
+from sosmith.hdl.plan.look_ahead import Products, period, plans
 from sosmith.hdl.plan.pipeline import longest_time, pipeline_depth
 from sosmith.hdl.plan.unfolding import unfolded_stages
 from sosmith.model.dataflow.datapath import Datapath
@@ -53,22 +53,25 @@ def depths(datapath: Datapath, channels: int, protect: str, adders: Sequence[Col
     return [plan.depth for plan in schedules(datapath, channels, protect, adders)]
 
 
-def block_latency_cycles(datapath: Datapath, lanes: int, *, look_ahead: bool) -> int:
-    """Clocks from the edge that accepts a beat to the edge that can hand its results on, without a stall."""
-    return sum(block_depths(datapath, lanes, look_ahead=look_ahead)) + 1
+def block_latency_cycles(datapath: Datapath, lanes: int, products: Products | None = None) -> int:
+    """Clocks from the edge that accepts a beat to the edge that can hand its results on, without a stall.
+
+    With look-ahead, `products` says how products by constants are made.
+    """
+    return sum(block_depths(datapath, lanes, products)) + 1
 
 
-def block_depths(datapath: Datapath, lanes: int, *, look_ahead: bool) -> list[int]:
+def block_depths(datapath: Datapath, lanes: int, products: Products | None = None) -> list[int]:
     """Return the number of pipeline stages of each stage with several samples a clock, or with look-ahead."""
     stages = unfolded_stages(datapath, lanes)
-    if look_ahead:
-        return [plan.depth for plan in plans(stages)]
+    if products is not None:
+        return [plan.depth for plan in plans(stages, products)]
     return [pipeline_depth(stage.graph) for stage in stages]
 
 
-def clock_estimate(datapath: Datapath, lanes: int, *, look_ahead: bool) -> float:
+def clock_estimate(datapath: Datapath, lanes: int, products: Products | None = None) -> float:
     """Estimate the highest clock of a core for one channel on an ECP5, in Hz: by its slowest pipeline stage."""
     stages = unfolded_stages(datapath, lanes)
-    if look_ahead:
-        return 1 / (_BESIDE + _UNIT * period(stages))
+    if products is not None:
+        return 1 / (_BESIDE + _UNIT * period(stages, products))
     return 1 / (_BESIDE + _CHAINED * max(longest_time(stage.graph) for stage in stages))

@@ -34,7 +34,7 @@ def pipeline_stages(graph: Graph) -> list[int]:
     last the rest of the loop. An FIR filter, which has states but no recursion, has as many as it takes to have one
     product and one sum after the other in each, at most.
     """
-    loop = _recursive(graph)
+    loop = recursive(graph)
     if not loop and graph.delays:
         return _one_after_another(graph)
     late = _late(graph, loop)
@@ -160,7 +160,7 @@ def loop_delays(graph: Graph) -> frozenset[int]:
     return frozenset(delay for delay in graph.delays if delay in _users(graph, [delay]))
 
 
-def _recursive(graph: Graph) -> set[int]:
+def recursive(graph: Graph) -> set[int]:
     """Return the nodes that depend on a state that depends on itself."""
     return _users(graph, loop_delays(graph))
 

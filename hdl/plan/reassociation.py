@@ -23,6 +23,11 @@ from sosmith.model.dataflow.graph import Graph, GraphBuilder, Node, Op, Wire
 
 def reassociated(graph: Graph) -> Graph:
     """Return the graph with states moved to the end of the sums that they are in."""
+    return with_places(graph)[0]
+
+
+def with_places(graph: Graph) -> tuple[Graph, list[int]]:
+    """Return the graph that `reassociated` returns, and where each node of the first is in it."""
     g = GraphBuilder()
     wires: list[Wire] = []
     for node in graph.nodes:
@@ -31,7 +36,7 @@ def reassociated(graph: Graph) -> Graph:
         wires.append(g.copied(node, operands) if other is None else other)
     for i in graph.delays:
         g.connect(wires[i], wires[graph.nodes[i].operands[0]])
-    return g.build([wires[i] for i in graph.outputs])
+    return g.build([wires[i] for i in graph.outputs]), [int(wire) for wire in wires]
 
 
 def _shorter(g: GraphBuilder, node: Node, operands: list[Wire]) -> Wire | None:

@@ -12,6 +12,7 @@ from tests.formal.stream_rules import StreamRules
 from sosmith.hdl.cores import block as block_core
 from sosmith.hdl.plan import look_ahead as plan
 from sosmith.hdl.plan import parallel_clocks
+from sosmith.hdl.plan.unfolding import unfolded_stages
 from sosmith.hdl.stages import look_ahead
 from sosmith.model.dataflow.datapath import Datapath
 
@@ -33,8 +34,9 @@ def rules(
     datapath: Datapath, lanes: int, *, ahead: bool, module: ModuleType = block_core, order: bool = True
 ) -> BlockRules:
     """Rules of a core; without `order`, those of the handshake alone."""
-    latency = parallel_clocks.block_latency_cycles(datapath, lanes, look_ahead=ahead)
-    design = module.BlockCore(datapath, lanes, look_ahead=ahead)
+    products = plan.Products.of_adders(unfolded_stages(datapath, lanes)) if ahead else None
+    latency = parallel_clocks.block_latency_cycles(datapath, lanes, products)
+    design = module.BlockCore(datapath, lanes, products=products)
     return BlockRules(design, latency + 1, patience=latency, datapath=datapath if order else None)
 
 

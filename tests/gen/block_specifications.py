@@ -19,6 +19,14 @@ def text(lanes: int = 1, *, pipeline: str = "look-ahead", clock: str = "48.0e6",
 
 
 @cache
-def designed(lanes: int = 1, *, pipeline: str = "look-ahead", clock: str = "48.0e6", order: int = 5) -> CoreDesign:
+def designed(
+    lanes: int = 1,
+    *,
+    pipeline: str = "look-ahead",
+    clock: str = "48.0e6",
+    order: int = 5,
+    multipliers: int | None = None,
+) -> CoreDesign:
     asked = text(lanes, pipeline=pipeline, clock=clock).replace("order = 5\n", f"order = {order}\n")
+    asked += "" if multipliers is None else f"\nmultipliers = {multipliers}\n"
     return design_core(from_text(asked, Path("audio.toml")))

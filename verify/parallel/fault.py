@@ -17,7 +17,7 @@ from sosmith.verify.parallel.pipeline import Pipeline
 def fault(netlist: Netlist, pipeline: Pipeline, graph: GraphCodes) -> RejectedError | None:
     """Return the rejection for the first net that does not hold the code of the node it is named after, if any."""
     for index, node in enumerate(graph.nodes):
-        if not node.entry.name and len(graph.lanes) > 1:
+        if not node.entry.name and (len(graph.lanes) > 1 or graph.turned):
             continue  # named by a number, which is that of another node in the hardware
         own = re.compile(rf"{re.escape(graph.state_name(index))}(_passed\d+|_register)?")
         for name in sorted(filter(own.fullmatch, netlist.widths), key=lambda name: (len(name), name)):

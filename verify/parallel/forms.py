@@ -147,6 +147,38 @@ class Forms:
 
     def limits(self, form: Form) -> Limits:
         """Return limits of a form."""
+        low, high = self._limits_by_atoms(form)
+        primitive = _primitive(form)
+        if primitive is not None and primitive.key in self._known:
+            ends = sorted(end * primitive.scale + primitive.offset for end in self._known[primitive.key])
+            low, high = max(low, ends[0]), min(high, ends[1])
+        for whole_low, whole_high in self._limits_without_floors(form):
+            low, high = max(low, whole_low), min(high, whole_high)
+        if self._always is not self:
+            for known_low, known_high in self._limits_by_floors(form):
+                low, high = max(low, known_low), min(high, known_high)
+        return low, high
+
+    def _limits_without_floors(self, form: Form) -> Iterator[Limits]:
+        """Yield limits of a form with floors of what else is in it: ``c floor(a)`` is ``c a`` less c times a remainder.
+
+        Each by itself, the parts of a number that was taken apart seem to range further than what is made of them.
+        """
+        atoms = {atom for monomial in form for atom in monomial}
+        for monomial, factor in form.items():
+            if len(monomial) != 1 or not self._is_floor(monomial[0]):
+                continue
+            inside = self._atoms[monomial[0]].inside
+            assert inside is not None
+            if not atoms & {atom for inner in inside for atom in inner}:
+                continue
+            whole = plus({m: value for m, value in form.items() if m != monomial}, inside, factor)
+            low, high = self._limits_by_atoms(whole)
+            remainder = factor * (1 - Fraction(1, lcm(*(value.denominator for value in inside.values()))))
+            yield low - max(remainder, Fraction(0)), high - min(remainder, Fraction(0))
+
+    def _limits_by_atoms(self, form: Form) -> Limits:
+        """Return limits of a form from those of its atoms, as if each were by itself."""
         low: int | Fraction = 0
         high: int | Fraction = 0
         self._spend(len(form))
@@ -155,13 +187,6 @@ class Forms:
             for atom in monomial:
                 ends = [end * limit for end in ends for limit in self._limits_of(atom)]
             low, high = low + min(ends), high + max(ends)
-        primitive = _primitive(form)
-        if primitive is not None and primitive.key in self._known:
-            ends = sorted(end * primitive.scale + primitive.offset for end in self._known[primitive.key])
-            low, high = max(low, ends[0]), min(high, ends[1])
-        if self._always is not self:
-            for known_low, known_high in self._limits_by_floors(form):
-                low, high = max(low, known_low), min(high, known_high)
         return low, high
 
     def _limits_by_floors(self, form: Form) -> Iterator[Limits]:

@@ -588,13 +588,6 @@ BAD = [
         'hardware.samples_per_clock must be at most 8 with hardware.pipeline = "look-ahead", not 16',
     ),
     (
-        "look-ahead with multipliers",
-        CLOCK,
-        CLOCK + '\npipeline = "look-ahead"\nmultipliers = 4',
-        "hardware.multipliers must be 'auto' or 0 with hardware.pipeline = \"look-ahead\", as all its products by "
-        "constants are made of adders, not 4",
-    ),
-    (
         "a factor that is no power of two",
         ORD,
         f"{ORD}\ndecimate = 12",

@@ -1,12 +1,14 @@
 """Graphs made for hardware compute what the graphs do that they are made of: unfolded, reassociated, with sums."""
 
 import random
+from collections.abc import Sequence
 
 import pytest
 from tests.gen.designs import parallel_design
 
+from sosmith.hdl.plan.block_products import blocks_of, is_product, with_blocks
 from sosmith.hdl.plan.constant_products import with_sums
-from sosmith.hdl.plan.look_ahead import period, plans
+from sosmith.hdl.plan.look_ahead import Products, TurnPlan, period, plans
 from sosmith.hdl.plan.reassociation import reassociated
 from sosmith.hdl.plan.unfolding import unfolded
 from sosmith.model.dataflow.graph import Graph, GraphBuilder, Op
@@ -58,6 +60,22 @@ def test_rewritten_graphs_give_the_same_codes(seed: int) -> None:
     assert all(value > 0 and value & (value - 1) == 0 for value in scales)
 
 
+@pytest.mark.parametrize("bits", [3, 5, 8])
+@pytest.mark.parametrize("seed", range(6))
+def test_products_in_pieces_fit_blocks_and_give_the_same_codes(seed: int, bits: int) -> None:
+    graph = random_graph(seed)
+    rows = samples(graph, seed)
+    products = [index for index, node in enumerate(graph.nodes) if node.op is Op.SCALE and node.parameter]
+    pieces, blocks = with_blocks(graph, products, bits)
+    assert pieces.run(rows) == graph.run(rows)
+    assert len(blocks) == sum(blocks_of(graph, graph.nodes[i], bits) for i in products if is_product(graph.nodes[i]))
+    for node in (pieces.nodes[index] for index in blocks):
+        operand = pieces.nodes[node.operands[0]]
+        assert operand.width + (not operand.signed) <= bits
+        assert abs(node.parameter) < 1 << (bits - 1)
+        assert node.parameter > 0 or operand.signed
+
+
 @pytest.mark.parametrize("lanes", [2, 3, 4, 8, 16])
 @pytest.mark.parametrize("seed", range(6))
 def test_unfolded_graphs_give_the_same_codes(seed: int, lanes: int) -> None:
@@ -68,14 +86,23 @@ def test_unfolded_graphs_give_the_same_codes(seed: int, lanes: int) -> None:
     assert found == [code for row in graph.run(rows) for code in row]
 
 
+def planned(stages: Sequence[Stage]) -> tuple[TurnPlan, ...]:
+    return plans(stages, Products.of_adders(stages))
+
+
+def time(stages: Sequence[Stage]) -> int:
+    return period(stages, Products.of_adders(stages))
+
+
 def test_a_start_takes_one_addition_however_many_samples_a_beat_holds() -> None:
     start = parallel_design("audio_lowpass.toml").datapath.stages[0]
     assert start.name == "start"
     for lanes in (1, 2, 8):
         graph = reassociated(unfolded(start.graph, lanes))
-        (plan,) = plans([HornerStep("start", graph)])
+        steps = [HornerStep("start", graph)]
+        (plan,) = planned(steps)
         assert plan.distance == plan.turns == 1
-        assert period([HornerStep("start", graph)]) == 5
+        assert time(steps) == 5
 
 
 def distant(turns: int, additions: int) -> Stage:
@@ -97,13 +124,13 @@ def distant(turns: int, additions: int) -> Stage:
 def test_pipeline_stages_are_as_short_as_the_turns_allow(turns: int, additions: int, wanted: int) -> None:
     """A loop of n operations, the limiter included, has turns - 1 pipeline stages: one clock goes to its memory."""
     stage = distant(turns, additions)
-    (plan,) = plans([stage])
-    assert (plan.turns, period([stage])) == (turns, wanted)
+    (plan,) = planned([stage])
+    assert (plan.turns, time([stage])) == (turns, wanted)
     assert plan.distance <= turns
     assert sum(node.op is Op.DELAY for node in plan.graph.nodes) == 1
 
 
 def test_all_stages_take_the_time_of_the_slowest_loop() -> None:
     slow, fast = distant(4, 5), distant(8, 5)
-    assert [plan.depth for plan in plans([slow, fast])] == [plans([slow])[0].depth, 4]
-    assert period([slow, fast]) == period([slow]) == 10
+    assert [plan.depth for plan in planned([slow, fast])] == [planned([slow])[0].depth, 4]
+    assert time([slow, fast]) == time([slow]) == 10

@@ -31,6 +31,7 @@ class Made(NamedTuple):
     certificate: Certificate
     channels: int
     lanes: int
+    latency: int
 
     def check(self, text: str | None = None) -> HardwareVerdict:
         return check_hardware(text or self.text, self.certificate, self.channels, self.lanes)
@@ -59,7 +60,7 @@ def made(
     )
     text = to_verilog(to_rtlil(core.component(), design.datapath.name))
     read = json.loads(certificate_text(certificate(design.quantized, design.spec.max_error)))
-    return Made(design, text, Certificate.model_validate(read), channels, lanes)
+    return Made(design, text, Certificate.model_validate(read), channels, lanes, core.latency_cycles)
 
 
 @cache
@@ -73,12 +74,14 @@ def small(spec: str = PLAIN, realization: str = "df1_ef1", channels: int = 1, la
 
 
 @cache
-def looking_ahead(spec: str = PLAIN, lanes: int = 1) -> Made:
+def looking_ahead(spec: str = PLAIN, lanes: int = 1, multipliers: int = 0) -> Made:
     """Return a core with look-ahead for 100 MHz."""
     hardware = f"""
 hardware.architecture = "parallel"
 hardware.clock = 100.0e6
 hardware.pipeline = "look-ahead"
 hardware.samples_per_clock = {lanes}
+hardware.multipliers = {multipliers}
 """
-    return made(design_core(specified(spec + hardware)), lanes=lanes, look_ahead=True)
+    design = design_core(specified(spec + hardware))
+    return made(design, lanes=lanes, look_ahead=True, blocks=Blocks(multipliers))

@@ -8,8 +8,6 @@ from tests.verify.parallel.cores import Made, looking_ahead, made
 from tests.verify.parallel.rejections import NODE, rejection, sweep
 from tests.verify.small_specifications import INSTRUMENT, NARROW, PLAIN, STEADY, STEADY_INSTRUMENT
 
-from sosmith.hdl.plan.parallel_clocks import block_latency_cycles
-
 FIRST_ORDER = PLAIN.replace("order = 2", "order = 1")
 SLOWER = FIRST_ORDER.replace("cutoff = 20.0", "cutoff = 13.0")
 """Four samples take turns in its loop."""
@@ -17,7 +15,7 @@ SLOWER = FIRST_ORDER.replace("cutoff = 20.0", "cutoff = 13.0")
 
 def accept(core: Made) -> None:
     found = core.check()
-    assert found.latency == block_latency_cycles(core.design.datapath, core.lanes, look_ahead=True)
+    assert found.latency == core.latency
     assert found.states > found.memories == len(re.findall(r"^  reg .*_memory \[", core.text, re.MULTILINE)) > 0
 
 
@@ -115,6 +113,33 @@ def test_each_kind_of_break_is_named(kind: str) -> None:
     text, count = re.subn(old, new, core.text, flags=re.DOTALL)
     assert count == 1
     assert re.fullmatch(sentence, rejection(core, text)), rejection(core, text)
+
+
+WIDE = FIRST_ORDER.replace("bits = 8", "bits = 18")
+"""Its products take two multiplier blocks each."""
+
+PIECES = {
+    "a piece by another number": (r"(assign scale_43 = y_4\[16:0\] \* 8'ha)5", r"\g<1>6"),
+    "pieces of another cut": (r"y_4\[22:17\]", "y_4[21:16]"),
+    "a piece a place too low": (r"\{ scale_42_passed8, 17'h00000 \}", "{ scale_42_passed8, 16'h0000 }"),
+    "a lower piece with a sign": (r"\$signed\(\{ 1'h0, scale_43_passed8 \}\)", "$signed(scale_43_passed8)"),
+    "a piece of the sample behind": (r"(\{ scale_42_passed8, 17'h00000 \}.*)scale_43_passed8", r"\1scale_43"),
+}
+
+
+def test_products_in_pieces_are_proven() -> None:
+    core = looking_ahead(WIDE, multipliers=20)
+    accept(core)
+    assert core.text.count(" * ") == core.design.architecture.multiplier_blocks == 8
+
+
+@pytest.mark.parametrize("kind", PIECES)
+def test_each_wrong_piece_is_rejected(kind: str) -> None:
+    core = looking_ahead(WIDE, multipliers=20)
+    old, new = PIECES[kind]
+    text, count = re.subn(old, new, core.text)
+    assert count == 1
+    assert re.match(r"section0\.\w+ must ", rejection(core, text))
 
 
 @pytest.mark.slow
