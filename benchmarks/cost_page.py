@@ -446,8 +446,8 @@ on it.
 
 audio_lowpass with loops that go back several samples at once, and with beats of several samples
 ([hardware.md](hardware.md#look-ahead)). Products of look-ahead take multiplier blocks in pieces, as long as there are
-any; the others are sums with registers between them. It looks as far ahead as the clock asks that it is designed for, by
-an estimate.
+any; the others are sums with registers between them. It looks as far ahead as the clock asks that it is designed for,
+by an estimate.
 
 {fast_table(record)}
 
