@@ -94,6 +94,11 @@ class StageDesign:
         return Rate(len(self.cores), self.design.datapath.samples_per_result)
 
     @property
+    def clocks_per_sample(self) -> float:
+        """Clocks that each of its samples takes, on average, at the highest rate."""
+        return float(max(len(self.cores), *(core.architecture.clocks_per_sample for core in self.cores)))
+
+    @property
     def output(self) -> Port:
         """Format of its results."""
         return self.design.datapath.output
@@ -214,6 +219,12 @@ class ChainDesign:
     def excess(self) -> tuple[str, ...]:
         """Which limits the chain does not keep to, a phrase for each; nothing if it keeps to all, or has none."""
         return excess_of(self.spec.limits, self.foldings)
+
+    @property
+    def clocks_per_sample(self) -> float:
+        """Clocks that each sample of a channel takes, on average, at the highest rate: those of the slowest stage."""
+        rate = self.spec.base.sample_rate
+        return max(stage.clocks_per_sample * float(stage.spec.rate / rate) for stage in self.stages)
 
     @property
     def carried_flags(self) -> int:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.gen.chain import rising
-from tests.gen.chain.chains import PLAIN, draw, stimulus
+from tests.gen.chain.chains import PLAIN, draw, instrument, stimulus
 from tests.gen.chain.rising import SHAPES
 
 import sosmith
@@ -89,22 +89,6 @@ def test_a_calibration_before_a_filter(tmp_path: Path) -> None:
     )
     assert report.passed
     assert np.array_equal(report.run.received[:, 0], results)
-
-
-def instrument() -> dict[str, Any]:
-    return {
-        "name": "gauge",
-        "sample_rate": 100.0,
-        "input": {
-            "voltage": {"bits": 10, "range": [0.0, 10.0]},
-            "temperature": {"bits": 10, "range": [0.0, 128.0]},
-        },
-        "stage": [
-            {"name": "cal", "kind": "polynomial", "coefficients": [[1.16, -0.0036], [0.3672, 0.0006618], [0.05812]]},
-            {"name": "low", "kind": "fir", "taps": [0.25, 0.5, 0.25], "decimate": 2},
-        ],
-        "output": {"bits": 12, "range": [0.0, 16.0], "unit": "mm"},
-    }
 
 
 @pytest.mark.slow
