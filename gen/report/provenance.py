@@ -145,10 +145,7 @@ def hardware_cost(design: CoreDesign, netlist: Netlist | None = None) -> dict[st
             "accumulator_bits": sum(each.accumulator_bits for each in programs),
         }
     if netlist is not None:
-        board = netlist.board
-        cost["luts"] = board.device.luts(netlist.cells)
-        cost["multiplier_blocks"] = netlist.cells.get(board.device.multiplier or "", 0)
-        return {"source": "synthesis", "board": board.name, "device": board.device.title, **cost}
+        return cost | counted(netlist)
     estimate = estimated(design.architecture, find_board(USUAL[0]))
     assert estimate is not None
     cost |= {
@@ -159,6 +156,19 @@ def hardware_cost(design: CoreDesign, netlist: Netlist | None = None) -> dict[st
         "within": estimate.tested.nine_in_ten,
     }
     return {"source": "estimate", "board": None, "device": estimate.device, **cost}
+
+
+def counted(netlist: Netlist) -> dict[str, Any]:
+    """Return what is known of a cost after synthesis, by the keys of `hardware_cost`; of the rest nothing is."""
+    board = netlist.board
+    return {
+        "source": "synthesis",
+        "board": board.name,
+        "device": board.device.title,
+        "luts": board.device.luts(netlist.cells),
+        "multiplier_blocks": netlist.cells.get(board.device.multiplier or "", 0),
+        **dict.fromkeys(("register_bits", "memory_bits", "within")),
+    }
 
 
 def _port(port: Port) -> list[Any]:

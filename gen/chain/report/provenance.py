@@ -8,8 +8,10 @@ from typing import Any
 
 from sosmith.gen.chain.design import ChainDesign
 from sosmith.gen.core import CoreDesign
+from sosmith.gen.fpga.synthesis import Netlist
 from sosmith.gen.report.provenance import (
     Provenance,
+    counted,
     datapath_text,
     hardware_cost,
     reference_of_stages,
@@ -35,14 +37,15 @@ def chain_provenance(design: ChainDesign, traces: Sequence[Trace]) -> Provenance
     )
 
 
-def chain_cost(design: ChainDesign) -> dict[str, Any]:
-    """Tell what the cores of a chain take together, before synthesis, as `hardware_cost` does of one.
+def chain_cost(design: ChainDesign, netlist: Netlist | None = None) -> dict[str, Any]:
+    """Tell what a chain takes, as `hardware_cost` does of a core.
 
-    Of what joins them, flags and turns, nothing is counted.
+    An estimate is that of the cores; of what joins them, flags and turns, nothing is counted before synthesis.
     """
     costs = [hardware_cost(core) for core in _cores(design)]
     total: dict[str, Any] = {key: _sum([cost[key] for cost in costs]) for key in costs[0] if key not in _SAME}
-    return {key: costs[0][key] for key in _SAME} | total | {"within": max(cost["within"] for cost in costs)}
+    total |= {key: costs[0][key] for key in _SAME} | {"within": max(cost["within"] for cost in costs)}
+    return total if netlist is None else total | counted(netlist)
 
 
 def names_of(design: ChainDesign) -> tuple[str, str]:

@@ -240,9 +240,9 @@ def test_a_chain_is_no_specification_of_a_core() -> None:
     with pytest.raises(SpecificationError) as refused:
         sosmith.Specification.load(TREE)
     assert str(refused.value) == (
-        "specification: not yet available: stage must be left out here, as only board, build, design, generate, "
-        "package, reload, simulate and verify take a chain: `sosmith generate` writes a specification of each stage "
-        "beside the chain's files, for what takes a single core, not [a table, a table, a table, a table]"
+        "specification: not yet available: stage must be left out here, as only board, build, design, explore, "
+        "generate, package, reload, simulate and verify take a chain: `sosmith generate` writes a specification of "
+        "each stage beside the chain's files, for what takes a single core, not [a table, a table, a table, a table]"
     )
 
 
