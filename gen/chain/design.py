@@ -400,7 +400,7 @@ class _Budget:
             If a phase of it has no tap.
         """
         ((taps, under),) = sections
-        if not stage.given_taps:
+        if not stage.keeps_taps:
             taps = tuple(tap * stage.rise for tap in taps)
         for phase in range(stage.rise):
             if not any(taps[phase :: stage.rise]):
@@ -440,7 +440,7 @@ class _Budget:
             output = self.last if is_last else self._port(stage, shares.steps[k], reach + carried + allowed)
             specs = [stage.ordinary(self.spec, inputs, output, allowed)]
             if stage.rise > 1:
-                taps = stage.given_taps or own[0].sections[0][0]
+                taps = (specs[0].filter.taps if stage.keeps_taps else None) or own[0].sections[0][0]
                 specs = [
                     stage.phase(self.spec, phase, taps[phase :: stage.rise], inputs, output, allowed)
                     for phase in range(stage.rise)

@@ -146,7 +146,7 @@ def judge_chain(
         except UndecidedError as error:
             raise RejectedError(f"{error} could not be decided") from None
         if text is not None:
-            check_words(chain, text, groups)
+            check_words(chain, text, groups, spec_folder)
         files = sum(len(stage.files) for stage in stages.values())
         if with_files:
             progress("files", 0, 0)

@@ -180,7 +180,7 @@ REFUSED: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
         )
         for cutoff, wanted in (
             ("nan", "a finite number"),
-            ("1e+999999999", "a number of at most 50 digits, zero or from 1e-30 to below 1e30 in size"),
+            ("1e+999999999", "a number of at most 130 digits, zero or from 1e-30 to below 1e30 in size"),
         )
     },
     "filter": (

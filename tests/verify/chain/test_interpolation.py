@@ -13,6 +13,8 @@ from tests.gen.chain.rising import UP
 from tests.verify.chain.sealing import CERTIFICATE, changed, less, more, proven, replace_sealed, sealed_again
 
 import sosmith
+from sosmith.gen.specification.exact_values import exact
+from sosmith.gen.specification.toml_text import toml_text
 from sosmith.model.errors import ShortfallError
 
 TREE = UP | {"hardware": {"start": "zero"}}
@@ -141,3 +143,20 @@ def test_other_words_are_refused(old: str, new: str, sentence: str, folder: Path
     sealed_again(folder, lambda tree: tree.update(specification=path.read_text(encoding="utf-8")))
     with pytest.raises(ShortfallError, match=sentence):
         sosmith.ChainCertificate.load(folder / CERTIFICATE).verify(spec=path)
+
+
+def test_a_file_of_taps_is_read_by_the_proof(tmp_path: Path) -> None:
+    """And another file than the one that the stage was made from is refused."""
+    stage = {"name": "fill", "kind": "fir", "interpolate": 2, "taps_file": "taps.csv"}
+    taps = ["0.25", "0.5", "1.0", "0.75", "0.25", "0.1", "0.0"]
+    (tmp_path / "taps.csv").write_text("\n".join(taps), encoding="utf-8")
+    text = toml_text(exact(TREE | {"stage": [stage]}))
+    (tmp_path / "rx.toml").write_text(text, encoding="utf-8")
+    sosmith.design_chain(tmp_path / "rx.toml").generate(tmp_path)
+    assert not proven(tmp_path).missing
+    for k, other in ((5, "0.2"), (6, "0.125"), (0, "-0.25")):
+        (tmp_path / "taps.csv").write_text("\n".join([*taps[:k], other, *taps[k + 1 :]]), encoding="utf-8")
+        with pytest.raises(
+            ShortfallError, match=rf"^the taps of stage fill, phase {k % 2}, must be as the specification"
+        ):
+            proven(tmp_path)
