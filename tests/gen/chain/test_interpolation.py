@@ -218,17 +218,11 @@ def test_what_a_chain_does_not_take_is_refused(name: str) -> None:
     assert str(refused.value) == message
 
 
-def test_neither_a_board_nor_a_package_takes_it(up: sosmith.Chain, tmp_path: Path) -> None:
+def test_a_board_does_not_take_it(up: sosmith.Chain, tmp_path: Path) -> None:
     with pytest.raises(SpecificationError) as refused:
         up.build("icebreaker", folder=tmp_path)
     assert str(refused.value) == (
         "specification: interpolate must be left out on a board, whose link returns one result for each sample"
-    )
-    with pytest.raises(SpecificationError) as refused:
-        up.package(tmp_path)
-    assert str(refused.value) == (
-        "specification: not yet available: interpolate must be left out in a package, whose benches take at most one "
-        "result for each sample"
     )
 
 
