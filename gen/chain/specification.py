@@ -355,16 +355,14 @@ def _checked(tree: dict[str, Any], path: Path, text: str | None) -> ChainSpec:
 
 
 def _check_rising(stage: StageSpec, k: int, alone: Specification) -> None:
-    """Check that a stage that interpolates has neither check bits nor registers: it is several cores."""
-    own = {"protect": (alone.hardware.protect, "none"), "reload": (alone.hardware.reload, False)}
-    for key, (value, wanted) in own.items():
-        if stage.rise > 1 and value != wanted:
-            raise UnfitError(
-                f"{literal(wanted)} in a stage that interpolates, which has a core for each result of a sample",
-                literal(value),
-                where=f"stage[{k}].{key}",
-                later=True,
-            )
+    """Check that a stage that interpolates has no registers: it is several cores."""
+    if stage.rise > 1 and alone.hardware.reload:
+        raise UnfitError(
+            f"{literal(False)} in a stage that interpolates, which has a core for each result of a sample",
+            literal(True),
+            where=f"stage[{k}].reload",
+            later=True,
+        )
 
 
 def _kind(stage: Mapping[str, Any], k: int) -> str:

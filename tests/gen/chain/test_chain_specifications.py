@@ -89,10 +89,10 @@ REFUSED: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
         stage(0, decimate=None, interpolate=3),
         "stage[0].interpolate must be a power of two for a CIC filter, whose weights are then exact, not 3",
     ),
-    "interpolate and protect": (
-        stage(0, decimate=None, interpolate=2, protect="detect"),
-        "not yet available: stage[0].protect must be 'none' in a stage that interpolates, which has a core for each "
-        "result of a sample, not 'detect'",
+    "interpolate and reload": (
+        stage(0, decimate=None, interpolate=2, reload=True),
+        "not yet available: stage[0].reload must be false in a stage that interpolates, which has a core for each "
+        "result of a sample, not true",
     ),
     "unknown key": (
         stage(3, order=2),

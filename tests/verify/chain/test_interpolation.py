@@ -160,3 +160,30 @@ def test_a_file_of_taps_is_read_by_the_proof(tmp_path: Path) -> None:
             ShortfallError, match=rf"^the taps of stage fill, phase {k % 2}, must be as the specification"
         ):
             proven(tmp_path)
+
+
+@pytest.mark.slow
+def test_check_bits_of_all_cores_are_proven(tmp_path: Path) -> None:
+    """But for the hardware of such cores; and a fault of one core that is not one of all is refused."""
+    tree = TREE | {"stage": [UP["stage"][0] | {"protect": "detect"}, UP["stage"][1]]}
+    chain = sosmith.design_chain(tree)
+    chain.generate(tmp_path)
+    (tmp_path / "rx.toml").write_text(chain.specification.toml(), encoding="utf-8")
+    scope = proven(tmp_path).scope
+    assert all(scope[name].state.value == "proven" for name in ("chain", "stages", "top", "c_model"))
+    assert scope["hardware"].is_missing
+    path = tmp_path / "rx.sv"
+    text = path.read_text(encoding="utf-8")
+    for old, new in (("own | {1'h0, any1, 6'h0}", "own"), ("any1 = fault1 | any0", "any1 = any0")):
+        replace_sealed(path, old, new)
+        with pytest.raises(ShortfallError, match=r"^rx_fill_turns must assign "):
+            proven(tmp_path)
+        path.write_text(text, encoding="utf-8")
+    sealed_again(tmp_path)
+    other = sosmith.design_chain(tree | {"stage": [UP["stage"][0], UP["stage"][1]]})
+    other.generate(tmp_path / "plain")
+    for file in (tmp_path / "plain").glob("rx_fill_p1.*"):
+        shutil.copy(file, tmp_path)
+    sealed_again(tmp_path)
+    with pytest.raises(ShortfallError, match=r"^the cores of stage fill must have the same protect$"):
+        proven(tmp_path, spec=False)
