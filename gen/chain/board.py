@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 
+from amaranth.lib.wiring import Component
+
 from sosmith.gen.chain.design import ChainDesign, StageDesign
 from sosmith.gen.chain.top import chain_interface, registers_port, top_text
 from sosmith.gen.output.identity import BoardItem
 from sosmith.gen.output.verilog import core_verilog
 from sosmith.gen.reload.register_writes import bank_size
 from sosmith.hdl.boards.chain_core import ChainCore
-from sosmith.hdl.boards.channel_holder import CLOCKS
+from sosmith.hdl.boards.channel_holder import CLOCKS, HeldChannels
 from sosmith.model.dataflow.status import Flag
 from sosmith.model.errors import SpecificationError
 from sosmith.model.reload.registers import ADDRESS_BITS
@@ -36,17 +38,18 @@ def chain_item(design: ChainDesign) -> BoardItem:
     latency = face.latency_cycles + (CLOCKS if in_turn else 0)
     fingerprint = None if loaded is None else loaded.design.architecture.fingerprint
 
-    def component() -> ChainCore:
-        return ChainCore(
+    def component() -> Component:
+        core = ChainCore(
             design.name,
             first.inputs,
             last.output,
             channels=channels,
-            factor=factor,
+            factor=1 if in_turn else factor,
             registers="" if loaded is None else registers_port(loaded),
             address_bits=ADDRESS_BITS,
             lock=loaded is not None and bool(loaded.design.spec.hardware.reload_lock),
         )
+        return HeldChannels(core, factor, channels) if in_turn else core
 
     return BoardItem(
         name=design.name,

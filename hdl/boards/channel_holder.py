@@ -16,11 +16,14 @@ and the results leave in the order of the samples, whatever the order of their c
 
 from __future__ import annotations
 
-from amaranth.hdl import Cat, Module, Mux, Signal
+from typing import Any
+
+from amaranth.hdl import Cat, ClockDomain, ClockSignal, DomainRenamer, Module, Mux, ResetSignal, Signal
 from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
+from sosmith.hdl.bus.axi_lite import forward_slave
 from sosmith.hdl.memory_ports import read_port, write_port
 
 CLOCKS = 4
@@ -115,4 +118,64 @@ class ChannelHolder(wiring.Component):
                 ]
                 with m.If(self.m_ready):
                     m.next = "idle"
+        return m
+
+
+class HeldChannels(wiring.Component):
+    """A core, or a chain, that decimates several channels, with a result for each sample.
+
+    Latency and throughput: those of a `ChannelHolder`.
+
+    Parameters
+    ----------
+    core : Component
+        With the members of `sosmith.hdl.axi_stream.core_members`, and with ``s_axil_*`` or without.
+    copies, channels : int
+        Samples of a channel for each result, and channels; at least 2.
+
+    Members
+    -------
+    aclk, aresetn, s_axis_*, m_axis_*, s_axil_*
+        As those of the core.
+
+    Attributes
+    ----------
+    lock : bool
+        Whether the registers of the core have a lock.
+    """
+
+    def __init__(self, core: wiring.Component, copies: int, channels: int) -> None:
+        self.core, self.copies, self.channels = core, copies, channels
+        self.lock = bool(getattr(core, "lock", False))
+        super().__init__(dict(core.signature.members))
+
+    def elaborate(self, platform: object) -> Module:
+        """Put the holder on both sides of the core."""
+        m = Module()
+        core: Any = self.core
+        m.domains.held = ClockDomain(local=True)
+        m.d.comb += [ClockSignal("held").eq(self.aclk), ResetSignal("held").eq(~self.aresetn)]
+        result, word = Cat(core.m_axis_tdata, core.m_axis_tuser), Cat(self.m_axis_tdata, self.m_axis_tuser)
+        holder = ChannelHolder(len(word), self.copies, self.channels, len(self.s_axis_tdest))
+        m.submodules.holder = DomainRenamer("held")(holder)
+        m.submodules.core = core
+        forward_slave(m, self, core)
+        m.d.comb += [
+            core.aclk.eq(self.aclk),
+            core.aresetn.eq(self.aresetn),
+            core.s_axis_tdata.eq(self.s_axis_tdata),
+            core.s_axis_tdest.eq(self.s_axis_tdest),
+            core.s_axis_tvalid.eq(holder.o_valid),
+            holder.o_ready.eq(core.s_axis_tready),
+            holder.s_valid.eq(self.s_axis_tvalid),
+            holder.s_dest.eq(self.s_axis_tdest),
+            self.s_axis_tready.eq(holder.s_ready),
+            holder.i_data.eq(result),
+            holder.i_valid.eq(core.m_axis_tvalid),
+            core.m_axis_tready.eq(holder.i_ready),
+            word.eq(holder.m_data),
+            self.m_axis_tdest.eq(holder.m_dest),
+            self.m_axis_tvalid.eq(holder.m_valid),
+            holder.m_ready.eq(self.m_axis_tready),
+        ]
         return m
