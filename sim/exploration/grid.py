@@ -47,6 +47,9 @@ class Traces(Protocol):
 MAX_POINTS = 100_000
 """Combinations, at most."""
 
+_NAMING = ("data", "sos_file", "taps_file")
+"""Keys whose values are names of files beside the specification."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Task:
@@ -116,10 +119,26 @@ class Subject:
     traces: Traces
 
     @cached_property
-    def _measurements(self) -> str:
-        calibration = common_part(self.spec).calibration
-        data = None if calibration is None else calibration.data
-        return "" if data is None else hashlib.sha256(data.read_bytes()).hexdigest()
+    def _read(self) -> dict[str, str]:
+        """Digests of the files that have been looked at, by their names; that of one that is not there is empty."""
+        return {}
+
+    def _files(self, tree: Any) -> str:
+        """Return the digests of the files that a specification names, one after the other."""
+        if isinstance(tree, list):
+            return "".join(map(self._files, tree))
+        if not isinstance(tree, Mapping):
+            return ""
+        return "".join(
+            self._file(value) if key in _NAMING and isinstance(value, str) else self._files(value)
+            for key, value in tree.items()
+        )
+
+    def _file(self, name: str) -> str:
+        path = common_part(self.spec).path.parent / name
+        if name not in self._read:
+            self._read[name] = hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
+        return self._read[name]
 
     @cached_property
     def _stimuli(self) -> list[str]:
@@ -140,7 +159,7 @@ class Subject:
             self.samples,
             self.seed,
             self.board,
-            self._measurements,
+            self._files(tree),
             __version__,
             *self._stimuli,
         ]

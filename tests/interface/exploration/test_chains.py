@@ -15,7 +15,10 @@ from tests.gen.chain.chains import PLAIN, instrument
 import sosmith
 from sosmith import SpecificationError
 from sosmith.gen.chain.report.provenance import chain_cost
-from sosmith.sim.exploration.grid import changed
+from sosmith.gen.specification.exact_values import exact
+from sosmith.gen.specification.toml_text import toml_text
+from sosmith.instrument.scenarios.traces import ChosenTraces
+from sosmith.sim.exploration.grid import Subject, changed
 
 SWEEP: dict[str, list[Any]] = {
     "stage.double.architecture": ["folded"],
@@ -71,6 +74,19 @@ def test_the_front_and_what_is_refused(found: sosmith.Exploration) -> None:
 def test_what_is_on_record_is_not_done_again(found: sosmith.Exploration, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sosmith.sim.exploration.processes.evaluate", None)
     assert explored(found.folder).points == found.points
+
+
+def test_a_file_of_taps_that_changes_is_another_design(tmp_path: Path) -> None:
+    """And the same file is not: what a specification names is part of it, in each stage and each table."""
+    stages = [*PLAIN["stage"], {"name": "last", "kind": "fir", "taps_file": "taps.csv"}]
+    (tmp_path / "rx.toml").write_text(toml_text(exact(PLAIN | {"stage": stages})), encoding="utf-8")
+    keys = []
+    for taps in ("0.5", "0.5", "0.25"):
+        (tmp_path / "taps.csv").write_text(f"{taps}\n0.5\n0.125\n", encoding="utf-8")
+        spec = sosmith.ChainSpecification.load(tmp_path / "rx.toml").checked
+        subject = Subject(spec=spec, core=None, samples=10, seed=1, board=None, traces=ChosenTraces(None))
+        keys.append(subject.task({"output.bits": 12}).key)
+    assert keys[0] == keys[1] != keys[2]
 
 
 @pytest.mark.parametrize(
