@@ -246,8 +246,8 @@ class Chain(View):
     ) -> Build:
         """Make a bitstream for a board, with the chain behind the serial link, which gets a result for each sample.
 
-        Parameters and errors are those of `Design.build`; a chain must not decimate several channels, and have at most
-        one stage with `reload`.
+        Parameters and errors are those of `Design.build`; a chain must not interpolate, and have at most one stage with
+        `reload`.
         """
         from sosmith.gen.chain.board import chain_item
         from sosmith.gen.output.board_build import build_board
