@@ -305,21 +305,6 @@ def _calibration_hardware(
     raise ShortfallError(refused)
 
 
-def refuse_decimated_channels(design: CoreDesign, where: str) -> None:
-    """Refuse a core that decimates several channels `where` only others can be.
-
-    Raises
-    ------
-    SpecificationError
-        If it does.
-    """
-    channels = design.spec.channels
-    if design.datapath.samples_per_result > 1 and channels > 1:
-        raise SpecificationError(
-            f"{design.spec.path}: not yet available: channels must be 1 with filter.decimate {where}, not {channels}"
-        )
-
-
 def _known(wanted: str) -> str:
     if wanted not in {AUTO, *REALIZATIONS}:
         known = (AUTO, *REALIZATIONS)

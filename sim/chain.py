@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
-
-import numpy as np
-import numpy.typing as npt
 
 from sosmith.gen.chain.design import ChainDesign
 from sosmith.gen.chain.generate import generate_chain
-from sosmith.gen.chain.golden import golden_chain
-from sosmith.gen.chain.run import ChainRun
+from sosmith.gen.chain.report.run import ChainRun, run_of
 from sosmith.gen.chain.top import chain_interface
 from sosmith.gen.output.vectors import whole_beats
 from sosmith.model.arrays import Codes
@@ -73,15 +70,8 @@ def simulate_chain(
             bench, interface, sent, seed=seed, progress=lambda done, total: progress("co-simulating", done, total)
         )
     progress("comparing", 0, 0)
-    expected, status = design.compute_with_status(codes)
-    received: Codes = result.codes[:, :, 0]
-    differs: npt.NDArray[np.bool_] = (received != expected) | (result.status != status)
-    return ChainRun(
-        codes=codes,
-        received=received,
-        expected=expected,
-        mismatches=int(differs.sum()),
-        golden=golden_chain(design, codes),
+    return replace(
+        run_of(design, codes, result.codes[:, :, 0], result.status),
         cycles=result.cycles,
         simulator=result.simulator,
         tools=dict(result.tools),

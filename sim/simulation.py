@@ -157,10 +157,10 @@ def simulate(
 def _results_of(
     hardware: Hardware, source: Path, sent: Codes, interface: InterfaceFacts, progress: Progress
 ) -> CosimulationResult:
-    """Return the results of hardware, each of them once."""
+    """Return the results of hardware, which has one for each sample, each of them once."""
     text = source.read_text(encoding="utf-8")
     return first_copies(
-        hardware(text, sent, lambda done, total: progress("running", done, total)), interface.copies_per_result
+        hardware(text, sent, lambda done, total: progress("running", done, total)), interface.samples_per_result
     )
 
 

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 
+from amaranth.lib.wiring import Component
+
 from sosmith.gen.chain.design import ChainDesign, StageDesign
 from sosmith.gen.chain.top import chain_interface, registers_port, top_text
 from sosmith.gen.output.identity import BoardItem
 from sosmith.gen.output.verilog import core_verilog
 from sosmith.gen.reload.register_writes import bank_size
 from sosmith.hdl.boards.chain_core import ChainCore
+from sosmith.hdl.boards.channel_holder import CLOCKS, HeldChannels
 from sosmith.model.dataflow.status import Flag
 from sosmith.model.errors import SpecificationError
 from sosmith.model.reload.registers import ADDRESS_BITS
@@ -21,7 +24,7 @@ def chain_item(design: ChainDesign) -> BoardItem:
     Raises
     ------
     SpecificationError
-        If it interpolates, it decimates several channels, or more than one stage has registers.
+        If it interpolates, or more than one stage has registers.
     """
     spec, loaded = design.spec.base, _loaded(design)
     channels, factor = spec.channels, design.factor
@@ -29,25 +32,24 @@ def chain_item(design: ChainDesign) -> BoardItem:
         raise SpecificationError(
             f"{spec.path}: interpolate must be left out on a board, whose link returns one result for each sample"
         )
-    if factor > 1 and channels > 1:
-        raise SpecificationError(
-            f"{spec.path}: not yet available: channels must be 1 with stages that decimate on a board, not {channels}"
-        )
     first, last = design.stages[0].design.datapath, design.stages[-1].design.datapath
     face = chain_interface(design)
+    in_turn = factor > 1 and channels > 1
+    latency = face.latency_cycles + (CLOCKS if in_turn else 0)
     fingerprint = None if loaded is None else loaded.design.architecture.fingerprint
 
-    def component() -> ChainCore:
-        return ChainCore(
+    def component() -> Component:
+        core = ChainCore(
             design.name,
             first.inputs,
             last.output,
             channels=channels,
-            factor=factor,
+            factor=1 if in_turn else factor,
             registers="" if loaded is None else registers_port(loaded),
             address_bits=ADDRESS_BITS,
             lock=loaded is not None and bool(loaded.design.spec.hardware.reload_lock),
         )
+        return HeldChannels(core, factor, channels) if in_turn else core
 
     return BoardItem(
         name=design.name,
@@ -58,8 +60,8 @@ def chain_item(design: ChainDesign) -> BoardItem:
         output=last.output,
         flags=dict(face.outputs.flags),
         possible=_possible(design, loaded),
-        cycles_per_sample=_cycles(design),
-        latency_cycles=face.latency_cycles,
+        cycles_per_sample=latency if in_turn else _cycles(design),
+        latency_cycles=latency,
         fingerprint=fingerprint,
         words=0 if loaded is None else bank_size(loaded.design.architecture)[0],
         component=component,

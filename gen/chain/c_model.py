@@ -80,7 +80,7 @@ def _rising(design: ChainDesign) -> list[str]:
     given = ", ".join(f"{port.name}_code" for port in design.spec.base.inputs)
     names = [stage.spec.name for stage in design.stages]
     lines = [f"int64_t {', '.join(f'at_{name}[{count}]' for name, count in zip(names, most, strict=True))};"]
-    lines += [f"int {', '.join(f'count_{name} = 0' for name in names)}, total = 0, i, k;"]
+    lines += [f"int {', '.join(f'count_{name} = 0' for name in names)}, total = 0, i{', k' if later else ''};"]
     lines += [f"uint8_t first[{most[0]}], last[{most[-1]}], flags;"]
     lines += _appended(first, given, "first")
     lines += [f"for (i = 0; i < count_{names[0]}; i++) {{"]

@@ -94,6 +94,11 @@ class StageDesign:
         return Rate(len(self.cores), self.design.datapath.samples_per_result)
 
     @property
+    def clocks_per_sample(self) -> float:
+        """Clocks that each of its samples takes, on average, at the highest rate."""
+        return float(max(len(self.cores), *(core.architecture.clocks_per_sample for core in self.cores)))
+
+    @property
     def output(self) -> Port:
         """Format of its results."""
         return self.design.datapath.output
@@ -214,6 +219,12 @@ class ChainDesign:
     def excess(self) -> tuple[str, ...]:
         """Which limits the chain does not keep to, a phrase for each; nothing if it keeps to all, or has none."""
         return excess_of(self.spec.limits, self.foldings)
+
+    @property
+    def clocks_per_sample(self) -> float:
+        """Clocks that each sample of a channel takes, on average, at the highest rate: those of the slowest stage."""
+        rate = self.spec.base.sample_rate
+        return max(stage.clocks_per_sample * float(stage.spec.rate / rate) for stage in self.stages)
 
     @property
     def carried_flags(self) -> int:
@@ -389,7 +400,7 @@ class _Budget:
             If a phase of it has no tap.
         """
         ((taps, under),) = sections
-        if not stage.given_taps:
+        if not stage.keeps_taps:
             taps = tuple(tap * stage.rise for tap in taps)
         for phase in range(stage.rise):
             if not any(taps[phase :: stage.rise]):
@@ -429,7 +440,7 @@ class _Budget:
             output = self.last if is_last else self._port(stage, shares.steps[k], reach + carried + allowed)
             specs = [stage.ordinary(self.spec, inputs, output, allowed)]
             if stage.rise > 1:
-                taps = stage.given_taps or own[0].sections[0][0]
+                taps = (specs[0].filter.taps if stage.keeps_taps else None) or own[0].sections[0][0]
                 specs = [
                     stage.phase(self.spec, phase, taps[phase :: stage.rise], inputs, output, allowed)
                     for phase in range(stage.rise)

@@ -47,9 +47,8 @@ def _kept(design: ChainDesign, kept: Kept) -> Table:
 def _stages(design: ChainDesign) -> Table:
     rows = []
     for stage in design.stages:
-        architectures = [core.architecture for core in stage.cores]
         rise, factor = stage.rate
-        multipliers = sum(architecture.multiplier_blocks for architecture in architectures)
+        multipliers = sum(core.architecture.multiplier_blocks for core in stage.cores)
         rows.append(
             (
                 stage.spec.name,
@@ -57,7 +56,7 @@ def _stages(design: ChainDesign) -> Table:
                 + (f", decimates by {factor}" if factor > 1 else "")
                 + (f", interpolates by {rise}" if rise > 1 else ""),
                 f"{', '.join(dict.fromkeys(map(_hardware, stage.cores)))}, {count(multipliers, 'multiplier')}",
-                plain_number(float(max(rise, *(each.clocks_per_sample for each in architectures), 0))),
+                plain_number(stage.clocks_per_sample),
                 str(stage.output.bits),
             )
         )

@@ -11,6 +11,7 @@ import numpy as np
 
 from sosmith.gen.chain.design import ChainDesign
 from sosmith.gen.chain.generate import chain_texts
+from sosmith.gen.chain.rates import samples_of
 from sosmith.gen.chain.top import chain_interface, top_ports
 from sosmith.gen.output.packages.bench import SPARE, bench_texts
 from sosmith.gen.output.packages.fusesoc import core_file
@@ -19,7 +20,6 @@ from sosmith.gen.output.packages.vlnv import Vlnv
 from sosmith.gen.output.vectors import Vectors, hex_words
 from sosmith.gen.version import __version__
 from sosmith.model.arrays import Codes
-from sosmith.model.errors import SpecificationError
 from sosmith.model.templates import render
 from sosmith.model.text_files import write_files
 
@@ -42,7 +42,7 @@ def package_chain(
     Raises
     ------
     SpecificationError
-        If a stage interpolates, or the folder cannot be written.
+        If the folder cannot be written.
     ToolError
         If Yosys fails, or the disk is full.
     """
@@ -57,19 +57,15 @@ def packed_chain(
     design: ChainDesign, progress: Callable[[str], None] = lambda step: None, *, vlnv: Vlnv | None = None
 ) -> dict[str, str]:
     """Return the texts that `package_chain` writes, by their paths in the package."""
-    if design.rise > 1:
-        raise SpecificationError(
-            f"{design.spec.base.path}: not yet available: interpolate must be left out in a package, whose benches "
-            "take at most one result for each sample"
-        )
     named = vlnv or Vlnv.default(design.name)
     texts = chain_texts(design, progress)
     progress("bench")
-    modules = [*(stage.design.datapath.name for stage in design.stages), design.name]
+    modules = [*(core.datapath.name for stage in design.stages for core in stage.cores), design.name]
     period, pins = round(float(10**9 / design.spec.base.hardware.clock), 3), top_ports(design)
     unit = design.spec.base.output.unit
     description = (
         f"chain of {', '.join(stage.spec.kind for stage in design.stages)}"
+        + (f", interpolated by {design.rise}" if design.rise > 1 else "")
         + (f", decimated by {design.factor}" if design.factor > 1 else "")
         + f", error at most {float(design.bound):.6g} {unit}".rstrip()
     )
@@ -80,9 +76,12 @@ def packed_chain(
         description=description,
         version=__version__,
         vlnv=named,
-        stages=[(stage.spec.name, stage.design.datapath.name, stage.spec.kind) for stage in design.stages],
+        stages=[
+            (stage.spec.name, [core.datapath.name for core in stage.cores], stage.spec.kind) for stage in design.stages
+        ],
         pins=pins,
         factor=design.factor,
+        rise=design.rise,
         period=period,
         modules=modules,
     )
@@ -98,9 +97,10 @@ def packed_chain(
 def _bench(design: ChainDesign, modules: list[str]) -> dict[str, str]:
     interface, (codes, parts) = chain_interface(design), _stimuli(design)
     responses, status = design.compute_with_status(codes)
-    hex_in, hex_out = hex_words(Vectors(stimuli=codes, responses=responses, status=status), interface)
+    vectors, came = Vectors(stimuli=codes, responses=responses, status=status), samples_of(design.rates, len(status))
+    hex_in, hex_out = hex_words(vectors, interface, came)
     into, out = interface.inputs, interface.outputs
-    clocks = sum(max(2, stage.design.architecture.cycles_per_sample) for stage in design.stages)
+    clocks = sum(max(2, *(core.architecture.cycles_per_sample for core in stage.cores)) for stage in design.stages)
     values: dict[str, Any] = {
         "state": f"{design.name}_state",
         "pushes": True,
@@ -111,6 +111,7 @@ def _bench(design: ChainDesign, modules: list[str]) -> dict[str, str]:
         "lanes": 1,
         "line": 80,
         "factor": design.factor,
+        "rise": design.rise,
         "copies": 1,
         "dest": into.dest_width,
         "data_in": into.width,
@@ -121,7 +122,7 @@ def _bench(design: ChainDesign, modules: list[str]) -> dict[str, str]:
         "registers": [(pin, width, way == "output") for way, pin, width in top_ports(design) if "axil" in pin],
         "patience": interface.reset_cycles
         + interface.latency_cycles
-        + clocks * design.factor * design.spec.base.channels
+        + clocks * design.factor * design.rise * design.spec.base.channels
         + SPARE,
         "channels": design.spec.base.channels,
         "takes_channel": False,
@@ -137,7 +138,7 @@ def _stimuli(design: ChainDesign) -> tuple[Codes, tuple[str, ...]]:
     Channel k lags channel 0 by k samples.
     """
     base = design.spec.base
-    most = max(_MOST // base.channels, 8)
+    most = max(_MOST // (base.channels * max(design.rise // design.factor, 1)), 8)
     corners = list(product(*((port.lowest, port.highest) for port in base.inputs)))
     held = min(_HELD * design.factor, -(-most // (2 * len(corners))))
     ends = np.repeat(np.array(corners, dtype=np.int64), held, axis=0)

@@ -117,9 +117,9 @@ class StageSpec:
         return self.rate * self.rise
 
     @property
-    def given_taps(self) -> tuple[Fraction, ...]:
-        """Taps of the specification, if it has any; others, in a stage that interpolates, are times `rise`."""
-        return () if self.kind == "cic" else tuple(map(number, self.tables["filter"].get("taps", ())))
+    def keeps_taps(self) -> bool:
+        """Whether taps are given, or a file of them; others, in a stage that interpolates, are times `rise`."""
+        return self.kind != "cic" and not {"taps", "taps_file"}.isdisjoint(self.tables["filter"])
 
     @property
     def core(self) -> str:
@@ -155,6 +155,11 @@ class StageSpec:
         max_error: Fraction,
     ) -> Specification:
         """Return the filter of phase k of a stage that interpolates, by its taps; the rest is as for `ordinary`."""
+        if endless := [tap for tap in taps if not _is_decimal(tap)]:
+            raise SpecificationError(
+                f"{chain.base.path}: stage {self.name}: taps must be finite decimals, as those of each phase are "
+                f"written out, not {literal(endless[0])}"
+            )
         tables = {"filter": {"taps": [decimal(tap) for tap in taps]}}
         return self._alone(chain, tables, self.rate, f"{self.name}_p{k}", inputs, output, max_error)
 
@@ -350,16 +355,14 @@ def _checked(tree: dict[str, Any], path: Path, text: str | None) -> ChainSpec:
 
 
 def _check_rising(stage: StageSpec, k: int, alone: Specification) -> None:
-    """Check that a stage that interpolates has neither check bits nor registers: it is several cores."""
-    own = {"protect": (alone.hardware.protect, "none"), "reload": (alone.hardware.reload, False)}
-    for key, (value, wanted) in own.items():
-        if stage.rise > 1 and value != wanted:
-            raise UnfitError(
-                f"{literal(wanted)} in a stage that interpolates, which has a core for each result of a sample",
-                literal(value),
-                where=f"stage[{k}].{key}",
-                later=True,
-            )
+    """Check that a stage that interpolates has no registers: it is several cores."""
+    if stage.rise > 1 and alone.hardware.reload:
+        raise UnfitError(
+            f"{literal(False)} in a stage that interpolates, which has a core for each result of a sample",
+            literal(True),
+            where=f"stage[{k}].reload",
+            later=True,
+        )
 
 
 def _kind(stage: Mapping[str, Any], k: int) -> str:
@@ -400,13 +403,6 @@ def _stage(table: Mapping[str, Any], kind: str, k: int, rate: Fraction) -> Stage
             where=f"{where}.kind",
         )
     factor, rise = _factor(table, kind, where), _rise(table, where)
-    if rise > 1 and "taps_file" in table:
-        raise UnfitError(
-            "left out in a stage that interpolates, whose taps stand in the specification",
-            literal(table["taps_file"]),
-            where=f"{where}.taps_file",
-            later=True,
-        )
     return StageSpec(
         name=name,
         kind=kind,

@@ -8,7 +8,7 @@
 
 A sample is offered to each core until that has taken it, and is taken itself once all of them have. So the cores may
 work at different paces. Result k of a sample is that of core k: `turn` counts them. The data of a sample goes to all
-cores past this module.
+cores past this module. Where cores have check bits, a fault of one is a fault of all results from then on.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from sosmith.gen.chain.design import ChainDesign, StageDesign
 from sosmith.gen.chain.verilog_text import net, range_of, register
 from sosmith.gen.output.core_facts import StreamFacts, interface_facts
+from sosmith.model.dataflow.status import Flag
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,11 +34,14 @@ class TurnsUnit:
         Number of cores, at least 2.
     results : StreamFacts
         Stream of the results of each.
+    guarded : bool
+        Whether they have check bits: a fault of one is then one of all.
     """
 
     name: str
     phases: int
     results: StreamFacts
+    guarded: bool = False
 
     @property
     def payload(self) -> list[tuple[str, int]]:
@@ -108,11 +112,28 @@ class TurnsUnit:
             for k in reversed(range(1, last)):
                 yield from net(f"from{k}_{signal}", width, f"is{k} ? i{k}_{signal} : {value}")
                 value = f"from{k}_{signal}"
-            yield f"assign m_{signal} = is0 ? i0_{signal} : {value};"
+            value = f"is0 ? i0_{signal} : {value}"
+            if self.guarded and signal == "tuser":
+                yield from net("own", width, value)
+            else:
+                yield f"assign m_{signal} = {value};"
         yield from net("moves", 1, "m_tvalid & m_tready")
         yield from net("later", bits, f"turn + {bits}'h1")
         yield from net("next_turn", bits, f"is{last} ? {bits}'h0 : later")
         yield from register("turn", f"{bits}'h0", "moves", "next_turn")
+        if self.guarded:
+            yield from self._faults()
+
+    def _faults(self) -> Iterator[str]:
+        """Say whether the last result of any core had a fault: so has each result then, in all turns."""
+        any_of = f"own[{Flag.FAULT.value}]"
+        for k in range(self.phases):
+            yield f"reg fault{k} = 1'h0;"
+            yield from net(f"leaves{k}", 1, f"moves & is{k}")
+            yield from register(f"fault{k}", "1'h0", f"leaves{k}", f"i{k}_tuser[{Flag.FAULT.value}]")
+            yield from net(f"any{k}", 1, f"fault{k} | {any_of}")
+            any_of = f"any{k}"
+        yield f"assign m_tuser = own | {{1'h0, {any_of}, {Flag.FAULT.value}'h0}};"
 
 
 def turns_unit(design: ChainDesign, stage: StageDesign) -> TurnsUnit | None:
@@ -123,6 +144,7 @@ def turns_unit(design: ChainDesign, stage: StageDesign) -> TurnsUnit | None:
         name=f"{design.name}_{stage.spec.name}_turns",
         phases=len(stage.cores),
         results=interface_facts(stage.design).outputs,
+        guarded=stage.design.spec.hardware.protect != "none",
     )
 
 

@@ -11,12 +11,13 @@ from typing import Literal
 from amaranth.lib.wiring import Component
 from pydantic import ValidationError
 
-from sosmith.gen.core import CoreDesign, refuse_decimated_channels
+from sosmith.gen.core import CoreDesign
 from sosmith.gen.output.core_facts import interface_facts
 from sosmith.gen.output.verilog import core_verilog
 from sosmith.gen.reload.register_writes import bank_size
 from sosmith.gen.specification.specification import Specification
 from sosmith.gen.version import __version__
+from sosmith.hdl.boards.channel_holder import CLOCKS, HeldChannels
 from sosmith.model.dataflow.status import Flag
 from sosmith.model.errors import SpecificationError
 from sosmith.model.link.identity import CONVERTER_FLAGS, Identity, Quantity, Reload, first_fault
@@ -94,6 +95,14 @@ def core_item(design: CoreDesign) -> BoardItem:
     """
     _check(design)
     fingerprint = design.architecture.fingerprint
+    channels, factor = design.spec.channels, design.datapath.samples_per_result
+    in_turn = channels > 1 and factor > 1
+    latency = design.architecture.latency_cycles + (CLOCKS if in_turn else 0)
+
+    def component() -> Component:
+        core = design.architecture.component()
+        return HeldChannels(core, factor, channels) if in_turn else core
+
     return BoardItem(
         name=design.datapath.name,
         kind=design.core,
@@ -103,11 +112,11 @@ def core_item(design: CoreDesign) -> BoardItem:
         output=design.datapath.output,
         flags=dict(interface_facts(design).outputs.flags),
         possible=_possible(design),
-        cycles_per_sample=design.architecture.cycles_per_sample,
-        latency_cycles=design.architecture.latency_cycles,
+        cycles_per_sample=latency if in_turn else design.architecture.cycles_per_sample,
+        latency_cycles=latency,
         fingerprint=fingerprint,
         words=0 if fingerprint is None else bank_size(design.architecture)[0],
-        component=design.architecture.component,
+        component=component,
         make_verilog=lambda: core_verilog(design),
     )
 
@@ -216,15 +225,17 @@ def _possible(design: CoreDesign) -> tuple[int, ...]:
 
 def _check(design: CoreDesign) -> None:
     """Check that a core takes one sample at a time, and has a result for each."""
-    refuse_decimated_channels(design, "on a board")
     lanes, factor = design.architecture.samples_per_clock, design.datapath.samples_per_result
     if lanes > 1:
         raise SpecificationError(
             f"{design.spec.path}: hardware.samples_per_clock must be 1 on a board, whose serial line never brings "
             f"several samples a clock, not {lanes}"
         )
-    if factor > 1 and not design.architecture.hold:
+    several = design.spec.channels > 1
+    if factor > 1 and design.architecture.hold is several:
+        beside = " and several channels" if several else ""
+        why = "keeps the last result of each" if several else "returns a result for each sample"
         raise SpecificationError(
-            f"{design.spec.path}: filter.hold must be true with filter.decimate = {factor} on a board, which "
-            "returns a result for each sample, not false"
+            f"{design.spec.path}: filter.hold must be {str(not several).lower()} with filter.decimate = {factor}"
+            f"{beside} on a board, which {why}, not {str(several).lower()}"
         )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -64,27 +65,39 @@ def whole_beats(codes: Codes, stream: StreamFacts) -> Codes:
     return np.concatenate([codes, np.repeat(codes[-1:], filling, axis=0)]) if filling else codes
 
 
-def hex_words(vectors: Vectors, interface: InterfaceFacts) -> tuple[str, str]:
+def hex_words(
+    vectors: Vectors, interface: InterfaceFacts, came: npt.NDArray[np.int64] | None = None
+) -> tuple[str, str]:
     """Return stimuli and responses as two texts for ``$readmemh``, one transfer a line.
 
-    The channels take turns. A line has ``tdest``, ``tuser`` and ``tdata``, as far as the stream has them, with
-    underscores between them. Several samples of a beat share a line; their number must be a multiple of that.
+    The channels take turns, with all the results that a sample brings: `came` has, for each result of a channel, the
+    number of the sample that it comes with; without it, none brings several. A line has ``tdest``, ``tuser`` and
+    ``tdata``, as far as the stream has them, with underscores between them. Several samples of a beat share a line;
+    their number must be a multiple of that.
     """
-    channels = vectors.stimuli.shape[1]
+    samples, channels, _ = vectors.stimuli.shape
+    numbers, channel = np.divmod(np.arange(vectors.responses.size), channels)
+    order = np.lexsort((numbers, channel, numbers if came is None else came[numbers]))
     sent = words(vectors.stimuli.reshape(-1, len(interface.inputs.fields)), interface.inputs)
-    expected = words(vectors.responses.reshape(-1, 1), interface.outputs)
-    status = vectors.status.reshape(-1)
+    expected = words(vectors.responses.reshape(-1, 1), interface.outputs)[order]
+    status = vectors.status.reshape(-1)[order]
+    turns = np.tile(np.arange(channels), samples)
     return (
-        _lines(interface.inputs, channels, [(interface.inputs.sample_width, sent)]),
-        _lines(interface.outputs, channels, [(STATUS_BITS, status), (interface.outputs.sample_width, expected)]),
+        _lines(interface.inputs, turns, [(interface.inputs.sample_width, sent)]),
+        _lines(
+            interface.outputs,
+            channel[order],
+            [(STATUS_BITS, status), (interface.outputs.sample_width, expected)],
+        ),
     )
 
 
-def _lines(stream: StreamFacts, channels: int, columns: list[tuple[int, npt.NDArray[np.generic]]]) -> str:
+def _lines(
+    stream: StreamFacts, dest: npt.NDArray[np.int64], columns: Sequence[tuple[int, npt.NDArray[np.generic]]]
+) -> str:
     """Rows of hexadecimal numbers of so many bits, with the channel first where there is one."""
     texts = [_joined(column, width, stream.lanes) for width, column in columns]
     if stream.dest_width:
-        dest = np.tile(np.arange(channels), len(texts[0]) // channels)
         texts.insert(0, _joined(dest, stream.dest_width, 1))
     return "".join("_".join(row) + "\n" for row in zip(*texts, strict=True))
 

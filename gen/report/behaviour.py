@@ -1,4 +1,4 @@
-"""What a run says about the core as an instrument: error against the true value, delay, settling time."""
+"""What a run says about the core as an instrument: error against the true value, delay, settling time, aliases."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from sosmith.gen.filter.decimation import decimated_step
-from sosmith.gen.filter.response import FilterFacts, group_delay, passbands
+from sosmith.gen.filter.response import FilterFacts, group_delay, magnitude_db, measurement_grid, passbands
 from sosmith.gen.filter.step_response import SETTLED, StepResponse, step_response
+from sosmith.gen.output.core_facts import CoreFacts
 from sosmith.gen.output.decimation_facts import DecimationFacts
 from sosmith.gen.report.evidence import Evidence
 from sosmith.gen.report.run import Mask
@@ -118,6 +119,29 @@ def behaviour_entry(measured: Behaviour) -> dict[str, Any]:
             "overshoot_percent": None if step.overshoot is None else 100 * step.overshoot,
         },
     }
+
+
+def aliases_entry(facts: CoreFacts) -> dict[str, float | None] | None:
+    """Return the exact filter's largest gains of aliases, in dB: of all, and in the pass band; None if it has none.
+
+    Those of a CIC decimator with its filter are proven, those of an FIR filter that decimates are measured.
+    """
+    if facts.decimation is not None:
+        passing = max(band.passing_db for band in facts.decimation.aliasing)
+        return {"anywhere_db": facts.decimation.largest_db, "passband_db": passing}
+    if facts.downsampling is None or facts.filter is None:
+        return None
+    return _measured_aliases(facts.filter, facts.downsampling.sample_rate)
+
+
+def _measured_aliases(facts: FilterFacts, rate: float) -> dict[str, float | None]:
+    grid = measurement_grid(facts)
+    above = grid[grid >= rate / 2]
+    gain = magnitude_db(facts.ideal_sos, above, facts.sample_rate)
+    lands = np.abs(above - rate * np.round(above / rate))
+    bands = passbands(facts)
+    inside = gain[lands <= bands[0][1]] if facts.kind == "lowpass" and bands else gain[:0]
+    return {"anywhere_db": float(gain.max()), "passband_db": float(inside.max()) if inside.size else None}
 
 
 def _step(facts: FilterFacts, lsb: float, span: float, before: DecimationFacts | None) -> StepResponse | None:

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sosmith.gen.filter.response import FilterFacts
-from sosmith.gen.report.evidence import Evidence
+from sosmith.gen.report.run import Instants
 
 Array = npt.NDArray[np.float64]
 
@@ -26,8 +26,15 @@ _DIGITS = 6
 """Significant digits of a drawn value."""
 
 
-def error_over_time(evidence: Evidence) -> dict[str, Any]:
+def error_over_time(error: Array, instants: Array | Instants) -> dict[str, Any]:
     """Smallest and largest error in each stretch of time, over all channels.
+
+    Parameters
+    ----------
+    error : ndarray, shape (n,) or (n, channels)
+        Hardware minus exact calculation, in the output's unit.
+    instants : ndarray or Instants, shape (n,)
+        Instants of the results in s, rising.
 
     Returns
     -------
@@ -35,18 +42,25 @@ def error_over_time(evidence: Evidence) -> dict[str, Any]:
         ``time``: where each stretch starts, in s; ``low`` and ``high``: its smallest and largest hardware minus exact
         calculation, in the output's unit. All lists have one length, at most `STRETCHES`.
     """
-    error = evidence.run.error.reshape(len(evidence.run), -1)
+    error = error.reshape(len(error), -1)
     edges = np.linspace(0, len(error), min(STRETCHES, len(error)) + 1).astype(int)
     stretches = [error[start:stop] for start, stop in itertools.pairwise(edges)]
     return {
-        "time": _rounded(evidence.run.instants[edges[:-1]]),
+        "time": _rounded(instants[edges[:-1]]),
         "low": _rounded(np.array([part.min() for part in stretches])),
         "high": _rounded(np.array([part.max() for part in stretches])),
     }
 
 
-def error_spectrum(evidence: Evidence) -> dict[str, Any] | None:
-    """Amplitude density of the error of the channel with the largest one, by Welch's method.
+def error_spectrum(error: Array, instants: Array | Instants) -> dict[str, Any] | None:
+    """Amplitude density of the error of one channel, by Welch's method.
+
+    Parameters
+    ----------
+    error : ndarray, shape (n,)
+        Hardware minus exact calculation, in the output's unit.
+    instants : ndarray or Instants, shape (n,)
+        Instants of the results in s, in even steps.
 
     Returns
     -------
@@ -54,10 +68,9 @@ def error_spectrum(evidence: Evidence) -> dict[str, Any] | None:
         ``frequency`` in Hz, without zero; ``density`` in the output's unit per square root of Hz. None for fewer than
         32 samples.
     """
-    error = evidence.shown.run.error
     if len(error) < 32:
         return None
-    rate = (len(error) - 1) / (evidence.run.at(-1) - evidence.run.at(0))
+    rate = (len(error) - 1) / float(instants[len(error) - 1] - instants[0])
     frequency, power = _spectrum(error, rate)
     return {"frequency": _rounded(frequency[1:]), "density": _rounded(np.sqrt(power[1:]))}
 

@@ -58,27 +58,46 @@ def provenance_of(design: CoreDesign, traces: Sequence[Trace], netlist: Netlist 
         specification_sha256=hashlib.sha256(design.spec.text.encode()).hexdigest(),
         reference_sha256=reference_digest(design),
         trace_sha256=trace_digest(traces),
-        datapath_sha256=hashlib.sha256(c_source(replace(design.datapath, name="datapath")).encode()).hexdigest(),
+        datapath_sha256=hashlib.sha256(datapath_text(design).encode()).hexdigest(),
         cycles_per_sample=design.architecture.clocks_per_sample,
         cost=hardware_cost(design, netlist),
     )
 
 
+def datapath_text(design: CoreDesign) -> str:
+    """Return the arithmetic of a core as its C model, whatever its name."""
+    return c_source(replace(design.datapath, name="datapath"))
+
+
 def reference_digest(design: CoreDesign) -> str:
     """Digest of the exact calculation that the hardware is held against, without how the hardware is built."""
-    quantized, output = design.quantized, design.datapath.output
-    polynomial = quantized.polynomial
+    return reference_of_stages([(design,)])
+
+
+def reference_of_stages(stages: Sequence[Sequence[CoreDesign]]) -> str:
+    """Return the same digest of stages in series; of one that interpolates there are the cores of all its results.
+
+    It does not tell stages from a single core that computes the same: a calibration, and then one filter.
+    """
+    first, last = stages[0][0], stages[-1][0]
+    polynomial, output = first.quantized.polynomial, last.datapath.output
+    filters = [[_filter(core) for core in cores] for cores in stages if cores[0].quantized.filter is not None]
+    alone = len(filters) < 2 and all(len(cores) == 1 for cores in filters)
     return _digest(
         {
-            "inputs": [_port(port) for port in design.datapath.inputs],
+            "inputs": [_port(port) for port in first.datapath.inputs],
             "polynomial": None if polynomial is None else [[str(a) for a in row] for row in polynomial.coefficients],
-            "sections": [] if quantized.filter is None else quantized.filter.sos.tolist(),
             "range": [str(output.zero + output.lsb * code) for code in (output.lowest, output.highest + 1)],
             "unit": output.unit,
-            "channels": design.spec.channels,
-            **_decimation(design),
+            "channels": first.spec.channels,
+            **({"sections": []} if not filters else filters[0][0] if alone else {"stages": filters}),
         }
     )
+
+
+def _filter(design: CoreDesign) -> dict[str, Any]:
+    assert design.quantized.filter is not None
+    return {"sections": design.quantized.filter.sos.tolist(), **_decimation(design)}
 
 
 def _decimation(design: CoreDesign) -> dict[str, Any]:
@@ -126,10 +145,7 @@ def hardware_cost(design: CoreDesign, netlist: Netlist | None = None) -> dict[st
             "accumulator_bits": sum(each.accumulator_bits for each in programs),
         }
     if netlist is not None:
-        board = netlist.board
-        cost["luts"] = board.device.luts(netlist.cells)
-        cost["multiplier_blocks"] = netlist.cells.get(board.device.multiplier or "", 0)
-        return {"source": "synthesis", "board": board.name, "device": board.device.title, **cost}
+        return cost | counted(netlist)
     estimate = estimated(design.architecture, find_board(USUAL[0]))
     assert estimate is not None
     cost |= {
@@ -140,6 +156,19 @@ def hardware_cost(design: CoreDesign, netlist: Netlist | None = None) -> dict[st
         "within": estimate.tested.nine_in_ten,
     }
     return {"source": "estimate", "board": None, "device": estimate.device, **cost}
+
+
+def counted(netlist: Netlist) -> dict[str, Any]:
+    """Return what is known of a cost after synthesis, by the keys of `hardware_cost`; of the rest nothing is."""
+    board = netlist.board
+    return {
+        "source": "synthesis",
+        "board": board.name,
+        "device": board.device.title,
+        "luts": board.device.luts(netlist.cells),
+        "multiplier_blocks": netlist.cells.get(board.device.multiplier or "", 0),
+        **dict.fromkeys(("register_bits", "memory_bits", "within")),
+    }
 
 
 def _port(port: Port) -> list[Any]:

@@ -12,7 +12,7 @@ from sosmith.gen.filter.response import ResponseMeasures, measure_response
 from sosmith.gen.output.core_facts import CoreFacts
 from sosmith.gen.output.manifest import limit_cycle_entry
 from sosmith.gen.quantity import quantity
-from sosmith.gen.report.behaviour import behaviour, behaviour_entry, readings_of
+from sosmith.gen.report.behaviour import aliases_entry, behaviour, behaviour_entry, readings_of
 from sosmith.gen.report.curves import error_over_time, error_spectrum, filter_curve
 from sosmith.gen.report.evidence import Evidence
 from sosmith.gen.report.headlines import headlines
@@ -89,6 +89,7 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
         ``error.{max_lsb,mean,proven,parts}``, ``first_mismatch``, ``latency_cycles``, ``cycles_per_sample`` (of
         this run, waiting included), ``start_up.{samples,seconds,limit}`` (None unless the filter starts from zero;
         ``accuracy_percent`` and ``true_error`` leave these samples out, unless the trace marks its readings),
+        ``aliases.{anywhere_db,passband_db}`` (see `sosmith.gen.report.behaviour.aliases_entry`),
         ``uncertainty`` (the budget of a reading in the terms of the GUM, at the point where it is largest; None if
         nothing is known of what the calibration is worth), ``decimation`` (factor, stages, delay, and what folds into
         the pass band; None without a decimator), ``alternatives``, ``limit_cycles``, ``tools``,
@@ -139,6 +140,7 @@ def summarise(evidence: Evidence) -> dict[str, Any]:
         "sqnr_db": sqnr_db(run.golden, run.error),
         "sound": sound_entry(evidence, statistics),
         "frequency_response": _response_summary(measures),
+        "aliases": aliases_entry(facts),
         "decimation": None if facts.lower_rate is None else facts.lower_rate.entries,
         "accuracy_percent": _accuracy(evidence),
         "uncertainty": evidence.uncertainty,
@@ -180,8 +182,8 @@ def _error(facts: CoreFacts, statistics: ErrorStatistics) -> dict[str, Any]:
 def _curves(evidence: Evidence) -> dict[str, Any]:
     """Curves that pages of comparisons draw."""
     return {
-        "error": error_over_time(evidence),
-        "spectrum": error_spectrum(evidence),
+        "error": error_over_time(evidence.run.error, evidence.run.instants),
+        "spectrum": error_spectrum(evidence.shown.run.error, evidence.run.instants),
         "filter": filter_curve(evidence.facts.filter),
     }
 

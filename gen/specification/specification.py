@@ -281,9 +281,9 @@ def from_tree(tree: dict[str, Any], path: Path) -> Specification:
     try:
         if STAGE in tree:
             raise UnfitError(
-                "left out here, as only board, build, design, generate, package, reload, simulate and verify take a "
-                "chain: `sosmith generate` writes a specification of each stage beside the chain's files, for what "
-                "takes a single core",
+                "left out here, as only board, build, design, explore, generate, package, reload, simulate and "
+                "verify take a chain: `sosmith generate` writes a specification of each stage beside the chain's "
+                "files, for what takes a single core",
                 literal(tree[STAGE]),
                 where=STAGE,
                 later=True,

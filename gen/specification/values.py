@@ -22,7 +22,9 @@ IDENTIFIER = f"a Verilog identifier of at most {MAX_NAME} letters, digits and un
 MAX_SHOWN = 12
 """Most errors that are shown beside the first one."""
 
-MAX_DIGITS = 50
+MAX_DIGITS = 130
+"""Enough for any double whose magnitude is allowed, written out."""
+
 MAX_EXPONENT = 30
 """Magnitudes are zero or from 1e-30 to below 1e30: `Fraction` would store ``1e999999999`` in full."""
 

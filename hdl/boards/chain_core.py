@@ -8,7 +8,8 @@
 
 A chain gives a result with the first sample and then with every R-th, and none of them waits for a later sample. So
 sample n has copy ``n % R`` of the result that sample ``n - n % R`` has brought, and a link that feeds one sample at a
-time never waits for ever: docs/protocol.md, "A result for each sample".
+time never waits for ever: docs/protocol.md, "A result for each sample". Several channels that are decimated have their
+holder around this: `sosmith.hdl.boards.channel_holder`.
 
 Latency: that of the chain, and a clock of the holder.
 """
@@ -39,9 +40,9 @@ class ChainCore(wiring.Component):
     output : Port
         The field of a result.
     channels : int
-        Number of channels; 1 for a chain that decimates.
+        Number of channels.
     factor : int
-        Samples for each result of the chain, 1 for one that does not decimate.
+        Times that each result leaves; 1 for a chain that does not decimate, or has several channels.
     registers : str
         Prefix of the ports of the one stage with registers, such as ``"s_axil_low"``; "" for none.
     address_bits : int

@@ -71,15 +71,17 @@ class IntegerCore(_NoRegisters):
 
 
 class HeldCore(_NoRegisters):
-    """A datapath with a decimator and one channel, each of whose results is handed out once for each of its samples.
+    """A datapath with a decimator, each of whose results is handed out once for each of its samples.
 
-    Result n is copy ``n % R`` of the result that sample ``n - n % R`` has brought, and so is there as soon as sample n
-    is in. It has no registers.
+    Result n of a channel is copy ``n % R`` of the result that its sample ``n - n % R`` has brought, and so is there as
+    soon as sample n is in. It has no registers.
 
     Parameters
     ----------
     datapath : Datapath
         What it computes.
+    channels : int
+        Number of channels.
 
     Raises
     ------
@@ -87,19 +89,21 @@ class HeldCore(_NoRegisters):
         If no C compiler is found.
     """
 
-    def __init__(self, datapath: Datapath) -> None:
+    def __init__(self, datapath: Datapath, channels: int = 1) -> None:
         self._datapath = datapath
-        self._push = Pushed(datapath)
-        self._held = (0, 0)
+        self._push = [Pushed(datapath) for _ in range(channels)]
+        self._held = [(0, 0)] * channels
 
     def reset(self) -> None:
         """Return to the state after reset."""
-        self._push.reset()
+        for push in self._push:
+            push.reset()
 
     def feed(self, channel: int, samples: bytes) -> bytes:
-        """Return a result for each of the samples."""
+        """Return a result for each sample, the first of `channel` and the others of those that follow in turn."""
         rows = []
-        for codes in codes_of(samples, self._datapath.inputs):
-            self._held = self._push(codes) or self._held
-            rows.append(self._held)
+        for n, codes in enumerate(codes_of(samples, self._datapath.inputs), channel):
+            own = n % len(self._push)
+            self._held[own] = self._push[own](codes) or self._held[own]
+            rows.append(self._held[own])
         return bytes_of(np.array(rows, dtype=np.int64).reshape(-1, 2), [self._datapath.output.bytes, 1])

@@ -8,9 +8,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from sosmith.gen.core import CoreDesign, design_core
+from sosmith.gen.chain.design import ChainDesign
+from sosmith.gen.chain.report.report import write_chain_report
+from sosmith.gen.core import CoreDesign
 from sosmith.gen.report.report import write_report
-from sosmith.sim.exploration.evaluation import traces_of
+from sosmith.model.arrays import side_by_side
+from sosmith.sim.chain import simulate_chain
+from sosmith.sim.exploration.evaluation import designed, traces_of
 from sosmith.sim.exploration.run import Outcome
 from sosmith.sim.simulation import simulate
 
@@ -48,8 +52,14 @@ def confirmed(
             passed[point["key"]] = bool(json.loads(kept.read_text(encoding="utf-8"))["passed"])
             continue
         task = tasks[point["key"]]
-        design = design_core(task.specification(), core=task.core)
-        traces, budget = traces_of(design, task), uncertainty(design)
+        design = designed(task)
+        traces = traces_of(design, task)
+        if isinstance(design, ChainDesign):
+            codes = side_by_side([trace.codes for trace in traces])
+            run = simulate_chain(design, codes, place, simulator=simulator, seed=task.seed)
+            passed[point["key"]] = bool(write_chain_report(design, run, traces, place)["passed"])
+            continue
+        budget = uncertainty(design)
         evidence = simulate(design, traces, place, simulator=simulator, seed=task.seed, uncertainty=budget)
         passed[point["key"]] = bool(write_report(evidence, place)["passed"])
     progress("co-simulating the front", len(front), len(front))

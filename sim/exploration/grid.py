@@ -12,11 +12,13 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Protocol, cast
 
+from sosmith.gen.chain.specification import ChainSpec, chain_from_tree, is_chain
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.specification.exact_values import exact
-from sosmith.gen.specification.specification import Specification, from_tree
+from sosmith.gen.specification.specification import STAGE, Specification, from_tree
 from sosmith.gen.version import __version__
 from sosmith.model.errors import ShortfallError, SpecificationError
+from sosmith.model.suggestion import did_you_mean
 from sosmith.model.traces.trace import Trace
 from sosmith.sim.exploration.parameters import Parameters, Span
 
@@ -44,6 +46,9 @@ class Traces(Protocol):
 
 MAX_POINTS = 100_000
 """Combinations, at most."""
+
+_NAMING = ("data", "sos_file", "taps_file")
+"""Keys whose values are names of files beside the specification."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,7 +87,7 @@ class Task:
     board: str | None
     traces: Traces
 
-    def specification(self) -> Specification:
+    def specification(self) -> Specification | ChainSpec:
         """Check the specification.
 
         Raises
@@ -90,7 +95,8 @@ class Task:
         SpecificationError
             If its values do not go together.
         """
-        return from_tree(exact(self.tree), self.path)
+        tree = exact(self.tree)
+        return chain_from_tree(tree, self.path) if is_chain(tree) else from_tree(tree, self.path)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,13 +105,13 @@ class Subject:
 
     Attributes
     ----------
-    spec : Specification
+    spec : Specification or ChainSpec
         The specification that tasks change.
     core, samples, seed, board, traces
         As in `Task`.
     """
 
-    spec: Specification
+    spec: Specification | ChainSpec
     core: str | None
     samples: int
     seed: int
@@ -113,10 +119,26 @@ class Subject:
     traces: Traces
 
     @cached_property
-    def _measurements(self) -> str:
-        calibration = self.spec.calibration
-        data = None if calibration is None else calibration.data
-        return "" if data is None else hashlib.sha256(data.read_bytes()).hexdigest()
+    def _read(self) -> dict[str, str]:
+        """Digests of the files that have been looked at, by their names; that of one that is not there is empty."""
+        return {}
+
+    def _files(self, tree: Any) -> str:
+        """Return the digests of the files that a specification names, one after the other."""
+        if isinstance(tree, list):
+            return "".join(map(self._files, tree))
+        if not isinstance(tree, Mapping):
+            return ""
+        return "".join(
+            self._file(value) if key in _NAMING and isinstance(value, str) else self._files(value)
+            for key, value in tree.items()
+        )
+
+    def _file(self, name: str) -> str:
+        path = common_part(self.spec).path.parent / name
+        if name not in self._read:
+            self._read[name] = hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
+        return self._read[name]
 
     @cached_property
     def _stimuli(self) -> list[str]:
@@ -137,7 +159,7 @@ class Subject:
             self.samples,
             self.seed,
             self.board,
-            self._measurements,
+            self._files(tree),
             __version__,
             *self._stimuli,
         ]
@@ -145,13 +167,18 @@ class Subject:
             key=hashlib.sha256(json.dumps(determined_by, sort_keys=True).encode()).hexdigest(),
             changes=changes,
             tree=tree,
-            path=self.spec.path,
+            path=common_part(self.spec).path,
             core=self.core,
             samples=self.samples,
             seed=self.seed,
             board=self.board,
             traces=self.traces,
         )
+
+
+def common_part(spec: Specification | ChainSpec) -> Specification:
+    """Return the specification itself; of a chain, what is common to its stages, with the calibration if it has one."""
+    return spec.base if isinstance(spec, ChainSpec) else spec
 
 
 def tasks_of(subject: Subject, parameters: Parameters) -> list[Task]:
@@ -208,7 +235,7 @@ def check_samples(tasks: Sequence[Task]) -> None:
         filtered = json.dumps({key: value for key, value in task.tree.items() if key != "hardware"}, sort_keys=True)
         if filtered not in least:
             try:
-                least[filtered] = task.traces.least(task.specification(), task.core)
+                least[filtered] = task.traces.least(common_part(task.specification()), task.core)
             except (SpecificationError, ShortfallError):
                 return  # it is for the evaluation to tell
         if least[filtered] <= task.samples:
@@ -224,18 +251,34 @@ def check_samples(tasks: Sequence[Task]) -> None:
 def changed(source: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
     """Copy a specification in the types of JSON, with other values of some keys, given with dots.
 
+    Those of a stage of a chain begin with ``stage.NAME``.
+
     Raises
     ------
     SpecificationError
-        If a key is inside of something that is no table.
+        If a key is inside of something that is no table, or of a stage that there is not.
     """
     tree = deepcopy(dict(source))
     for key, value in changes.items():
         *tables, last = key.split(".")
         place: Any = tree
+        if tables[:1] == [STAGE] and is_chain(tree):
+            place, tables = _stage(tree[STAGE], key), tables[2:]
         for name in tables:
             place = place.setdefault(name, {})
             if not isinstance(place, dict):
                 raise SpecificationError(f"a parameter must be a key of the specification, not {key}")
         place[last] = value
     return tree
+
+
+def _stage(stages: Sequence[dict[str, Any]], key: str) -> dict[str, Any]:
+    """Return the table of the stage that a key is of."""
+    names = [str(stage["name"]) for stage in stages]
+    _, name, *keys = key.split(".")
+    if name not in names or not keys:
+        raise SpecificationError(
+            f"a parameter of a stage must be stage.NAME.KEY with one of the names {', '.join(names)}, not {key}"
+            f"{'' if name in names else did_you_mean(name, names)}"
+        )
+    return stages[names.index(name)]

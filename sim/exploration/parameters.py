@@ -12,6 +12,7 @@ from typing import Any
 
 from sosmith.gen.architectures.blocks import NO_LIMIT
 from sosmith.gen.architectures.registry import candidates
+from sosmith.gen.chain.specification import ChainSpec
 from sosmith.gen.realizations.registry import realizations_for
 from sosmith.gen.specification.choices import AUTO
 from sosmith.gen.specification.combinations import asked_by
@@ -39,19 +40,26 @@ Values = Sequence[Any] | Span
 Parameters = Mapping[str, Values]
 
 
-def default_parameters(spec: Specification) -> dict[str, Values]:
+def default_parameters(spec: Specification | ChainSpec) -> dict[str, Values]:
     """Return what is swept if nothing is asked for: realizations, architectures, word lengths by the allowed error.
 
-    Look-ahead has realizations of its own, and like several samples a clock one architecture.
+    Look-ahead has realizations of its own, and like several samples a clock one architecture. The stages of a chain
+    choose their own.
     """
-    allowed, looks_ahead = spec.max_error, spec.hardware.pipeline == "look-ahead"
+    if isinstance(spec, ChainSpec):
+        return {"output.max_error": _errors(spec.base)}
+    looks_ahead = spec.hardware.pipeline == "look-ahead"
     parameters: dict[str, Values] = {}
     if not looks_ahead:
         parameters["hardware.realization"] = list(realizations_for(fir=spec.filter.is_fir))
         fastest_first = [kind.terms.name for kind in reversed(candidates(AUTO, NO_LIMIT, asked_by(spec)))]
         if len(fastest_first) > 1:
             parameters["hardware.architecture"] = fastest_first
-    return {**parameters, "output.max_error": [float(allowed * factor) for factor in (1, 2, 4)]}
+    return {**parameters, "output.max_error": _errors(spec)}
+
+
+def _errors(spec: Specification) -> list[float]:
+    return [float(spec.max_error * factor) for factor in (1, 2, 4)]
 
 
 def in_json(parameters: Parameters) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from sosmith.gen.chain.specification import ChainSpec
 from sosmith.gen.specification.specification import Specification
 from sosmith.sim.exploration.evaluation import Point
 from sosmith.sim.exploration.front import pareto_front
@@ -118,7 +119,7 @@ def _at(point: Mapping[str, Any], column: str) -> Any:
 
 
 def explore(
-    spec: Specification,
+    spec: Specification | ChainSpec,
     parameters: Parameters,
     folder: Path,
     runner: Runner,
@@ -135,7 +136,7 @@ def explore(
 
     Parameters
     ----------
-    spec : Specification
+    spec : Specification or ChainSpec
         The specification.
     parameters : mapping of str to sequence
         Keys with dots, and their values in the types of JSON.

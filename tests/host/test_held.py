@@ -9,13 +9,14 @@ from tests.commands.invocation import Invocation
 from tests.gen.output.packages.made import design_of
 from tests.host.ports import plugged
 
+import sosmith
 from sosmith.gen.output.generate import generated
 from sosmith.host.board import Board
 from sosmith.host.model_line import ModelLine, model_of
 from sosmith.host.port_run import run_on
 from sosmith.instrument.scenarios.traces import traces_for
 from sosmith.model.arrays import Codes
-from sosmith.model.errors import ShortfallError
+from sosmith.model.errors import ShortfallError, SpecificationError
 from sosmith.model.traces.trace_file import write_traces
 from sosmith.sim.cosimulate import CosimulationResult, first_copies
 from sosmith.sim.simulation import simulate
@@ -100,3 +101,41 @@ def test_commands_have_a_row_for_each_sample(tmp_path: Path) -> None:
     rows = out.read_text(encoding="utf-8").splitlines()
     place = rows[0].split(",").index("y_code")
     assert [int(row.split(",")[place]) for row in rows[1:]] == expected.tolist()
+
+
+THREE = design_of("held").specification.as_dict() | {"channels": 3, "hardware": {"clock": 12e6}}
+FILTERS = {
+    "cic": {key: value for key, value in THREE["filter"].items() if key != "hold"},
+    "fir": {"taps": [0.25, 0.5, 0.25], "decimate": FACTOR},
+}
+
+
+@pytest.mark.parametrize("name", FILTERS)
+def test_each_sample_of_several_channels_has_the_result_of_its_own(name: str) -> None:
+    made = sosmith.design(THREE | {"filter": FILTERS[name]})
+    codes = np.random.default_rng(3).integers(-512, 512, (50, 3, 1))
+    results, status = made.core.datapath.compute_with_status(codes)
+    last = np.arange(len(codes)) // FACTOR
+    with made.board() as board:
+        found = [board.run_codes(part) for part in np.split(codes, [1, 3, 30])]
+    assert np.array_equal(np.concatenate([each.codes for each in found]), results[last])
+    assert np.array_equal(np.concatenate([each.status for each in found]), status[last])
+
+
+def test_a_board_with_several_channels_repeats_results_itself() -> None:
+    with pytest.raises(SpecificationError) as refused:
+        sosmith.design(THREE).board()
+    assert str(refused.value) == (
+        "specification: filter.hold must be false with filter.decimate = 4 and several channels on a board, which "
+        "keeps the last result of each, not true"
+    )
+
+
+@pytest.mark.slow
+def test_the_suite_takes_each_result_of_several_channels_once(tmp_path: Path) -> None:
+    made = sosmith.design(THREE | {"filter": FILTERS["cic"]})
+    traces = traces_for(made.core, "sweep", seed=1, seconds=0.202)
+    device = model_of(made.core, generated(made.core)["held.sv"])
+    with Board.on(ModelLine(device)) as board:
+        evidence = simulate(made.core, traces, tmp_path, hardware=partial(run_on, board))
+    assert (evidence.run.mismatches, evidence.run.samples, evidence.simulator) == (0, 3 * 51, "board")

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from tests.gen.chain import rising
-from tests.gen.chain.chains import PLAIN, draw, stimulus
+from tests.gen.chain.chains import PLAIN, draw, instrument, stimulus
 from tests.gen.chain.rising import SHAPES
 
 import sosmith
@@ -91,22 +92,6 @@ def test_a_calibration_before_a_filter(tmp_path: Path) -> None:
     assert np.array_equal(report.run.received[:, 0], results)
 
 
-def instrument() -> dict[str, Any]:
-    return {
-        "name": "gauge",
-        "sample_rate": 100.0,
-        "input": {
-            "voltage": {"bits": 10, "range": [0.0, 10.0]},
-            "temperature": {"bits": 10, "range": [0.0, 128.0]},
-        },
-        "stage": [
-            {"name": "cal", "kind": "polynomial", "coefficients": [[1.16, -0.0036], [0.3672, 0.0006618], [0.05812]]},
-            {"name": "low", "kind": "fir", "taps": [0.25, 0.5, 0.25], "decimate": 2},
-        ],
-        "output": {"bits": 12, "range": [0.0, 16.0], "unit": "mm"},
-    }
-
-
 @pytest.mark.slow
 def test_a_fault_of_an_early_stage_reaches_every_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A stage whose flags say so from one of its results on: so do those of the chain from the same sample on."""
@@ -132,6 +117,42 @@ def test_a_fault_of_an_early_stage_reaches_every_result(tmp_path: Path, monkeypa
     wrong = int((between[::2] >> bit & 1).sum())
     assert 0 < wrong < len(between) // 2
     assert wrong <= report.summary["mismatches"] <= wrong + 2  # a result on its way may already say so
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("protect", "core"), [("detect", 0), ("detect", 1), ("correct", 0)])
+def test_a_wrong_bit_in_a_core_of_several(
+    protect: str, core: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A state changes in mid-stream: from a sample on all results have the flag, or it is corrected."""
+    whole, compared, seen = simulation.whole_text, simulation.run_of, dict[str, Any]()
+
+    def upset(design: Any, directory: Path) -> str:
+        text = whole(design, directory)
+        start = text.index(f"module rx_fill_p{core}_word_memory(")
+        memory = re.compile(r"reg \[\d+:0\] words0 \[7:0\];").search(text, start)
+        assert memory is not None
+        change = "always @(posedge clk) begin clocks = clocks + 1; if (clocks == 9000) words0[0] = words0[0] ^ 1; end"
+        return f"{text[: memory.end()]} integer clocks = 0; {change}{text[memory.end() :]}"
+
+    def run_of(design: Any, codes: Any, received: Any, status: Any) -> Any:
+        seen["wrong"] = (design.compute_with_status(codes)[1] ^ status) >> 6
+        return compared(design, codes, received, status)
+
+    monkeypatch.setattr(simulation, "whole_text", upset)
+    monkeypatch.setattr(simulation, "run_of", run_of)
+    stages = [rising.UP["stage"][0] | {"protect": protect}, *rising.UP["stage"][1:]]
+    chain = sosmith.design_chain(rising.UP | {"stage": stages})
+    codes = rising.stimulus(chain, 200, 1)
+    (port,) = chain.core.spec.base.inputs
+    report = chain.simulate({"x": port.decode(codes)}, folder=tmp_path, simulator="icarus")
+    first = int(seen["wrong"][:, 0].argmax())
+    if protect == "correct":
+        assert report.passed
+    else:
+        assert 800 < first < 1590
+        assert seen["wrong"][first:].all()
+        assert report.summary["mismatches"] == 1600 - first
 
 
 @pytest.mark.slow

@@ -103,7 +103,9 @@ def _several(chain: ChainCertificate, groups: Groups, flags: FlagsClaim | None) 
     """Yield the statements of a chain with stages that interpolate, whose results lie in arrays."""
     names, most = [entry.name for entry in chain.stages], _most(groups)
     yield "int64_t " + ", ".join(f"at_{name}[{count}]" for name, count in zip(names, most, strict=True)) + ";"
-    yield "int " + "".join(f"count_{name} = 0, " for name in names) + "total = 0, i, k;"
+    yield (
+        "int " + "".join(f"count_{name} = 0, " for name in names) + f"total = 0, i{', k' if flags is not None else ''};"
+    )
     yield f"uint8_t first[{most[0]}], last[{most[-1]}], flags;"
     inputs = ", ".join(f"{port.name}_code" for port in chain.inputs)
     yield from _put(chain.stages[0], groups[0], inputs, "first")

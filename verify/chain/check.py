@@ -146,7 +146,7 @@ def judge_chain(
         except UndecidedError as error:
             raise RejectedError(f"{error} could not be decided") from None
         if text is not None:
-            check_words(chain, text, groups)
+            check_words(chain, text, groups, spec_folder)
         files = sum(len(stage.files) for stage in stages.values())
         if with_files:
             progress("files", 0, 0)
@@ -254,15 +254,15 @@ def _check_core(
 
 
 def _check_beside(entry: ChainStageEntry, items: Sequence[ItemEntry]) -> None:
-    """Check that cores of one stage have the same streams, and neither check bits nor registers."""
+    """Check that cores of one stage have the same streams and check bits, and no registers."""
     if len(items) == 1:
         return
     what = f"the cores of stage {entry.name}"
     require(entry.kind in _RISING, f"{what} must be one for the kind {entry.kind}, not {len(items)}")
     for item in items:
-        for part in ("taken", "given", "flags", "calibrated"):
+        for part in ("taken", "given", "flags", "calibrated", "protect"):
             require(getattr(item, part) == getattr(items[0], part), f"{what} must have the same {part}")
-        require(not item.reload and item.protect == "none", f"{what} must be without reload and protect")
+        require(not item.reload, f"{what} must be without reload")
 
 
 def _flags(chain: ChainCertificate, groups: Groups, items: Sequence[Sequence[ItemEntry]]) -> FlagsClaim | None:

@@ -114,7 +114,12 @@ def _check_in_turn(
     stage: Stage, own: Sequence[Mapping[str, str]], nets: Mapping[str, str], modules: Mapping[str, Module]
 ) -> None:
     """Check the cores of a stage that interpolates: all get the sample, and its handshake from what joins them."""
-    claim = TurnsClaim(name=stage.joining, cores=len(stage.cores), results=stage.item.given)
+    claim = TurnsClaim(
+        name=stage.joining,
+        cores=len(stage.cores),
+        results=stage.item.given,
+        guarded=stage.item.protect != "none",
+    )
     for k, (core, ports) in enumerate(zip(stage.cores, own, strict=False)):
         each = f"stage_{stage.name}_p{k}"
         inner = {port: f"{each}_{port.removeprefix('m_axis_')}" for port in nets if port.startswith("m_axis_")}

@@ -12,14 +12,18 @@ from sosmith.verify.certificate_file import StreamEntry
 from sosmith.verify.chain.written import check_written
 from sosmith.verify.reader.syntax import Module
 
+_FAULT = 6
+"""Bit of the flag of a fault."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class TurnsClaim:
-    """What the module must be made of: its name, the number of cores, and the stream of their results."""
+    """What the module must be made of: its name, how many cores, their results, and whether they have check bits."""
 
     name: str
     cores: int
     results: StreamEntry
+    guarded: bool = False
 
     @property
     def signals(self) -> dict[str, int]:
@@ -81,12 +85,30 @@ def _text(claim: TurnsClaim) -> str:
             own = f"from{k}_{signal}"
             text += [f"wire {_sized(own, width)};", f"assign {own} = is{k} ? i{k}_{signal} : {rest};"]
             rest = own
-        text += [f"assign m_{signal} = is0 ? i0_{signal} : {rest};"]
+        target = "m_" + signal
+        if claim.guarded and signal == "tuser":
+            target = "own"
+            text += [f"wire {_sized(target, width)};"]
+        text += [f"assign {target} = is0 ? i0_{signal} : {rest};"]
     text += ["wire moves;", "assign moves = m_tvalid & m_tready;"]
     text += [f"wire {_sized('later', bits)};", f"assign later = turn + {bits}'h1;"]
     text += [f"wire {_sized('next_turn', bits)};", f"assign next_turn = is{count - 1} ? {bits}'h0 : later;"]
     text += [f"always_ff @(posedge aclk) if (reset) turn <= {bits}'h0; else if (moves) turn <= next_turn;"]
+    if claim.guarded:
+        text += _faults(count)
     return "\n".join([*text, "endmodule", ""])
+
+
+def _faults(count: int) -> list[str]:
+    """Return what gives a result a fault: its own, or that of the last result of any of the cores."""
+    text = []
+    for k in range(count):
+        rest = f"any{k - 1}" if k else f"own[{_FAULT}]"
+        text += [f"reg fault{k} = 1'h0;", f"wire leaves{k};", f"assign leaves{k} = moves & is{k};"]
+        loads = f"else if (leaves{k}) fault{k} <= i{k}_tuser[{_FAULT}];"
+        text += [f"always_ff @(posedge aclk) if (reset) fault{k} <= 1'h0; {loads}"]
+        text += [f"wire any{k};", f"assign any{k} = fault{k} | {rest};"]
+    return [*text, f"assign m_tuser = own | {{1'h0, any{count - 1}, {_FAULT}'h0}};"]
 
 
 def _sized(name: str, width: int) -> str:

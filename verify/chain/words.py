@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
 from sosmith.verify.certificate_file import Certificate
@@ -17,6 +18,7 @@ from sosmith.verify.chain.responses import taps_in_turn
 from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.specified.filter_table import read_filter_table
 from sosmith.verify.specified.fir_mask import keeps_to_losses
+from sosmith.verify.specified.sections_file import taps_in
 from sosmith.verify.specified.stated_specification import CALIBRATED, stated_number, stated_port
 from sosmith.verify.specified.words import with_fractions, words_of
 from sosmith.verify.verdict.generated_files import about_of
@@ -36,8 +38,8 @@ Groups = Sequence[tuple[Certificate, ...]]
 """The certificates of each stage's cores."""
 
 
-def check_words(chain: ChainCertificate, text: str, groups: Groups) -> None:
-    """Check that a chain and its stages are those that a specification describes.
+def check_words(chain: ChainCertificate, text: str, groups: Groups, folder: Path) -> None:
+    """Check that a chain and its stages are those that a specification in a folder describes.
 
     Raises
     ------
@@ -50,12 +52,12 @@ def check_words(chain: ChainCertificate, text: str, groups: Groups) -> None:
             check_chosen(asked, own)
         else:
             require(text == chain.specification, "the specification must have the text in the certificate of the chain")
-        _check(chain, own, groups)
+        _check(chain, own, groups, folder)
     except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
         raise RejectedError(f"the specification must be valid and complete, not: {error!r}") from None
 
 
-def _check(chain: ChainCertificate, tree: Mapping[str, Any], groups: Groups) -> None:
+def _check(chain: ChainCertificate, tree: Mapping[str, Any], groups: Groups, folder: Path) -> None:
     stages = tree["stage"]
     kinds = [stage["kind"] for stage in stages]
     _same("the name", chain.name, tree["name"])
@@ -78,7 +80,7 @@ def _check(chain: ChainCertificate, tree: Mapping[str, Any], groups: Groups) -> 
             _check_core(chain, tree, stage, core, rate)
         table = "calibration" if stage["kind"] == "polynomial" else "filter"
         if rise > 1:
-            _check_taps(stage, cores, rate * rise)
+            _check_taps(stage, cores, rate * rise, folder)
         else:
             own = words_of(about_of(cores[0]).specification)
             wanted = with_fractions(_table(stage, rate))
@@ -109,7 +111,7 @@ def _check_core(
     require(not others, f"the specification of {what} must be without {', '.join(others)}")
 
 
-def _check_taps(stage: Mapping[str, Any], cores: Sequence[Certificate], rate: Fraction) -> None:
+def _check_taps(stage: Mapping[str, Any], cores: Sequence[Certificate], rate: Fraction, folder: Path) -> None:
     """Check the taps of a stage that interpolates, of which core k has every L-th, from tap k on.
 
     Those that are given are as they are, and others times L, so that the gain in the pass band is about 1.
@@ -117,11 +119,13 @@ def _check_taps(stage: Mapping[str, Any], cores: Sequence[Certificate], rate: Fr
     what, rise = f"stage {stage['name']}", len(cores)
     tables = [words_of(about_of(core).specification)["filter"] for core in cores]
     require(all(list(table) == ["taps"] for table in tables), f"the filters of {what} must have their taps alone")
-    if stage["kind"] == "cic" or "taps" in stage:
+    if stage["kind"] == "cic" or "taps" in stage or "taps_file" in stage:
         if stage["kind"] == "cic":
             wanted = [tap * rise for tap in _moving_sums(rise, stage["order"])]
-        else:
+        elif "taps" in stage:
             wanted = [stated_number(tap) for tap in stage["taps"]]
+        else:
+            wanted = list(taps_in(folder / stage["taps_file"]))
         for k, table in enumerate(tables):
             own = [stated_number(tap) for tap in table["taps"]]
             _same(f"the taps of {what}, phase {k},", own, wanted[k::rise])

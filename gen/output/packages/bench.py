@@ -45,6 +45,7 @@ def bench_files(design: CoreDesign, facts: PackageFacts) -> dict[str, str]:
         "lanes": lanes,
         "line": max(into.width, out.width + out.user_width) // 4 + 8,
         "factor": None if lower_rate is None else lower_rate.factor,
+        "rise": 1,
         "copies": interface.copies_per_result,
         "width_in": into.sample_width,
         "width_out": out.sample_width,

@@ -92,15 +92,21 @@ def _specification(reports: Sequence[Report]) -> list[Difference]:
 
 
 def flat_keys(tree: Mapping[str, Any], depth: int = _DEPTH) -> dict[str, str]:
-    """Keys with dots, and their values as text."""
+    """Keys with dots, and their values as text; of a list of tables that have names, each by its own."""
     flat: dict[str, str] = {}
-    for name, value in tree.items():
-        key = json.dumps(name)[1:-1]
+    for name, given in tree.items():
+        key, value = json.dumps(name)[1:-1], given
+        if _are_named(given):
+            value = {table["name"]: {k: v for k, v in table.items() if k != "name"} for table in given}
         if isinstance(value, Mapping) and depth > 1:
             flat |= {f"{key}.{inner}": text for inner, text in flat_keys(value, depth - 1).items()}
         else:
             flat[key] = _text(value)
     return flat
+
+
+def _are_named(value: Any) -> bool:
+    return isinstance(value, list) and all(isinstance(t, Mapping) and isinstance(t.get("name"), str) for t in value)
 
 
 def _facts(reports: Sequence[Report], group: str, titles: Mapping[str, str]) -> list[Difference]:

@@ -18,6 +18,7 @@ TITLES = {
     "run": "What ran",
     "accuracy": "Accuracy on this trace",
     "bounds": "Bounds over all inputs in range",
+    "filter": "The filter",
     "clocks": "Clocks",
     "cost": "Cost",
     "simulation": "Speed of the simulation",

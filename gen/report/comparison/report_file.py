@@ -44,6 +44,15 @@ _KNOWN: dict[str, tuple[type, ...]] = {
     "seed": (int,),
     "gates": (str, type(None)),
     "latency_cycles": (int,),
+    "error.parts": (dict,),
+    "delay": (dict, type(None)),
+    "delay.seconds": _NUMBER,
+    "frequency_response": (dict,),
+    "frequency_response.passband_loss_db": _OPTIONAL,
+    "frequency_response.stopband_attenuation_db": _OPTIONAL,
+    "aliases": (dict, type(None)),
+    "aliases.anywhere_db": _OPTIONAL,
+    "aliases.passband_db": _OPTIONAL,
     "true_error": (dict, type(None)),
     "true_error.max_abs": _NUMBER,
     "true_error.rms": _NUMBER,
@@ -90,8 +99,6 @@ def load_report(path: Path) -> dict[str, Any]:
     content = read_json(file, what="a report.json, or a folder that holds one,", parse_constant=_refuse_constant)
     if content is None:
         raise SpecificationError(f"{file} must be a report.json of sosmith, not text that is no JSON")
-    if isinstance(content, dict) and content.get("core") == "chain":
-        raise SpecificationError(f"{file} must be the report of a single core, not that of a chain of stages")
     problem = _problem(content)
     if problem:
         raise SpecificationError(f"{file} must be a report.json of sosmith, not JSON {problem}")
@@ -124,6 +131,10 @@ def _problem(content: Any) -> str:
         problem = _wrong(content, keys, types, required=False)
         if problem:
             return problem
+    for name in fact(content, "error.parts") or {}:
+        problem = _wrong(content["error"]["parts"], name, _NUMBER, required=True)
+        if problem or not name.isprintable():
+            return f"with {shortened(name)} in error.parts"
     for name, version in (fact(content, "tools") or {}).items():
         if not isinstance(version, str) or not (name + version).isprintable():
             return f"with {shortened(version)} as tools.{shortened(name)}"

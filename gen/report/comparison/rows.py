@@ -19,7 +19,7 @@ class Row:
     Attributes
     ----------
     group : str
-        "run", "accuracy", "bounds", "clocks", "cost" or "simulation".
+        "run", "accuracy", "bounds", "filter", "clocks", "cost" or "simulation".
     key : str
         Its name in `report.json`, with dots.
     title : str
@@ -97,6 +97,11 @@ FIGURES = (
     Figure("accuracy", "accuracy_percent.golden", "accuracy, exact calculation", _percent),
     Figure("accuracy", "accuracy_percent.unfiltered", "accuracy without the filter", _percent),
     Figure("bounds", "error.bound", "error limit", quantity, min),
+    Figure("filter", "delay.seconds", "group delay", lambda value, _: quantity(value, "s")),
+    Figure("filter", "frequency_response.passband_loss_db", "loss in the pass band", _level),
+    Figure("filter", "frequency_response.stopband_attenuation_db", "attenuation in the stop band", _level),
+    Figure("filter", "aliases.anywhere_db", "largest gain of aliases and images", _level),
+    Figure("filter", "aliases.passband_db", "largest gain of these in the pass band", _level),
     Figure("clocks", "provenance.cycles_per_sample", "clock cycles per sample", _count, min),
     Figure("clocks", "latency_cycles", "latency in clock cycles", _count, min),
     Figure("cost", "provenance.cost.source", "origin of the cost", _text),
@@ -125,8 +130,15 @@ def compare(reports: Sequence[Report]) -> list[Row]:
         raise ValueError(f"reports must hold at least two reports, not {len(reports)}")
     fair = fairness(reports)
     reasons = {"accuracy": fair.accuracy, "bounds": fair.bounds, "clocks": fair.clocks, "cost": fair.cost}
-    rows = {figure: _row(reports, figure, fair=not reasons.get(figure.group)) for figure in FIGURES}
+    figures = [one for figure in FIGURES for one in (figure, *(_parts(reports) if figure.key == "error.bound" else ()))]
+    rows = {figure: _row(reports, figure, fair=not reasons.get(figure.group)) for figure in figures}
     return [row for figure, row in rows.items() if row.group in _ALWAYS or _is_known(row, by_all=figure.by_all)]
+
+
+def _parts(reports: Sequence[Report]) -> list[Figure]:
+    """Return what the bounds are sums of: parts of a core, stages of a chain."""
+    names = dict.fromkeys(name for report in reports for name in fact(report, "error.parts") or {})
+    return [Figure("bounds", f"error.parts.{name}", f"of it, {name}", quantity) for name in names]
 
 
 def _is_known(row: Row, *, by_all: bool) -> bool:

@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from sosmith.commands.chain import refuse
 from sosmith.commands.options import CORE, SEED, SPEC, OneOf, completed_by, print_tables
 from sosmith.interface.choices import SIMULATORS, SYNTHESIZED, board_named
 from sosmith.model.errors import SpecificationError
@@ -21,9 +22,9 @@ from sosmith.terminal import JSON_OPTION, note, print_json, reader_may_leave, sh
     "parameters",
     multiple=True,
     metavar="KEY=V1,V2...",
-    help="Values of a key of the specification, such as hardware.realization=df1,delta, or for --search a range, "
-    "such as filter.cutoff=0.1..1.6; several make a grid.  [default: all realizations, parallel and folded, at 1, 2 "
-    "and 4 times the allowed error]",
+    help="Values of a key of the specification, such as hardware.realization=df1,delta or stage.NAME.order=3,4, or "
+    "for --search a range, such as filter.cutoff=0.1..1.6; several make a grid.  [default: all realizations, parallel "
+    "and folded, at 1, 2 and 4 times the allowed error; of a chain of stages, these errors]",
 )
 @click.option(
     "--search",
@@ -92,11 +93,14 @@ def explore_command(
         sosmith explore my.toml
         sosmith explore my.toml -p hardware.realization=df1,df1_ef2,delta -p output.bits=12,14,16
         sosmith explore my.toml -p filter.order=3..8 -p output.max_error=1e-4..1e-2 --search 200
+        sosmith explore my_chain.toml -p stage.cic.order=3,4,5 -p output.max_error=1e-4,2e-4
         sosmith explore my.toml --scheduler tcp://10.0.0.1:8786
     """
-    from sosmith.interface.specification import Specification
+    from sosmith.interface.chain.specification import ChainSpecification, specification_in
 
-    asked = Specification.load(spec)
+    asked = specification_in(spec)
+    if isinstance(asked, ChainSpecification):
+        refuse(core=core)
     folder = output or Path("build") / f"{asked.name}-exploration"
     try:
         with show_progress(remaining=True) as step:

@@ -39,5 +39,5 @@ def model_of(design: CoreDesign, verilog: str = "", *, window: int = 4, baud: in
     """Return the model of a board with a core, whose SystemVerilog is `verilog`."""
     own_identity = identity(design, verilog, baud=baud, clock=float(design.spec.hardware.clock))
     decimates = design.datapath.samples_per_result > 1
-    core = HeldCore(design.datapath) if decimates else IntegerCore(design.datapath, design.spec.channels)
+    core = (HeldCore if decimates else IntegerCore)(design.datapath, design.spec.channels)
     return Device(own_identity, core, window=window)

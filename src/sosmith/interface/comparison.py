@@ -18,12 +18,13 @@ from sosmith.gen.report.comparison.report_file import load_report
 from sosmith.gen.report.comparison.rows import Row, column_names
 from sosmith.gen.report.comparison.rows import compare as compare_reports
 from sosmith.gen.report.comparison.summary import comparison_json
+from sosmith.interface.chain.report import ChainReport
 from sosmith.interface.report import Report
 from sosmith.model.errors import SpecificationError
 
 __all__ = ["Comparison", "Difference", "Judgement", "compare"]
 
-Source = Report | Mapping[str, Any] | str | PathLike[str]
+Source = Report | ChainReport | Mapping[str, Any] | str | PathLike[str]
 
 
 @dataclass(frozen=True)
@@ -92,10 +93,10 @@ def compare(reports: Sequence[Source], *, baseline: Source | None = None, tolera
 
     Parameters
     ----------
-    reports : sequence of Report, path or mapping
-        At least two, or one beside a baseline: the result of `Design.simulate`, a ``report.json``, its folder, or its
-        content.
-    baseline : Report, path or mapping
+    reports : sequence of Report, ChainReport, path or mapping
+        At least two, or one beside a baseline: the result of `Design.simulate` or `Chain.simulate`, a
+        ``report.json``, its folder, or its content.
+    baseline : Report, ChainReport, path or mapping
         Report that none of the others may be worse than; see `Comparison.passed`.
     tolerance : str
         How much worse a figure may be, such as ``"error=5%,cycles=0,lut=2%"``: a share of the baseline's value, or an
@@ -131,7 +132,7 @@ def compare(reports: Sequence[Source], *, baseline: Source | None = None, tolera
 
 
 def _content(report: Source) -> Mapping[str, Any]:
-    if isinstance(report, Report):
+    if isinstance(report, Report | ChainReport):
         return report.summary
     if isinstance(report, Mapping):
         return report

@@ -9,12 +9,14 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from sosmith.gen.chain.specification import is_chain
 from sosmith.gen.facts.table import Table, View
 from sosmith.gen.fpga.boards import SYNTHESIZED, find_board
 from sosmith.gen.quantity import number, quantity
 from sosmith.gen.specification.exact_values import exact
 from sosmith.interface.certificate import Progress
-from sosmith.interface.specification import Specification, specification_of
+from sosmith.interface.chain.specification import ChainSpecification, specification_in
+from sosmith.interface.specification import Specification
 from sosmith.model.errors import SpecificationError, ToolError
 from sosmith.model.text_files import to_json, write_contents, write_files
 
@@ -109,7 +111,8 @@ class Exploration(View):
             for point in self.front
             if point["cost"]["unit"] == unit
         ]
-        head = ("realization", "architecture", *(key.rpartition(".")[2] for key in keys), "bound", "cost", "clocks")
+        named = [key.removeprefix("stage.") if key.startswith("stage.") else key.rpartition(".")[2] for key in keys]
+        head = ("realization", "architecture", *named, "bound", "cost", "clocks")
         return Table(f"{self.outcome.name}: the front, cost in {unit}", rows, head)
 
     @property
@@ -133,7 +136,7 @@ class Exploration(View):
 
 
 def explore(
-    specification: Specification | str | PathLike[str] | Mapping[str, Any],
+    specification: Specification | ChainSpecification | str | PathLike[str] | Mapping[str, Any],
     parameters: Mapping[str, Sequence[Any]] | None = None,
     *,
     search: int | None = None,
@@ -156,19 +159,20 @@ def explore(
 
     Parameters
     ----------
-    specification : Specification, path or mapping
-        The specification; a path or a mapping is passed to `Specification.load`.
+    specification : Specification, ChainSpecification, path or mapping
+        The specification of a core or of a chain of stages; a path or a mapping is loaded first.
     parameters : mapping of str to sequence
-        Keys of the specification with dots, such as "hardware.realization", and the values of each; for a search also
-        a range as text, such as "0.1..1.6". By default all realizations, parallel and folded, at one, two and four
-        times the allowed error.
+        Keys of the specification with dots, such as "hardware.realization" or "stage.NAME.order", and the values of
+        each; for a search also a range as text, such as "0.1..1.6". By default all realizations, parallel and folded,
+        at one, two and four times the allowed error; of a chain, only these errors.
     search : int
         Number of designs to make; which ones, an optimizer decides by the results so far (TPE of the package
         optuna). By default all combinations are made.
     folder : path
         Folder of the results, ``build/<name>-exploration`` by default.
     core : str
-        The part to design, "instrument", "filter" or "calibration"; by default everything in the specification.
+        The part to design, "instrument", "filter" or "calibration"; by default everything in the specification. A chain
+        has none.
     board : str
         Name of a board: the cost is counted after synthesis for its FPGA, which takes seconds for each design, once.
         By default it is estimated for the parallel architecture, and the length of the program for the others.
@@ -207,6 +211,7 @@ def explore(
     from sosmith.instrument.scenarios.traces import ChosenTraces
     from sosmith.instrument.uncertainty.instrument_budget import budget_in_json
     from sosmith.sim.exploration.confirmation import confirmed
+    from sosmith.sim.exploration.grid import common_part
     from sosmith.sim.exploration.parameters import default_parameters
     from sosmith.sim.exploration.processes import in_processes, processors
     from sosmith.sim.exploration.run import explore as run
@@ -216,11 +221,14 @@ def explore(
             raise SpecificationError(f"{name} must be at least 1, not {count}")
     if jobs is not None and scheduler is not None:
         raise SpecificationError("jobs must come without a scheduler, whose workers do the designs, not with one")
-    asked = specification_of(specification).checked
+    asked = _asked(specification).checked
+    common = common_part(asked)
+    if core is not None and common is not asked:
+        raise SpecificationError(f"core must be left out with a chain of stages, not {core}")
     swept = default_parameters(asked) if parameters is None else _plain(parameters)
     place = Path("build") / f"{asked.name}-exploration" if folder is None else Path(fspath(folder))
     traces = ChosenTraces(None if trace is None else fspath(trace))
-    traces.check(asked, core)
+    traces.check(common, core)
     if scheduler is None:
         runner = partial(in_processes, jobs=jobs or processors())
     else:
@@ -251,6 +259,17 @@ def explore(
     }
     write_files(place, files)
     return exploration
+
+
+def _asked(
+    source: Specification | ChainSpecification | str | PathLike[str] | Mapping[str, Any],
+) -> Specification | ChainSpecification:
+    """Return a specification itself, or load it."""
+    if isinstance(source, Specification | ChainSpecification):
+        return source
+    if isinstance(source, Mapping):
+        return ChainSpecification.load(source) if is_chain(source) else Specification.load(source)
+    return specification_in(source)
 
 
 def _arrow() -> tuple[Any, Any]:

@@ -43,6 +43,23 @@ GUARDED: dict[str, Any] = {
 KINDS = ("gain", "fir", "cic", "halfband", "iir", "decimated iir")
 
 
+def instrument() -> dict[str, Any]:
+    """Return a calibration of two inputs before an FIR filter that decimates."""
+    return {
+        "name": "gauge",
+        "sample_rate": 100.0,
+        "input": {
+            "voltage": {"bits": 10, "range": [0.0, 10.0]},
+            "temperature": {"bits": 10, "range": [0.0, 128.0]},
+        },
+        "stage": [
+            {"name": "cal", "kind": "polynomial", "coefficients": [[1.16, -0.0036], [0.3672, 0.0006618], [0.05812]]},
+            {"name": "low", "kind": "fir", "taps": [0.25, 0.5, 0.25], "decimate": 2},
+        ],
+        "output": {"bits": 12, "range": [0.0, 16.0], "unit": "mm"},
+    }
+
+
 def draw(seed: int) -> dict[str, Any]:
     """Draw a specification of 2 to 4 stages; six seeds in a row begin with all kinds."""
     rng = random.Random(f"chain {seed}")

@@ -36,6 +36,10 @@ def draw(seed: int) -> dict[str, Any]:
         stage = _stage(rng, what, rate)
         stages.append({"name": f"s{k}", **stage})
         rate = rate * stage.get("interpolate", 1) / stage.get("decimate", 1)
+    options = random.Random(f"hardware of rising chain {seed}")
+    for stage in stages:
+        if "decimate" not in stage:
+            stage.update(options.choice([{}, {}, {"protect": "detect"}, {"protect": "correct"}]))
     bits, low = rng.randint(6, 16), rng.choice([0.0, -1.0])
     return {
         "name": f"rising{seed}",

@@ -18,7 +18,7 @@ from sosmith.gen.chain.generate import chain_texts
 from sosmith.gen.chain.top import chain_interface, top_text
 from sosmith.gen.fpga import bitstream
 from sosmith.gen.output.board_top import board_verilog
-from sosmith.gen.output.identity import identity
+from sosmith.gen.output.identity import BoardItem, identity
 from sosmith.gen.output.vectors import whole_beats
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.model.errors import SpecificationError
@@ -72,15 +72,6 @@ def test_a_board_reaches_the_registers_of_one_stage(guarded: sosmith.Chain) -> N
     )
 
 
-def test_several_channels_that_are_decimated_are_refused(guarded: sosmith.Chain) -> None:
-    spec = replace(guarded.core.spec, base=replace(guarded.core.spec.base, channels=2))
-    with pytest.raises(SpecificationError) as refused:
-        chain_item(replace(guarded.core, spec=spec))
-    assert str(refused.value) == (
-        "specification: not yet available: channels must be 1 with stages that decimate on a board, not 2"
-    )
-
-
 def test_the_cores_go_into_the_fpga_as_they_are_generated(chain: sosmith.Chain) -> None:
     texts = chain_texts(chain.core)
     top = board_verilog(chain_item(chain.core), clock=CLOCK)
@@ -90,12 +81,17 @@ def test_the_cores_go_into_the_fpga_as_they_are_generated(chain: sosmith.Chain) 
     assert re.search(r"^module rx_board\(", top, re.MULTILINE)
 
 
+def source_of(item: BoardItem, folder: Path) -> Path:
+    """Write what stands in a board, but for the link."""
+    source = folder / "whole.sv"
+    source.write_text(to_verilog(to_rtlil(item.component(), "whole")) + item.make_modules(), encoding="ascii")
+    return source
+
+
 def test_every_sample_has_a_result(chain: sosmith.Chain, tmp_path: Path) -> None:
     """What stands in the board, with random handshakes; the bench compares all copies of a result."""
     item, factor = chain_item(chain.core), chain.factor
-    text = to_verilog(to_rtlil(item.component(), "whole")) + item.make_modules()
-    source = tmp_path / "whole.sv"
-    source.write_text(text, encoding="ascii")
+    source = source_of(item, tmp_path)
     face = chain_interface(chain.core)
     interface = replace(face, name="whole", latency_cycles=face.latency_cycles + 1, copies_per_result=factor)
     codes = stimulus(chain, 300, 1)
@@ -107,6 +103,29 @@ def test_every_sample_has_a_result(chain: sosmith.Chain, tmp_path: Path) -> None
     results, status = chain.core.compute_with_status(codes[:, :, None])
     assert np.array_equal(got.codes[:, :, 0], results)
     assert np.array_equal(got.status, status)
+
+
+SEVERAL = {"three": PLAIN | {"channels": 3}, "guarded": GUARDED}
+
+
+@pytest.mark.parametrize("name", ["three", pytest.param("guarded", marks=pytest.mark.slow)])
+def test_every_sample_of_several_channels_has_the_result_of_its_own(name: str, tmp_path: Path) -> None:
+    """In the order of the samples, whose channels come in turn and in any order."""
+    chain = sosmith.design_chain(SEVERAL[name])
+    item, samples = chain_item(chain.core), 120
+    source = source_of(item, tmp_path)
+    face = chain_interface(chain.core)
+    interface = replace(face, name="whole", latency_cycles=item.latency_cycles, samples_per_result=1)
+    codes = stimulus(chain, samples, 1)
+    bench = SimulatorBench(
+        source=source, interface=interface, build_dir=tmp_path, simulator="icarus", seed=1, idle=0.3, stall=0.3
+    )
+    got = cosimulate(bench, interface, whole_beats(codes[:, :, None], interface.inputs), seed=1)
+    results, status = chain.core.compute_with_status(codes[:, :, None])
+    last = np.arange(samples) // chain.factor
+    assert np.array_equal(got.codes[:, :, 0], results[last])
+    assert np.array_equal(got.status, status[last])
+    assert got.cycles <= codes.size * item.cycles_per_sample * 2
 
 
 @pytest.mark.slow

@@ -89,10 +89,10 @@ REFUSED: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
         stage(0, decimate=None, interpolate=3),
         "stage[0].interpolate must be a power of two for a CIC filter, whose weights are then exact, not 3",
     ),
-    "interpolate and protect": (
-        stage(0, decimate=None, interpolate=2, protect="detect"),
-        "not yet available: stage[0].protect must be 'none' in a stage that interpolates, which has a core for each "
-        "result of a sample, not 'detect'",
+    "interpolate and reload": (
+        stage(0, decimate=None, interpolate=2, reload=True),
+        "not yet available: stage[0].reload must be false in a stage that interpolates, which has a core for each "
+        "result of a sample, not true",
     ),
     "unknown key": (
         stage(3, order=2),
@@ -180,7 +180,7 @@ REFUSED: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
         )
         for cutoff, wanted in (
             ("nan", "a finite number"),
-            ("1e+999999999", "a number of at most 50 digits, zero or from 1e-30 to below 1e30 in size"),
+            ("1e+999999999", "a number of at most 130 digits, zero or from 1e-30 to below 1e30 in size"),
         )
     },
     "filter": (
@@ -240,9 +240,9 @@ def test_a_chain_is_no_specification_of_a_core() -> None:
     with pytest.raises(SpecificationError) as refused:
         sosmith.Specification.load(TREE)
     assert str(refused.value) == (
-        "specification: not yet available: stage must be left out here, as only board, build, design, generate, "
-        "package, reload, simulate and verify take a chain: `sosmith generate` writes a specification of each stage "
-        "beside the chain's files, for what takes a single core, not [a table, a table, a table, a table]"
+        "specification: not yet available: stage must be left out here, as only board, build, design, explore, "
+        "generate, package, reload, simulate and verify take a chain: `sosmith generate` writes a specification of "
+        "each stage beside the chain's files, for what takes a single core, not [a table, a table, a table, a table]"
     )
 
 

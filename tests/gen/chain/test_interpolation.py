@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.io import savemat
 from scipy.signal import upfirdn
 from tests.gen.chain.rising import SHAPES, UP, draw, exact, flags, stimulus
 
 import sosmith
 from sosmith.gen.chain.rates import Rate, gathered, results_of
 from sosmith.gen.chain.response import Part, peak_gain, segments_of
+from sosmith.gen.specification.exact_values import exact as exact_values
+from sosmith.gen.specification.toml_text import toml_text
 from sosmith.model.errors import SpecificationError
 
 FEW = (0, 3)
@@ -203,11 +207,6 @@ REFUSED: dict[str, tuple[list[dict[str, Any]], str]] = {
         "specification: stage[2].interpolate must be such that all stages together interpolate by at most 4096, as "
         "their response is computed at the last rate, not 32",
     ),
-    "a file of taps": (
-        [{"name": "a", "kind": "fir", "taps_file": "taps.npy", "interpolate": 2}],
-        "specification: not yet available: stage[0].taps_file must be left out in a stage that interpolates, whose "
-        "taps stand in the specification, not 'taps.npy'",
-    ),
 }
 
 
@@ -219,15 +218,49 @@ def test_what_a_chain_does_not_take_is_refused(name: str) -> None:
     assert str(refused.value) == message
 
 
-def test_neither_a_board_nor_a_package_takes_it(up: sosmith.Chain, tmp_path: Path) -> None:
+def test_a_board_does_not_take_it(up: sosmith.Chain, tmp_path: Path) -> None:
     with pytest.raises(SpecificationError) as refused:
         up.build("icebreaker", folder=tmp_path)
     assert str(refused.value) == (
         "specification: interpolate must be left out on a board, whose link returns one result for each sample"
     )
+
+
+def from_file(folder: Path, name: str, taps: list[float]) -> Path:
+    """Write a specification of a stage that interpolates by 2, and its taps in a file."""
+    match name.rpartition(".")[2]:
+        case "npy":
+            np.save(folder / name, np.array(taps))
+        case "mat":
+            savemat(folder / name, {"b": np.array([taps]), "a": np.array([[3.0]])})
+        case _:
+            (folder / name).write_text("\n".join(map(str, taps)), encoding="utf-8")
+    stage = {"name": "fill", "kind": "fir", "interpolate": 2, "taps_file": name}
+    path = folder / "rx.toml"
+    path.write_text(toml_text(exact_values(UP | {"stage": [stage]})), encoding="utf-8")
+    return path
+
+
+TAPS = [0.1, 0.3, 3e-29, 0.7, 0.2, 0.25, 0.0]
+
+
+@pytest.mark.parametrize("name", ["taps.npy", "taps.csv"])
+def test_taps_of_a_file_are_used_as_they_are(name: str, tmp_path: Path) -> None:
+    """Doubles digit by digit; the zero at the end stays."""
+    chain = sosmith.design_chain(from_file(tmp_path, name, TAPS))
+    told = [Fraction(tap) if name.endswith("npy") else Fraction(Decimal(str(tap))) for tap in TAPS]
+    for k, core in enumerate(chain.core.stages[0].cores):
+        assert list(core.spec.filter.taps or ()) == told[k::2]
+    x = np.array([0.5, 0.0, 0.0, 0.0, -1.0])
+    chain_of_zeros = np.concatenate([np.full(4, x[0]), x])  # the first value was there before
+    assert np.abs(chain.run(x=x) - upfirdn(TAPS, chain_of_zeros, up=2)[8:18]).max() <= chain.bound
+
+
+def test_taps_that_never_end_are_refused(tmp_path: Path) -> None:
+    path = from_file(tmp_path, "taps.mat", [1.0, 2.0, 1.0])
     with pytest.raises(SpecificationError) as refused:
-        up.package(tmp_path)
+        sosmith.design_chain(path)
     assert str(refused.value) == (
-        "specification: not yet available: interpolate must be left out in a package, whose benches take at most one "
-        "result for each sample"
+        f"{path}: stage fill: taps must be finite decimals, as those of each phase are written out, not "
+        "0.3333333333333333"
     )

@@ -7,6 +7,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from tests.gen.chain import rising
 from tests.gen.chain.chains import GUARDED, PLAIN
 from tests.gen.output.packages.made import called
 
@@ -14,7 +15,16 @@ import sosmith
 from sosmith.gen.chain.package import packed_chain
 
 PASS = re.compile(r"^PASS: (\d+) results, 0 mismatches$", re.MULTILINE)
-TREES = {"plain": PLAIN, "guarded": GUARDED}
+THIRD = {"name": "third", "kind": "fir", "taps": [0.25, 0.5, 0.25], "decimate": 3}
+UP = {**rising.UP, "channels": 2, "stage": [rising.UP["stage"][0], THIRD]}
+"""Two results for three samples of two channels."""
+TREES = {"plain": PLAIN, "guarded": GUARDED, "up": UP}
+
+
+CORES = {
+    "plain": ("rx_slow", "rx_double", "rx_out", "rx"),
+    "up": ("rx_fill_p0", "rx_fill_p1", "rx_third", "rx"),
+}
 
 
 @cache
@@ -41,14 +51,18 @@ def test_the_bench_passes(name: str, way: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("way", "file", "old", "new"),
+    ("name", "way", "file", "old", "new"),
     [
-        ("c", "rx.c", "state->kept = 0;", ""),
-        ("icarus", "rx.sv", "assign next_kept = due ? 1'h0 : gathered;", "assign next_kept = gathered;"),
+        ("plain", "c", "rx.c", "state->kept = 0;", ""),
+        ("plain", "icarus", "rx.sv", "assign next_kept = due ? 1'h0 : gathered;", "assign next_kept = gathered;"),
+        ("up", "c", "rx.c", "state->kept = 0;", ""),
+        pytest.param("up", "icarus", "rx.sv", "is0 ? i0_tdata", "is0 ? i1_tdata", marks=pytest.mark.slow),
     ],
 )
-def test_flags_of_other_samples_fail(way: str, file: str, old: str, new: str, tmp_path: Path) -> None:
-    folder = unpacked("plain", tmp_path)
+def test_flags_or_results_of_other_samples_fail(
+    name: str, way: str, file: str, old: str, new: str, tmp_path: Path
+) -> None:
+    folder = unpacked(name, tmp_path)
     text = (folder / "core" / file).read_text(encoding="utf-8")
     assert old in text
     (folder / "core" / file).write_text(text.replace(old, new), encoding="utf-8")
@@ -57,9 +71,10 @@ def test_flags_of_other_samples_fail(way: str, file: str, old: str, new: str, tm
     assert "FAIL" in result.stdout
 
 
-def test_verilator_says_nothing_beyond_what_is_waived(tmp_path: Path) -> None:
-    folder = unpacked("plain", tmp_path)
-    files = [f"core/{name}.sv" for name in ("rx_slow", "rx_double", "rx_out", "rx")]
+@pytest.mark.parametrize("chain", CORES)
+def test_verilator_says_nothing_beyond_what_is_waived(chain: str, tmp_path: Path) -> None:
+    folder = unpacked(chain, tmp_path)
+    files = [f"core/{name}.sv" for name in CORES[chain]]
     command = ["verilator", "--lint-only", "-Wall", "--top-module", "rx", "verilator/rx.vlt", *files]
     result = called(*command, at=folder, simulator="verilator")
     assert result.returncode == 0, result.stderr
@@ -70,3 +85,15 @@ def test_the_core_file_has_the_modules_in_order() -> None:
     text = packed("plain")["rx.core"]
     assert re.findall(r"core/(\w+)\.sv", text) == ["rx_slow", "rx_double", "rx_out", "rx"]
     assert "| `s_axil_out_awaddr` | in |" in packed("guarded")["README.md"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(len(rising.SHAPES)))
+def test_the_bench_of_a_chain_that_interpolates_passes(seed: int, tmp_path: Path) -> None:
+    chain = sosmith.design_chain(rising.draw(seed))
+    chain.package(tmp_path)
+    for way in ("c", "icarus") if seed % 3 == 0 else ("c",):
+        result = called("make", way, at=tmp_path / "bench", simulator="icarus")
+        assert result.returncode == 0, result.stdout + result.stderr
+        (count,) = PASS.findall(result.stdout)
+        assert int(count) == (tmp_path / f"bench/{chain.name}_responses.hex").read_text().count("\n") > 20

@@ -89,7 +89,7 @@ def test_cost_by_its_origin(tmp_path: Path) -> None:
 def test_error_over_time_keeps_every_peak() -> None:
     run = evidence()
     error = run.run.hardware - run.run.golden
-    curve = error_over_time(run)
+    curve = error_over_time(run.run.error, run.run.instants)
     assert [len(values) for values in curve.values()] == [STRETCHES] * 3
     assert (min(curve["low"]), max(curve["high"])) == pytest.approx((error.min(), error.max()), rel=1e-5)
     start = int(np.searchsorted(run.run.time, curve["time"][7]))
@@ -100,7 +100,7 @@ def test_error_over_time_keeps_every_peak() -> None:
 def test_spectrum_of_the_error_has_its_power() -> None:
     """The density of white noise, over the whole band, is its root mean square (Parseval)."""
     run = evidence()
-    found = error_spectrum(run)
+    found = error_spectrum(run.shown.run.error, run.run.instants)
     assert found is not None
     step = found["frequency"][1] - found["frequency"][0]
     power = sum(density**2 for density in found["density"]) * step

@@ -114,7 +114,7 @@ FILTER_KEYS = (
 IDENTIFIER = "a Verilog identifier of at most 64 letters, digits and underscores"
 
 
-IN_PROPORTION = "a number of at most 50 digits, zero or from 1e-30 to below 1e30 in size"
+IN_PROPORTION = "a number of at most 130 digits, zero or from 1e-30 to below 1e30 in size"
 
 
 FAMILIES = "one of butterworth, chebyshev1, chebyshev2, elliptic, bessel, equiripple, least_squares, kaiser, halfband"
@@ -280,9 +280,9 @@ BAD = [
     ("large number", RATE, "sample_rate = 1e30", f"sample_rate must be {IN_PROPORTION}, not 1e+30"),
     ("tiny number", RATE, "sample_rate = 1e-31", f"sample_rate must be {IN_PROPORTION}, not 1e-31"),
     (
-        "number of 51 digits",
+        "number of 131 digits",
         RATE,
-        f"sample_rate = 1.{'3' * 50}",
+        f"sample_rate = 1.{'3' * 130}",
         f"sample_rate must be {IN_PROPORTION}, not 1.3333333333333333",
     ),
     (

@@ -51,3 +51,33 @@ def test_a_board_with_a_chain_gives_a_result_for_each_sample_and_takes_coefficie
     exact = sosmith.design_chain(other).run_exact(x=codes[:, 0] / 128)
     error = np.abs(after.codes[:: chain.factor] * float(chain.core.stages[-1].output.lsb) - exact).max()
     assert error <= proven.bound < np.abs(after.codes - before.codes).max() * float(chain.core.stages[-1].output.lsb)
+
+
+@pytest.mark.slow
+def test_a_board_keeps_the_results_of_each_channel(tmp_path: Path) -> None:
+    chain = sosmith.design_chain(GUARDED)
+    codes = np.random.default_rng(1).integers(-128, 128, (400, 2, 1))
+    netlist = build(chain_item(chain.core), tmp_path, clock=Fraction(4_000_000), baud=1_000_000)
+    with Terminal() as terminal, netlist.at(terminal.end), Board(terminal.path) as board:
+        got = board.run_codes(codes)
+        assert set(board.counters().values()) == {0}
+    results, status = chain.core.compute_with_status(codes)
+    assert np.array_equal(got.codes, np.repeat(results, chain.factor, axis=0))
+    assert np.array_equal(got.status, np.repeat(status, chain.factor, axis=0))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "decimate", [{"taps": [0.25, 0.5, 0.25]}, {"family": "butterworth", "kind": "lowpass", "order": 2, "cutoff": 100.0}]
+)
+def test_a_board_keeps_the_results_of_each_channel_of_a_core(decimate: dict[str, Any], tmp_path: Path) -> None:
+    plain = {key: GUARDED[key] for key in ("name", "sample_rate", "input", "output")}
+    core = sosmith.design(plain | {"channels": 3, "filter": decimate | {"decimate": 4}}).core
+    codes = np.random.default_rng(1).integers(-128, 128, (203, 3, 1))
+    netlist = build(core, tmp_path, clock=Fraction(4_000_000), baud=1_000_000)
+    with Terminal() as terminal, netlist.at(terminal.end), Board(terminal.path) as board:
+        got = board.run_codes(codes)
+        assert set(board.counters().values()) == {0}
+    results, status = core.datapath.compute_with_status(codes)
+    assert np.array_equal(got.codes, results[np.arange(203) // 4])
+    assert np.array_equal(got.status, status[np.arange(203) // 4])

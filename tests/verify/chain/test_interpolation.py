@@ -13,6 +13,8 @@ from tests.gen.chain.rising import UP
 from tests.verify.chain.sealing import CERTIFICATE, changed, less, more, proven, replace_sealed, sealed_again
 
 import sosmith
+from sosmith.gen.specification.exact_values import exact
+from sosmith.gen.specification.toml_text import toml_text
 from sosmith.model.errors import ShortfallError
 
 TREE = UP | {"hardware": {"start": "zero"}}
@@ -141,3 +143,47 @@ def test_other_words_are_refused(old: str, new: str, sentence: str, folder: Path
     sealed_again(folder, lambda tree: tree.update(specification=path.read_text(encoding="utf-8")))
     with pytest.raises(ShortfallError, match=sentence):
         sosmith.ChainCertificate.load(folder / CERTIFICATE).verify(spec=path)
+
+
+def test_a_file_of_taps_is_read_by_the_proof(tmp_path: Path) -> None:
+    """And another file than the one that the stage was made from is refused."""
+    stage = {"name": "fill", "kind": "fir", "interpolate": 2, "taps_file": "taps.csv"}
+    taps = ["0.25", "0.5", "1.0", "0.75", "0.25", "0.1", "0.0"]
+    (tmp_path / "taps.csv").write_text("\n".join(taps), encoding="utf-8")
+    text = toml_text(exact(TREE | {"stage": [stage]}))
+    (tmp_path / "rx.toml").write_text(text, encoding="utf-8")
+    sosmith.design_chain(tmp_path / "rx.toml").generate(tmp_path)
+    assert not proven(tmp_path).missing
+    for k, other in ((5, "0.2"), (6, "0.125"), (0, "-0.25")):
+        (tmp_path / "taps.csv").write_text("\n".join([*taps[:k], other, *taps[k + 1 :]]), encoding="utf-8")
+        with pytest.raises(
+            ShortfallError, match=rf"^the taps of stage fill, phase {k % 2}, must be as the specification"
+        ):
+            proven(tmp_path)
+
+
+@pytest.mark.slow
+def test_check_bits_of_all_cores_are_proven(tmp_path: Path) -> None:
+    """But for the hardware of such cores; and a fault of one core that is not one of all is refused."""
+    tree = TREE | {"stage": [UP["stage"][0] | {"protect": "detect"}, UP["stage"][1]]}
+    chain = sosmith.design_chain(tree)
+    chain.generate(tmp_path)
+    (tmp_path / "rx.toml").write_text(chain.specification.toml(), encoding="utf-8")
+    scope = proven(tmp_path).scope
+    assert all(scope[name].state.value == "proven" for name in ("chain", "stages", "top", "c_model"))
+    assert scope["hardware"].is_missing
+    path = tmp_path / "rx.sv"
+    text = path.read_text(encoding="utf-8")
+    for old, new in (("own | {1'h0, any1, 6'h0}", "own"), ("any1 = fault1 | any0", "any1 = any0")):
+        replace_sealed(path, old, new)
+        with pytest.raises(ShortfallError, match=r"^rx_fill_turns must assign "):
+            proven(tmp_path)
+        path.write_text(text, encoding="utf-8")
+    sealed_again(tmp_path)
+    other = sosmith.design_chain(tree | {"stage": [UP["stage"][0], UP["stage"][1]]})
+    other.generate(tmp_path / "plain")
+    for file in (tmp_path / "plain").glob("rx_fill_p1.*"):
+        shutil.copy(file, tmp_path)
+    sealed_again(tmp_path)
+    with pytest.raises(ShortfallError, match=r"^the cores of stage fill must have the same protect$"):
+        proven(tmp_path, spec=False)

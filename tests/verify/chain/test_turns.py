@@ -23,11 +23,11 @@ _TOKEN = re.compile(r"\d+'h[0-9a-f]+|\b\d+\b|[-+&|~?:]|==|\b[a-z_]\w*\b")
 _OTHER = {"-": "+", "+": "-", "&": "|", "|": "&", "==": "!=", "~": "!"}
 
 
-def pair(phases: int, dest: int) -> tuple[str, TurnsClaim]:
+def pair(phases: int, dest: int, *, guarded: bool = False) -> tuple[str, TurnsClaim]:
     stream = StreamFacts(fields=fields((PORT,)), dest_width=dest, flags={"fault": 6})
-    unit = TurnsUnit(name="rx_fill_turns", phases=phases, results=stream)
+    unit = TurnsUnit(name="rx_fill_turns", phases=phases, results=stream, guarded=guarded)
     entry = StreamEntry.model_construct(width=stream.width, dest_width=dest, user_width=stream.user_width)
-    return unit.text(), TurnsClaim(name="rx_fill_turns", cores=phases, results=entry)
+    return unit.text(), TurnsClaim(name="rx_fill_turns", cores=phases, results=entry, guarded=guarded)
 
 
 def check(text: str, claim: TurnsClaim) -> None:
@@ -36,8 +36,9 @@ def check(text: str, claim: TurnsClaim) -> None:
 
 @pytest.mark.parametrize("dest", [0, 8])
 @pytest.mark.parametrize("phases", [2, 3, 4, 7])
-def test_each_variant_is_accepted(phases: int, dest: int) -> None:
-    check(*pair(phases, dest))
+@pytest.mark.parametrize("guarded", [False, True])
+def test_each_variant_is_accepted(phases: int, dest: int, guarded: bool) -> None:
+    check(*pair(phases, dest, guarded=guarded))
 
 
 def test_another_number_of_cores_is_refused() -> None:
@@ -47,9 +48,19 @@ def test_another_number_of_cores_is_refused() -> None:
         check(text, claim)
 
 
+def test_a_fault_that_is_one_of_a_core_alone_is_refused() -> None:
+    text, claim = pair(3, 8, guarded=True)
+    plain, other = pair(3, 8)
+    for given, wanted in ((plain, claim), (text, other), (text.replace("any2, 6", "any1, 6"), claim)):
+        with pytest.raises(
+            ShortfallError, match=r"^rx_fill_turns must |^the (registers|widths) of rx_fill_turns must "
+        ):
+            check(given, wanted)
+
+
 @pytest.mark.slow
 def test_no_token_may_be_another_one() -> None:
-    text, claim = pair(3, 8)
+    text, claim = pair(3, 8, guarded=True)
     refused = 0
     for match in _TOKEN.finditer(text, text.index("wire reset;")):
         other = _OTHER.get(match[0], "moves" if match[0] != "moves" else "later")

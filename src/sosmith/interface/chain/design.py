@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike, fspath
 from pathlib import Path
@@ -246,8 +246,8 @@ class Chain(View):
     ) -> Build:
         """Make a bitstream for a board, with the chain behind the serial link, which gets a result for each sample.
 
-        Parameters and errors are those of `Design.build`; a chain must not decimate several channels, and have at most
-        one stage with `reload`.
+        Parameters and errors are those of `Design.build`; a chain must not interpolate, and have at most one stage with
+        `reload`.
         """
         from sosmith.gen.chain.board import chain_item
         from sosmith.gen.output.board_build import build_board
@@ -332,7 +332,7 @@ class Chain(View):
 
         Parameters are those of `Design.simulate`, and errors too.
         """
-        from sosmith.gen.chain.report import write_chain_report
+        from sosmith.gen.chain.report.report import write_chain_report
         from sosmith.interface.chain.report import ChainReport
         from sosmith.sim.chain import simulate_chain
 
@@ -353,9 +353,8 @@ class Chain(View):
             waves=waves,
             progress=progress,
         )
-        run = replace(run, scenario=traces[0].name)
         progress("writing the report", 0, 0)
-        return ChainReport(write_chain_report(self.core, run, place), place, run)
+        return ChainReport(write_chain_report(self.core, run, traces, place), place, run)
 
     def plot(self, path: str | PathLike[str]) -> Path:
         """Draw the gains of the chain and of its stages, and the aliasing limit, into a file; return its path.

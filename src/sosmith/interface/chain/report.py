@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from sosmith.gen.chain.report import report_table
-from sosmith.gen.chain.run import ChainRun
+from sosmith.gen.chain.report.report import report_table
+from sosmith.gen.chain.report.run import ChainRun
 from sosmith.gen.facts.table import Table, View
 
 

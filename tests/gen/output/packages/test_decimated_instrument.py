@@ -1,4 +1,4 @@
-"""The package of a decimated instrument: hardware and C model on its bench; and where several channels are refused."""
+"""The package of a decimated instrument: hardware and C model on its bench; several channels are refused."""
 
 import re
 import subprocess
@@ -10,7 +10,6 @@ from tests.gen.word_lengths.decimated import locomotive, small
 
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.output.packages.package import package, packed
-from sosmith.interface.design import Design
 from sosmith.model.errors import SpecificationError
 
 
@@ -37,5 +36,3 @@ def test_several_channels_are_refused() -> None:
     made = small("channels = 3\n")
     with refused("slight.toml: not yet available: channels must be 1 with filter.decimate in a package, not 3"):
         packed(made)
-    with refused("slight.toml: not yet available: channels must be 1 with filter.decimate on a board, not 3"):
-        Design(made).board()

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -13,22 +14,31 @@ from sosmith.gen.chain.design import ChainDesign
 from sosmith.gen.chain.facts import chain_tables
 from sosmith.gen.chain.golden import chain_gain, stage_gain
 from sosmith.gen.chain.picture import axis_label, frequencies, level, limits
-from sosmith.gen.chain.run import ChainRun
+from sosmith.gen.chain.report.measures import aliases_entry, delay_entry, in_db, response_entry
+from sosmith.gen.chain.report.provenance import chain_provenance, names_of
+from sosmith.gen.chain.report.run import ChainRun
+from sosmith.gen.chain.top import chain_interface
 from sosmith.gen.facts.table import Fact, Table
 from sosmith.gen.quantity import decibels, plain_number, quantity
+from sosmith.gen.report.curves import error_over_time, error_spectrum
 from sosmith.gen.report.page import Figure
 from sosmith.gen.report.plots import COLOUR, NARROW, PANEL_HEIGHT, draw, frequency_axis
+from sosmith.gen.report.run import Instants
 from sosmith.gen.version import __version__
 from sosmith.model.reference.accuracy import error_statistics, sqnr_db
 from sosmith.model.templates import render
 from sosmith.model.text_files import to_json, write_files
+from sosmith.model.traces.trace import Trace
 
 
-def chain_summary(design: ChainDesign, run: ChainRun) -> dict[str, Any]:
-    """Content of ``report.json``: the keys of a core's report that have a meaning here, and `stages`, `folding`."""
+def chain_summary(design: ChainDesign, run: ChainRun, traces: Sequence[Trace]) -> dict[str, Any]:
+    """Content of ``report.json``: the keys of a core's report that have a meaning here, and `stages`, `folding`.
+
+    `traces` are what went in, one for each channel.
+    """
     output = design.spec.base.output
-    values = output.decode(run.received)
-    statistics = error_statistics(values - run.golden)
+    error = output.decode(run.received) - run.golden
+    statistics = error_statistics(error)
     bound, allowed = float(design.bound), float(design.spec.base.max_error)
     shortfalls = []
     if run.mismatches:
@@ -36,18 +46,22 @@ def chain_summary(design: ChainDesign, run: ChainRun) -> dict[str, Any]:
             f"The hardware differs from the integer models at {run.mismatches:,} of {run.received.size:,} results."
         )
     if statistics.max_abs > bound:
-        error, limit = quantity(statistics.max_abs, output.unit), quantity(bound, output.unit)
-        shortfalls.append(f"The largest error is {error}, over the limit of {limit}.")
+        largest, limit = quantity(statistics.max_abs, output.unit), quantity(bound, output.unit)
+        shortfalls.append(f"The largest error is {largest}, over the limit of {limit}.")
+    realization, architecture = names_of(design)
+    instants = Instants(len(error), float(design.spec.last_rate))
+    worst = error[:, int(np.argmax(np.abs(error).max(axis=0)))]
     return {
         "name": design.name,
         "core": "chain",
-        "scenario": run.scenario,
+        "scenario": traces[0].name,
         "passed": not shortfalls,
         "shortfalls": shortfalls,
         "samples": run.received.size,
         "channels": design.spec.base.channels,
         "cycles": run.cycles,
         "cycles_per_sample": run.cycles / (run.codes.shape[0] * run.codes.shape[1]),
+        "latency_cycles": chain_interface(design).latency_cycles,
         "simulator": run.simulator,
         "tools": run.tools,
         "sosmith_version": __version__,
@@ -64,7 +78,13 @@ def chain_summary(design: ChainDesign, run: ChainRun) -> dict[str, Any]:
         },
         "max_error": allowed,
         "lsb": float(output.lsb),
-        "sqnr_db": sqnr_db(run.golden, values - run.golden),
+        "delay": delay_entry(design),
+        "sqnr_db": sqnr_db(run.golden, error),
+        "frequency_response": response_entry(design),
+        "aliases": aliases_entry(design),
+        "accuracy_percent": dict.fromkeys(("unfiltered", "golden", "hardware")),
+        "realization": realization,
+        "architecture": architecture,
         "stages": [
             {
                 "name": stage.spec.name,
@@ -82,22 +102,28 @@ def chain_summary(design: ChainDesign, run: ChainRun) -> dict[str, Any]:
             {
                 "interpolate": each.segment.rise,
                 "decimate": each.segment.factor,
-                "anywhere_db": _db(float(each.anywhere.gain)),
+                "anywhere_db": in_db(each.anywhere.gain),
                 "passband_edge": None if each.edge is None or design.spec.edge is None else float(design.spec.edge),
-                "into_passband_db": None if each.passing is None else _db(float(each.passing.gain)),
+                "into_passband_db": None if each.passing is None else in_db(each.passing.gain),
             }
             for each in design.foldings
         ],
         "cycles_per_second": run.cycles_per_second,
         "wall_seconds": run.wall_seconds,
+        "provenance": asdict(chain_provenance(design, traces)),
+        "curves": {
+            "error": error_over_time(error, instants),
+            "spectrum": error_spectrum(worst, instants),
+            "filter": None,
+        },
     }
 
 
-def write_chain_report(design: ChainDesign, run: ChainRun, directory: Path) -> dict[str, Any]:
-    """Write ``report.json`` and ``report.html``; return the content of the first."""
-    summary = chain_summary(design, run)
+def write_chain_report(design: ChainDesign, run: ChainRun, traces: Sequence[Trace], directory: Path) -> dict[str, Any]:
+    """Write ``report.json`` and ``report.html``; return the content of the first, see `chain_summary`."""
+    summary = chain_summary(design, run, traces)
     page = render(
-        ("sosmith.gen.chain", "sosmith.gen.report"),
+        ("sosmith.gen.chain.report", "sosmith.gen.report"),
         "chain.html.jinja",
         summary=summary,
         figures=[_response_figure(design), _stages_figure(design)] if design.parts else [],
@@ -133,10 +159,6 @@ def report_table(summary: dict[str, Any]) -> Table:
         )
     )
     return Table(summary["name"], rows, styles={"Short": "red"}, passed=summary["passed"])
-
-
-def _db(gain: float) -> float | None:
-    return 20 * math.log10(gain) if gain > 0 else None
 
 
 def _response_figure(design: ChainDesign) -> Figure:
