@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from sosmith.gen.architectures.blocks import Blocks
-from sosmith.gen.word_lengths.cost import cost_of_graphs, multiplication_of, scalings
+from sosmith.gen.word_lengths.cost import bits_by_digits, cost_of_graphs, multiplication_of, scalings
 from sosmith.hdl.plan.block_products import blocks_of, with_blocks
 from sosmith.hdl.plan.look_ahead import Products
 from sosmith.model.dataflow.graph import Graph, GraphBuilder, Op
@@ -39,10 +39,10 @@ def products_for(graphs: Sequence[Graph], blocks: Blocks) -> Products:
 
 
 def _saved(graph: Graph, index: int, bits: int) -> int:
-    """Return the adder bits that blocks save of a product by a constant."""
+    """Estimate the adder bits that blocks save of a product by a constant, by the digits of the constant."""
     node = graph.nodes[index]
     g = GraphBuilder()
     alone = g.build([g.scale(g.input("", *graph.nodes[node.operands[0]].range), node.parameter, node.parameter_frac)])
     split, pieces = with_blocks(alone, scalings(alone), bits)
-    of_pieces = cost_of_graphs([split], [scalings(split) - pieces]).adder_bits
-    return cost_of_graphs([alone], [scalings(alone)]).adder_bits - of_pieces
+    of_pieces = cost_of_graphs([split], [scalings(split) - pieces], bits_by_digits).adder_bits
+    return cost_of_graphs([alone], [scalings(alone)], bits_by_digits).adder_bits - of_pieces

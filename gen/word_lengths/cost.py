@@ -181,7 +181,7 @@ def area_by_digits(graph: Graph) -> int:
     Each digit but the first of a constant takes a sum of about the width of the operand. `adder_graph` finds sums that
     take less, but not in the time that a search among thousands of constants has.
     """
-    return cost_of_graphs([graph], [scalings(graph)], _bits_by_digits).area
+    return cost_of_graphs([graph], [scalings(graph)], bits_by_digits).area
 
 
 def scalings(graph: Graph) -> frozenset[int]:
@@ -238,7 +238,7 @@ def _bits_of_products(graph: Graph, products: Iterable[int]) -> int:
     return total
 
 
-def _bits_by_digits(graph: Graph, products: Iterable[int]) -> int:
+def bits_by_digits(graph: Graph, products: Iterable[int]) -> int:
     """Estimate the adder bits of products by constants."""
     nodes = graph.nodes
     return sum(

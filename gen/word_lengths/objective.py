@@ -13,6 +13,7 @@ from sosmith.gen.word_lengths.cost import (
     MULTIPLIER_BITS,
     area_by_digits,
     area_of,
+    bits_by_digits,
     cost_of,
     cost_of_graphs,
     scalings,
@@ -195,7 +196,7 @@ class FewSums:
     def of_graph(self, graph: Graph) -> float:
         """Return the area of the graph's operators, in LUT4: of sums, and a little for each block."""
         split, pieces = with_blocks(graph, scalings(graph), self.bits)
-        cost = cost_of_graphs([split], [scalings(split) - pieces])
+        cost = cost_of_graphs([split], [scalings(split) - pieces], bits_by_digits)
         return cost.luts + _LUTS_FOR_A_PIECE * cost.multiplier_blocks
 
     def of_datapath(self, datapath: Datapath) -> float:
