@@ -129,7 +129,7 @@ def test_flags_that_come_with_samples_are_gathered(tmp_path: Path) -> None:
     ("right", "wrong"),
     [
         ("self.o_flags.eq(found | self.i_flags)", "self.o_flags.eq(found)"),  # that of the last sample forgotten
-        ("found.eq(0)]", "found.eq(self.i_flags)]"),  # told of the next result too
+        ('kept.load("found", 0)', 'kept.load("found", self.i_flags)'),  # told of the next result too
     ],
 )
 def test_flags_lost_are_found_out(right: str, wrong: str, tmp_path: Path) -> None:
