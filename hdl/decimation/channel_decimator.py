@@ -206,9 +206,13 @@ class ChannelDecimator(wiring.Component):
         phase = Signal(phases)
         if cic.steady:
             m.d.comb += kept.first.eq(sample)
-        with m.If(word.data[0] & ~word.failed if self.guarded else word.data[0]):
-            fields = [kept.started, phase, kept.flags, *([kept.marked] if marks else []), kept.first]
-            m.d.comb += Cat(*fields)[:size].eq(word.data)
+        if self.guarded:
+            m.d.comb += kept.started.eq(word.data[0] & ~word.failed)
+            with m.If(kept.started):
+                m.d.comb += Cat(phase, kept.flags, kept.marked, kept.first)[: size - 1].eq(word.data[1:])
+        else:
+            with m.If(read.data[0]):
+                m.d.comb += Cat(kept.started, phase, kept.flags, kept.first)[:size].eq(read.data)
         less = kept.marked - (kept.completes & kept.marked.any())
         marked = [Mux(wrong, cic.stages, less)[:marks]] if marks else []
         flags = Mux(kept.completes, 0, kept.flags | gathered)
