@@ -2,10 +2,11 @@
 // turned over, or with two bits of one word, and prints what came out.
 //
 //   core places                       a line for each memory and register: depth, width, name; then the clocks of a run
-//   core runs SAMPLES FLIPS [full]    a line for each line of FLIPS, "place element bit other clock later": the other
+//   core runs SAMPLES BEATS FLIPS [full]
+//                                     a line for each line of FLIPS, "place element bit other clock later": the other
 //                                     bit, if it is not -1, is hit `later` clocks after; clock -1: no flip
 //
-// A line of SAMPLES is "tdest tdata" in hexadecimal. A line of the outcome is the number of beats, whether a word with
+// A line of SAMPLES is "tdest tdata" in hexadecimal; BEATS of results belong to them. A line of the outcome is the number of beats, whether a word with
 // a wrong bit was read, and the first beat that differs from the run without a flip, the first one with the flag
 // `fault`, and the first one that differs without it, each -1 if there is none; with `full`, all beats follow.
 #include "Vtop.h"
@@ -86,7 +87,7 @@ uint32_t next(uint32_t& state) {  // xorshift, Marsaglia 2003
     return state;
 }
 
-Run run(const std::vector<Beat>& samples, const Flip& flip, long most) {
+Run run(const std::vector<Beat>& samples, size_t beats, const Flip& flip, long most) {
     VerilatedContext context;
     Vtop core{&context, "TOP"};
     auto clock = [&] {
@@ -108,7 +109,7 @@ Run run(const std::vector<Beat>& samples, const Flip& flip, long most) {
     uint32_t pace = 2463534242u;
     size_t sent = 0;
     bool offered = false;
-    for (; out.beats.size() < samples.size() && out.clocks < most; ++out.clocks) {
+    for (; out.beats.size() < beats && out.clocks < most; ++out.clocks) {
         if (out.clocks == flip.clock) {
             turn(places[flip.place], flip.element, int(flip.bit));
         }
@@ -164,14 +165,15 @@ int main(int argc, char** argv) {
             else std::printf("0 0 %s\n", place.name.c_str());
         return 0;
     }
-    if (command != "runs" || argc < 4) return 2;
+    if (command != "runs" || argc < 5) return 2;
     const std::vector<Beat> samples = samples_in(argv[2]);
-    const Run whole = run(samples, {0, 0, 0, -1, -1, 0}, 1L << 40);
+    const size_t beats = std::stoul(argv[3]);
+    const Run whole = run(samples, beats, {0, 0, 0, -1, -1, 0}, 1L << 40);
     std::printf("%ld\n", whole.clocks);
-    std::ifstream flips(argv[3]);
+    std::ifstream flips(argv[4]);
     Flip flip;
     while (flips >> flip.place >> flip.element >> flip.bit >> flip.other >> flip.clock >> flip.later) {
-        const Run out = run(samples, flip, 4 * whole.clocks + 100000);
+        const Run out = run(samples, beats, flip, 4 * whole.clocks + 100000);
         long wrong = -1, flagged = -1, silent = -1;
         for (size_t k = 0; k < out.beats.size(); ++k) {
             const bool differs = !(out.beats[k] == whole.beats[k]), fault = out.beats[k].user & kFault;
@@ -180,7 +182,7 @@ int main(int argc, char** argv) {
             if (differs && !fault && silent < 0) silent = long(k);
         }
         std::printf("%zu %d %ld %ld %ld", out.beats.size(), int(out.noticed), wrong, flagged, silent);
-        if (argc > 4)
+        if (argc > 5)
             for (const Beat& beat : out.beats)
                 std::printf(" %llx:%llx:%x", (unsigned long long)beat.dest, (unsigned long long)beat.data, beat.user);
         std::printf("\n");

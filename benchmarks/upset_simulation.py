@@ -33,8 +33,8 @@ _MAIN = Path(__file__).parent / "upset_simulation.cpp"
 _MODULE = re.compile(r"^module (\S+?)\s*\((.*?)^endmodule", re.MULTILINE | re.DOTALL)
 _MEMORY = re.compile(r"^\s*reg (?:\[\S+\] )?(\S+)\s+\[\d+:\d+\];", re.MULTILINE)
 _LOADED = re.compile(r"^\s*(?:if \(.*?\) |else )*(\S+?)(?:\s*\[[^]]*\])?\s*<=", re.MULTILINE)
-_SYNDROME = re.compile(r"^\s*wire (?:\[\S+\] )?(\S+_syndrome) ?;", re.MULTILINE)
-"""Signals that are not 0 when a word was read that has a wrong bit."""
+_SYNDROME = re.compile(r"^\s*wire (?:\[\S+\] )?((?!(?:any|not|odd)_)\S+_syndrome) ?;", re.MULTILINE)
+"""Signals, and not what is made of them, that are not 0 when a word was read that has a wrong bit."""
 
 
 class Fate(StrEnum):
@@ -108,7 +108,7 @@ class Target:
     program, samples : Path
         The simulation, and the file of its input beats.
     beats : int
-        Number of these.
+        Number of beats of results.
     places : tuple of Place
         Its memories and registers, by name.
     numbers : dict of str to int
@@ -134,10 +134,10 @@ class Target:
 
     @property
     def states(self) -> tuple[Place, ...]:
-        """The registers that have a parity bit, and these bits."""
+        """The registers that have a parity bit, and these bits, and what is kept with check bits."""
         names = {place.name for place in self.places}
         bare = [place for place in self.places if {f"{place.name}_parity", f"{place.name}_parity0"} & names]
-        return tuple(bare) + tuple(place for place in self.places if re.search(r"_parity\d*$", place.name))
+        return tuple(bare) + tuple(place for place in self.places if re.search(r"_parity\d*$|\.kept_word$", place.name))
 
     @property
     def registers(self) -> tuple[Place, ...]:
@@ -196,7 +196,7 @@ class Target:
         flips = self.samples.with_name("flips.txt")
         rows = (" ".join(map(str, (self.numbers[hit.place.name], *hit[1:]))) for hit in hits)
         flips.write_text("".join(f"{row}\n" for row in rows), encoding="utf-8")
-        command = [str(self.program), "runs", str(self.samples), str(flips), *["full"] * full]
+        command = [str(self.program), "runs", str(self.samples), str(self.beats), str(flips), *["full"] * full]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
             assert process.stdout is not None
             next(process.stdout)
@@ -255,8 +255,16 @@ def build(architecture: Architecture, sent: Beats, folder: Path) -> Target:
     places = sorted(Place(found, int(depth), int(width)) for depth, width, found in lines if depth != "0")
     (folder / "none.txt").write_text("", encoding="utf-8")
     samples = (folder / "samples.txt").resolve()
-    clocks = int(_output([str(program), "runs", str(samples), str(folder.resolve() / "none.txt")]))
-    return Target(program, samples, len(sent), tuple(places), numbers, clocks, architecture.protect == "correct")
+    beats = _results(architecture, sent)
+    clocks = int(_output([str(program), "runs", str(samples), str(beats), str(folder.resolve() / "none.txt")]))
+    return Target(program, samples, beats, tuple(places), numbers, clocks, architecture.protect == "correct")
+
+
+def _results(architecture: Architecture, sent: Beats) -> int:
+    """Count the beats of results: one for each sample, or some for each of those that bring any."""
+    counts = [int((sent.tdest == channel).sum()) for channel in range(architecture.channels)]
+    share, copies = architecture.datapath.samples_per_result, architecture.copies_per_result
+    return sum(-(-count // share) * copies for count in counts)
 
 
 def counted(upsets: Sequence[Upset]) -> dict[str, int]:

@@ -66,18 +66,22 @@ RAIL_ALONE, OF_INPUT = 1, 2
 """Numbers of flags that come with a sample from a decimator: `input_at_rail`, or all flags of inputs."""
 
 
-def members_beside_decimator(datapath: Datapath, given: int, *, before: bool) -> dict[str, In | Out]:
+def members_beside_decimator(datapath: Datapath, given: int, *, before: bool, guarded: bool) -> dict[str, In | Out]:
     """Return the members of a core that differ where its samples come from a decimator, or its results go to one.
 
-    The code is then as wide as it is. With a sample come the flags that are `given`; with a result, `before` the
-    decimator, those of the inputs.
+    The code is then as wide as it is. With a sample come the flags that are `given`, and above them whether a wrong bit
+    may have changed it, if it is `guarded`; with a result, `before` the decimator, those of the inputs, or all.
     """
     members: dict[str, In | Out] = {}
+    whole = Flag.FAULT + 1
     if given:
         (port,) = datapath.inputs
-        members |= {"s_axis_tdata": In(port.bits), "s_axis_tuser": In(given), "m_axis_tuser": Out(flag_count(datapath))}
+        members |= {"s_axis_tdata": In(port.bits), "s_axis_tuser": In(given + guarded)}
+        members |= {"m_axis_tuser": Out(whole if guarded else flag_count(datapath))}
+        members |= {"i_corrected": In(1)} if guarded else {}
     if before:
-        members |= {"m_axis_tdata": Out(datapath.output.bits), "m_axis_tuser": Out(OF_INPUT)}
+        members |= {"m_axis_tdata": Out(datapath.output.bits), "m_axis_tuser": Out(whole if guarded else OF_INPUT)}
+        members |= {"o_corrected": Out(1)} if guarded else {}
     return members
 
 

@@ -120,6 +120,7 @@ class FoldedFir(Architecture):
             copies=self.copies_per_result,
             fingerprint=self.fingerprint,
             lock=self.reload_lock,
+            protect=self.protect,
         )
 
     def reason(self, why: str, available: int) -> str:

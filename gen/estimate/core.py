@@ -15,8 +15,11 @@ from sosmith.gen.estimate.pipelined import Pipelined
 from sosmith.gen.estimate.programs import of_program
 from sosmith.gen.estimate.quantities import (
     Quantities,
+    check_bits,
     flags_of,
+    of_check_bits,
     of_inputs,
+    of_kept,
     of_output_buffer,
     tree,
 )
@@ -43,7 +46,7 @@ def quantities_of(architecture: Architecture, device: Device) -> Quantities:
         made = _of_stages(architecture, device)
     made["cores"] += 1
     if architecture.decimator is not None:
-        made += _of_decimator(architecture.decimator, architecture.channels, device)
+        made += _of_decimator(architecture, architecture.decimator, device)
         made += of_inputs(architecture.datapath.inputs, architecture.datapath.calibrated)
         if architecture.calibration is not None:
             made += quantities_of(architecture.calibration, device)
@@ -123,18 +126,24 @@ def _of_constants(architecture: Architecture) -> Quantities:
     )
 
 
-def _of_decimator(decimator: Decimator, channels: int, device: Device) -> Quantities:
-    width, bits = decimator.width, decimator.output.bits
+def _of_decimator(architecture: Architecture, decimator: Decimator, device: Device) -> Quantities:
+    """Count integrators and combs, or the adder and memories of several channels, with their check bits."""
+    width, bits, channels = decimator.width, decimator.output.bits, architecture.channels
+    guarded, states = architecture.protect != "none", 2 * decimator.stages
     made: Quantities = Counter({"decimators": 1})
     made["sums"] += decimator.factor.bit_length() + (width if decimator.dropped else 0)
+    marks = (decimator.stages + 1).bit_length() * guarded
     if channels == 1:
-        made["sums"] += 2 * decimator.stages * width
-        made["registers"] += decimator.register_bits + 4 * decimator.stages
-        return made
-    made["sums"] += width
+        made["sums"] += states * width + marks
+        made["registers"] += decimator.register_bits + 2 * states + marks
+        for _ in range(states * guarded):
+            made += of_check_bits(width, "detect") + Counter({"registers": 1})
+        return made + (of_kept(decimator.factor.bit_length()) if guarded else Counter())
+    made["sums"] += width + marks
     made["chosen"] += 4 * width + decimator.input.bits
     made["channels"] += channel_bits(channels)
     made["registers"] += width + 2 * decimator.input.bits + bits
-    states = channels << (2 * decimator.stages - 1).bit_length()
-    kept = decimator.input.bits + decimator.factor.bit_length() + 1
-    return made + of_memory(device, states, width) + of_memory(device, channels, kept)
+    kept, own = decimator.input.bits + decimator.factor.bit_length() + 1 + marks, "correct" if guarded else "none"
+    made += of_check_bits(width, architecture.protect) + of_check_bits(kept, own)
+    made += of_memory(device, channels << (states - 1).bit_length(), width + check_bits(width, architecture.protect))
+    return made + of_memory(device, channels, kept + check_bits(kept, own))

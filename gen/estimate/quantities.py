@@ -46,6 +46,11 @@ def of_check_bits(bits: int, protect: str, *, written: bool = True) -> Quantitie
     return made + Counter({"corrected": bits * (1 + tree(checks)) if checks > 1 else 0})
 
 
+def of_kept(bits: int) -> Quantities:
+    """Count what corrects a wrong bit in what a core keeps between samples; the registers of check bits alone."""
+    return of_check_bits(bits, "correct") + Counter({"registers": check_bits(bits, "correct")})
+
+
 def parity(code: int) -> int:
     """Return the parity of a word."""
     return code.bit_count() % 2

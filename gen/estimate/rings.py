@@ -10,7 +10,15 @@ from sosmith.gen.architectures.folded_fir import FoldedFir
 from sosmith.gen.estimate.graphs import clamp
 from sosmith.gen.estimate.memories import of_memory, of_rom
 from sosmith.gen.estimate.products import Product, of_product
-from sosmith.gen.estimate.quantities import Quantities, flags_of, of_inputs
+from sosmith.gen.estimate.quantities import (
+    Quantities,
+    check_bits,
+    flags_of,
+    of_check_bits,
+    of_inputs,
+    of_kept,
+    parity,
+)
 from sosmith.gen.fpga.boards import Device
 from sosmith.gen.word_lengths.cost import Multiplication, Operand
 from sosmith.hdl.plan.streams import channel_bits
@@ -38,6 +46,8 @@ class Rings(NamedTuple):
         Number of the clock at which the sum is complete.
     codes : sequence of int
         The words of the table of steps.
+    protect : str
+        One of `sosmith.model.dataflow.protection.PROTECTIONS`.
     """
 
     words: int
@@ -51,6 +61,7 @@ class Rings(NamedTuple):
     channels: int
     last_step: int
     codes: Sequence[int]
+    protect: str = "none"
 
 
 def of_rings(architecture: FoldedFir, device: Device) -> Quantities:
@@ -70,6 +81,7 @@ def of_rings(architecture: FoldedFir, device: Device) -> Quantities:
         channels=architecture.channels,
         last_step=plan.last_step,
         codes=[(step.coefficient & ((1 << factor) - 1)) << place | step.first for step in plan.steps],
+        protect=architecture.protect,
     )
     made = of_size(rings, device)
     last = graph.nodes[graph.outputs[0]]
@@ -77,15 +89,19 @@ def of_rings(architecture: FoldedFir, device: Device) -> Quantities:
         made += clamp(last, graph.nodes[last.operands[0]])
     made += of_inputs(datapath.inputs, datapath.calibrated)
     made["compared"] += 2 * datapath.output.bits * bool(datapath.wear)
+    kept, guarded = 2 + place + datapath.samples_per_result.bit_length(), architecture.protect != "none"
+    made["guarded_ports"] += guarded and architecture.reload
     if rings.channels > 1:
-        made += of_memory(device, rings.channels, 2 + place + datapath.samples_per_result.bit_length())
-    return made
+        own = "correct" if guarded else "none"
+        return made + of_memory(device, rings.channels, kept + check_bits(kept, own)) + of_check_bits(kept, own)
+    return made + (of_kept(kept) if guarded else Counter())
 
 
 def of_size(rings: Rings, device: Device) -> Quantities:
     """Count all but the limits of the output, what looks at the input, and the places of several channels."""
     channels, place = channel_bits(rings.channels), (rings.words - 1).bit_length()
     factor, count = rings.factor_bits, 1 + rings.pairs
+    row = factor + count * place
     made: Quantities = Counter(
         {
             "logic": _CONTROL,
@@ -94,10 +110,14 @@ def of_size(rings: Rings, device: Device) -> Quantities:
             "channels": channels,
         }
     )
-    for _ in range(count):
-        made += of_memory(device, rings.words * rings.channels, rings.data_bits)
+    for ring in range(count):
+        word = rings.data_bits + check_bits(rings.data_bits, rings.protect)
+        made += of_memory(device, rings.words * rings.channels, word)
+        made += of_check_bits(rings.data_bits, rings.protect, written=ring == 0)
         made["sums"] += place
-    made += of_rom(device, rings.codes, factor + count * place)
+    codes = [code | parity(code) << row for code in rings.codes] if rings.protect != "none" else rings.codes
+    made += of_rom(device, codes, row + check_bits(row, rings.protect))
+    made += of_check_bits(row, rings.protect, written=False)
     operands = Multiplication(Operand(rings.pair_bits, signed=True), Operand(factor, signed=True))
     made += of_product(Product(operands), device)
     made["sums"] += rings.sum_bits + rings.pair_bits * rings.pairs

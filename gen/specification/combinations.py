@@ -255,8 +255,6 @@ CHAIN = Terms(
 
 _APART: dict[tuple[Option, Option], Refusal] = {
     (FIR, LOOK_AHEAD): Refusal(Verdict.NO_USE, "it has no recursion, and registers between its sums without that"),
-    (DECIMATE, PROTECT): LATER,
-    (FIR_DECIMATE, PROTECT): LATER,
     **dict.fromkeys(((SEVERAL, each) for each in (CHANNELS, RELOAD, PROTECT, DECIMATE, FIR_DECIMATE)), LATER),
     **dict.fromkeys(((LOOK_AHEAD, each) for each in (CHANNELS, PROTECT, DECIMATE)), LATER),
     (FIR_DECIMATE, LOOK_AHEAD): Refusal(Verdict.NO_USE, "it has no recursion"),

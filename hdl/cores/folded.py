@@ -206,7 +206,8 @@ class FoldedCore(Shell):
         if guard is not None:
             memories = (fetched, remembered, limits)
             corrected, failed = (Cat(nets).any() for nets in zip(*memories, strict=True))
-            self.report(m, guard, None if reload is None else reload.port, corrected, failed)
+            found = corrected, failed | (control.start & self.given_fault) if self.flags_given else failed
+            self.report(m, guard, None if reload is None else reload.port, found, control.start)
 
     def _sequence(self, m: Module, control: Control, guard: FaultGuard | None, reload: Reload | None) -> Position:
         """Find samples, and count through the program for each."""
@@ -477,7 +478,7 @@ class FoldedCore(Shell):
         rail = Signal(reset_less=True)
         outside = Signal(reset_less=True)
         with m.If(begins):
-            known = self.s_axis_tuser if self.flags_given else at_rail(self.datapath.inputs, self.s_axis_tdata)
+            known = self.given_flags if self.flags_given else at_rail(self.datapath.inputs, self.s_axis_tdata)
             both = self.flags_given == OF_INPUT
             m.d.sync += [rail.eq(known[0] if both else known), outside.eq(known[1] if both else 0)]
         if self.fingerprint is not None or any(i.opcode is Opcode.JUDGE for i in self.program.instructions):

@@ -257,7 +257,8 @@ class Core(Shell):
             corrected = Cat(
                 *(stage.corrected for stage in parts.interleaved), result.valid & status.corrected & buffer.advance
             )
-            self.report(m, parts.guard, port, corrected.any(), fault & buffer.advance)
+            found = corrected.any(), fault & buffer.advance
+            self.report(m, parts.guard, port, found, Const(1, 1))
         self._restart(m, parts, first)
         self.hand_out(m, buffer, result.valid, [(result.code, flags)], result.channel)
 
@@ -372,7 +373,8 @@ class Core(Shell):
             m.d.comb += parts.guard.idle.eq(parts.guard.broken & parts.empty)
         if parts.swap is not None:
             m.d.comb += parts.swap.may.eq(parts.empty)
-        return Sample(valid, parts.bank), self.s_axis_tdata, self.s_axis_tuser if self.flags_given else None
+        sample = Sample(valid, parts.bank, fault=self.given_fault)
+        return sample, self.s_axis_tdata, self.given_flags if self.flags_given else None
 
     def _source_of_channels(self, m: Module, parts: _Parts) -> tuple[Sample, Value, Value | None]:
         """Return the same of several channels, from behind an input buffer where samples wait for those before."""
@@ -382,7 +384,8 @@ class Core(Shell):
             "channel": self.s_axis_tdest[:bits],
             "bank": parts.bank,
             "tdata": self.s_axis_tdata,
-            "given": self.s_axis_tuser if self.flags_given else Const(0, 0),
+            "given": self.given_flags if self.flags_given else Const(0, 0),
+            "fault": self.given_fault if self.flags_given and self.is_guarded else Const(0, 0),
         }
         layout = data.StructLayout({name: len(value) for name, value in word.items()})
         buffer = m.submodules.input_buffer = StreamBuffer(layout.size)
@@ -416,7 +419,8 @@ class Core(Shell):
             m.d.comb += swap.may.eq(parts.empty & ~buffer.o_valid & ~clearing)
         for stage in parts.interleaved:
             m.d.comb += [stage.clear.eq(clearing), stage.clear_channel.eq(cleared)]
-        sample = Sample(valid, head.bank, channel=channel, scrub=scrubs)
+        fault = head.fault & buffer.o_valid if self.flags_given and self.is_guarded else NEVER
+        sample = Sample(valid, head.bank, fault=fault, channel=channel, scrub=scrubs)
         return sample, head.tdata, head.given if self.flags_given else None
 
     def _clear_channels(self, m: Module, parts: _Parts) -> tuple[Signal, Signal]:

@@ -31,6 +31,11 @@ that sample as often as it has words. With one channel that sample waits on the 
 With a fingerprint, the coefficients stand in a memory of their own, in two banks: a result is computed with those of
 the bank that was active when the sample that brings it was taken.
 
+With protection, ring, table and coefficients have check bits as asked for, which are compared where a step needs the
+word; a wrong one in a ring is gone once a new sample has its place, so that nothing has to be cleared. `pointer`,
+`phase`, `rail` and `counted` correct a wrong bit in any case: in `sosmith.hdl.shell.kept`, or in the control word of
+their channel, which is filled anew when that has two.
+
 With several channels a sample is kept, with its channel, while the control word of that is read: whether it has been
 filled, `pointer`, `phase`, `rail` and `counted`. After a reset all control words are cleared, one a clock.
 """
@@ -44,13 +49,16 @@ from amaranth.lib import data
 from amaranth.lib.memory import Memory
 
 from sosmith.hdl.axi_stream import extended
+from sosmith.hdl.check_bits import CheckBits, Read
 from sosmith.hdl.memory_ports import read_port, write_port
 from sosmith.hdl.pipelined_logic import limits
 from sosmith.hdl.plan.streams import channel_bits
 from sosmith.hdl.plan.tap_steps import PIPELINE, tap_steps
 from sosmith.hdl.reload import ReloadPort
+from sosmith.hdl.shell.fault_guard import FaultGuard
+from sosmith.hdl.shell.kept import Kept
 from sosmith.hdl.shell.shell import Shell
-from sosmith.hdl.status import at_rail, status_of_result
+from sosmith.hdl.status import NEVER, ResultStatus, at_rail, status_of_result, with_fault
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.downsampler import Downsampler
 from sosmith.model.dataflow.graph import Op
@@ -101,6 +109,8 @@ class RingCore(Shell):
         Fingerprint of the structure, 32 bits; None for a core whose coefficients cannot be loaded.
     lock : bool
         Whether loading can be locked until a reset.
+    protect : str
+        One of `sosmith.model.dataflow.protection.PROTECTIONS`, for all memories.
 
     Members
     -------
@@ -116,20 +126,25 @@ class RingCore(Shell):
         copies: int = 1,
         fingerprint: int | None = None,
         lock: bool = False,
+        protect: str = "none",
     ) -> None:
         if datapath.downsampler is None:
             raise ValueError("datapath must have a downsampler")
         self._down: Downsampler = datapath.downsampler
         self._steps = tap_steps(datapath, loadable=fingerprint is not None)
         self._copies = copies
-        super().__init__(datapath, channels, fingerprint, lock=lock)
+        super().__init__(datapath, channels, fingerprint, lock=lock, protect=protect)
 
     def fill(self, m: Module) -> None:
         """Build control, rings and the multiplier."""
         (port,) = self.datapath.inputs
         self._idle, self._running = Signal(name="idle"), Signal(name="running")
         self._step = Signal(range(self._steps.last_step + 1), name="step", reset_less=True)
-        self._pointer = Signal(range(self._steps.words), name="pointer")
+        self._kept = Kept(m, self._sizes(), guarded=self.is_guarded) if self.channels == 1 else None
+        self._pointer = (
+            Signal(range(self._steps.words), name="pointer") if self._kept is None else self._kept.values["pointer"]
+        )
+        self._found: list[Read] = [] if self._kept is None else [Read(NEVER, self._kept.corrected, self._kept.failed)]
         self._channel = Signal(channel_bits(self.channels), name="channel")
         ready = Signal(name="result_leaves")
         if self.channels == 1:
@@ -147,8 +162,20 @@ class RingCore(Shell):
             m.d.sync += self._step.eq(self._step + 1)
         with m.If(ends & ready):
             m.d.sync += self._running.eq(0)
-        total = self._multiply(m, write, self._reload(m, taken.taken & taken.completes))
-        self._give(m, total, ends, ready, rail, counted)
+        reload = self._reload(m, taken.taken & taken.completes)
+        total = self._multiply(m, write, reload)
+        self._give(m, total, ends, ready, (rail, counted), None if reload is None else reload[0])
+
+    def _in_steps(self, first: int, last: int) -> Value:
+        """Whether a word that has been read is needed: at the clocks from one step to another."""
+        return self._running & (self._step >= first) & (self._step <= last) if self.is_guarded else NEVER
+
+    def _checked(self, m: Module, check: CheckBits, word: Value, name: str, needed: Value) -> Value:
+        """Return the data of a word that has been read, and note what is found wrong in it while it is `needed`."""
+        read = check.read(m, word, name)
+        if self.is_guarded:
+            self._found.append(Read(NEVER, read.corrected & needed, read.failed & needed))
+        return read.data
 
     # What is kept of a channel.
 
@@ -191,10 +218,8 @@ class RingCore(Shell):
     def _one_channel(self, m: Module, code: Value) -> tuple[_Taken, tuple[Value, Value, Value]]:
         """Take the samples of one channel; return also address and word of the ring, and when it is written."""
         filling, steady = Signal(init=1, name="filling"), self._down.filled > 0
-        kept = {
-            name: self._pointer if name == "pointer" else Signal(bits, name=name)
-            for name, bits in self._sizes().items()
-        }
+        kept = self._kept
+        assert kept is not None
         taken, fills = Signal(name="taken"), Signal(name="fills")
         m.d.comb += [
             self._idle.eq(~self._running & ~filling),
@@ -202,13 +227,14 @@ class RingCore(Shell):
             taken.eq(self._idle & self.s_axis_tvalid),
             fills.eq(filling & self.s_axis_tvalid if steady else filling),
         ]
-        sample = self._taken(m, taken, _Kept(**kept), self.s_axis_tdata)
+        sample = self._taken(m, taken, _Kept(**kept.values), self.s_axis_tdata)
         with m.If(fills):
-            m.d.sync += self._pointer.eq(sample.after.pointer)
+            kept.load("pointer", sample.after.pointer)
             with m.If(self._pointer.all()):
                 m.d.sync += filling.eq(0)
         with m.If(taken):
-            m.d.sync += [kept[name].eq(getattr(sample.after, name)) for name in kept]
+            for name in kept.values:
+                kept.load(name, getattr(sample.after, name))
         word = code if steady else Mux(filling, 0, code)
         return sample, (self._pointer, word, taken | fills)
 
@@ -220,11 +246,14 @@ class RingCore(Shell):
         filling, fresh = Signal(name="filling"), Signal(name="fresh", reset_less=True)
         dest = self.s_axis_tdest
         layout = data.StructLayout({"started": 1, **self._sizes()})
+        check = CheckBits(layout.size, "correct" if self.is_guarded else "none")
         m.submodules.control_memory = memory = Memory(
-            shape=layout.size, depth=self.channels, init=[], attrs=_NO_COLLISIONS
+            shape=check.width, depth=self.channels, init=[], attrs=_NO_COLLISIONS
         )
         reader, writer = read_port(memory, "control"), write_port(memory, "control")
-        word = data.View(layout, reader.data)
+        read = check.read(m, reader.data, "control")
+        word = data.View(layout, read.data)
+        started = word.started & ~read.failed if self.is_guarded else word.started
         accepted, taken = Signal(name="accepted"), Signal(name="taken")
         m.d.comb += [
             self._idle.eq(~self._running & ~filling & ~clearing & ~waits),
@@ -232,7 +261,7 @@ class RingCore(Shell):
             accepted.eq(self._idle & self.s_axis_tvalid & (dest < self.channels)),
             reader.addr.eq(dest),
             reader.en.eq(self._idle),
-            taken.eq(waits & (fresh | word.started)),
+            taken.eq(waits & (fresh | started)),
         ]
         with m.If(accepted):
             m.d.sync += [waits.eq(1), fresh.eq(0), sample.eq(code), self._channel.eq(dest)]
@@ -255,9 +284,12 @@ class RingCore(Shell):
         kept = Cat(Const(1, 1), *(getattr(change.after, name) for name in self._sizes()))
         m.d.comb += [
             writer.addr.eq(self._channel),
-            writer.data.eq(Mux(clearing, 0, kept)),
+            writer.data.eq(Mux(clearing, 0, check.written(kept))),
             writer.en.eq(clearing | taken),
         ]
+        if self.is_guarded:
+            needed = waits & ~fresh
+            self._found.append(Read(NEVER, needed & read.corrected, needed & read.failed))
         place = Mux(filling, self._pointer, now.pointer)
         value = sample if steady else Mux(filling, 0, sample)
         return change, (place, value, filling | taken)
@@ -277,7 +309,13 @@ class RingCore(Shell):
         if self.fingerprint is None:
             return None
         plan = self._steps
-        port = ReloadPort(len(plan.steps), bits=plan.factor_bits, design=self.fingerprint, lock=self.lock)
+        port = ReloadPort(
+            len(plan.steps),
+            bits=plan.factor_bits,
+            design=self.fingerprint,
+            protected=self.is_guarded,
+            lock=self.lock,
+        )
         self.join_port(m, port)
         used = Signal(name="bank_in_use", reset_less=True)
         with m.If(begins):
@@ -288,8 +326,13 @@ class RingCore(Shell):
     def _coefficients(self, m: Module, rows: list[int], reload: tuple[ReloadPort, Signal]) -> Value:
         """Make the memory of both banks of coefficients; return the one that was read."""
         port, used = reload
+        size = self._steps.factor_bits
+        check = CheckBits(size, self.protect)
         m.submodules.coefficients_memory = memory = Memory(
-            shape=signed(self._steps.factor_bits), depth=2 * len(rows), init=rows, attrs=_NO_COLLISIONS
+            shape=check.width if self.is_guarded else signed(size),
+            depth=2 * len(rows),
+            init=[check.word(row & (1 << size) - 1) for row in rows] if self.is_guarded else rows,
+            attrs=_NO_COLLISIONS,
         )
         reader, writer = read_port(memory, "coefficients"), write_port(memory, "coefficients")
         bits = len(self._step)
@@ -297,10 +340,12 @@ class RingCore(Shell):
             reader.addr.eq(Cat(self._step, used)),
             reader.en.eq(1),
             writer.addr.eq(Cat((port.write_address + _LATER)[:bits], ~port.bank)),
-            writer.data.eq(port.write_data),
+            writer.data.eq(check.written(port.write_data)),
             writer.en.eq(port.write_enable),
         ]
-        return reader.data
+        needed = self._in_steps(_LATER + 1, _LATER + len(self._steps.steps))
+        coefficient = self._checked(m, check, reader.data, "coefficients", needed)
+        return coefficient.as_signed() if self.is_guarded else coefficient
 
     def _multiply(
         self, m: Module, write: tuple[Value, Value, Value], reload: tuple[ReloadPort, Signal] | None
@@ -331,16 +376,24 @@ class RingCore(Shell):
             rows[k + 1] |= (step.second is None) * alone << at["alone"] | (step.sign < 0) << at["minus"]
             if reload is None:
                 rows[k + _LATER] |= (step.coefficient & ((1 << factor_bits) - 1)) << at["coefficient"]
-        m.submodules.steps_memory = table = Memory(shape=layout.size, depth=len(rows), init=rows)
+        check = CheckBits(layout.size, self.protect)
+        words = [check.word(code) for code in rows]
+        m.submodules.steps_memory = table = Memory(shape=check.width, depth=len(rows), init=words)
         reader = read_port(table, "steps")
         m.d.comb += [reader.addr.eq(self._step), reader.en.eq(1)]
-        row = data.View(layout, reader.data)
+        needed = self._in_steps(1, _LATER + len(plan.steps))
+        row = data.View(layout, self._checked(m, check, reader.data, "steps", needed))
         if reload is None:
             coefficient: Value = row.coefficient
         else:
             own = [0] * _LATER + [step.coefficient for step in plan.steps]
             coefficient = self._coefficients(m, own + [0] * (len(rows) - len(own)), reload)
-        taps = [self._ring(m, name, getattr(row, name), write) for name in ("first", "second")[: 1 + pairs]]
+        needed = self._in_steps(_LATER, _LATER + len(plan.steps) - 1)
+        second_needed = needed & ~row.alone if alone and self.is_guarded else needed
+        taps = [
+            self._ring(m, name, getattr(row, name), write, needs)
+            for name, needs in (("first", needed), ("second", second_needed))[: 1 + pairs]
+        ]
         pair = Signal(signed(plan.pair_bits(port)), name="pair", reset_less=True)
         first, second = taps[0], taps[-1]
         other: Value = Mux(row.alone, 0, second) if alone else second
@@ -366,12 +419,13 @@ class RingCore(Shell):
         grid = max([graph.nodes[graph.inputs[0]].frac, *(node.frac for node in constants)])
         return grid, sum(node.parameter << grid - node.frac for node in constants)
 
-    def _ring(self, m: Module, name: str, offset: Value, write: tuple[Value, Value, Value]) -> Value:
+    def _ring(self, m: Module, name: str, offset: Value, write: tuple[Value, Value, Value], needed: Value) -> Value:
         """Make a memory of the samples of all channels; return what a tap of the sample before the pointer is."""
         (port,) = self.datapath.inputs
         words = self._steps.words
+        check = CheckBits(port.bits, self.protect)
         m.submodules[f"ring_{name}_memory"] = memory = Memory(
-            shape=signed(port.bits) if port.signed else port.bits,
+            shape=signed(port.bits) if port.signed and not self.is_guarded else check.width,
             depth=words * self.channels,
             init=[],
             attrs=_NO_COLLISIONS,
@@ -383,14 +437,26 @@ class RingCore(Shell):
             reader.addr.eq(Cat(place, self._channel)),
             reader.en.eq(1),
             writer.addr.eq(Cat(write[0], self._channel)),
-            writer.data.eq(write[1]),
+            writer.data.eq(check.written(write[1][: port.bits]) if self.is_guarded else write[1]),
             writer.en.eq(write[2]),
         ]
-        return reader.data
+        sample = self._checked(m, check, reader.data, f"ring_{name}", needed)
+        return sample.as_signed() if port.signed and self.is_guarded else sample
 
-    def _give(self, m: Module, total: Signal, ends: Value, ready: Signal, rail: Value, counted: Value) -> None:
-        """Round and limit the sum, and hand it on with its flags, as often as it leaves."""
-        output = self.datapath.output
+    def _give(
+        self,
+        m: Module,
+        total: Signal,
+        ends: Value,
+        ready: Signal,
+        known: tuple[Value, Value],
+        port: ReloadPort | None,
+    ) -> None:
+        """Round and limit the sum, and hand it on with its flags, as often as it leaves.
+
+        Of its last sample, it is `known` whether a code since the last result was at a rail, and the count.
+        """
+        output, (rail, counted) = self.datapath.output, known
         graph = self.datapath.stages[-1].graph
         last = graph.nodes[graph.outputs[0]]
         grid, _ = self._rounding()
@@ -414,7 +480,11 @@ class RingCore(Shell):
             settling=settling,
             channel=self._channel,
             enable=Const(1),
+            protect=self.protect,
         )
+        given = status.flags
+        if self.is_guarded:
+            given = with_fault(given, self._fault(m, ends & ready, status, port))
         held = Signal(len(limited), name="code", reset_less=True)
         live = self.live_flags
         flags = Signal(len(live), name="flags", reset_less=True)
@@ -437,16 +507,27 @@ class RingCore(Shell):
             m.d.sync += [
                 self.m_axis_tvalid.eq(1),
                 held.eq(limited),
-                flags.eq(Cat(status.flags[bit] for bit in live)),
+                flags.eq(Cat(given[bit] for bit in live)),
                 dest.eq(self._channel),
             ]
         whole = held.as_signed() if output.signed else held
         m.d.comb += [
             self.m_axis_tdata.eq(extended(whole, len(self.m_axis_tdata))),
-            self.m_axis_tuser.eq(flags),
+            self.m_axis_tuser.eq(with_fault(flags[:-1], flags[-1]) if self.is_guarded else flags),
         ]
         if self.channels > 1:
             m.d.comb += self.m_axis_tdest.eq(dest)
+
+    def _fault(self, m: Module, gives: Value, status: ResultStatus, port: ReloadPort | None) -> Value:
+        """Keep in mind that a wrong bit was found that could not be corrected; return whether one was, or is now.
+
+        The guard is never idle: nothing is scrubbed, and nothing restarts.
+        """
+        guard = m.submodules.guard = FaultGuard(1)
+        found = [*self._found, Read(NEVER, gives & status.corrected, gives & status.failed)]
+        corrected, failed = Cat(each.corrected for each in found).any(), Cat(each.failed for each in found).any()
+        self.report(m, guard, port, (corrected, failed), NEVER)
+        return guard.fault | status.failed
 
 
 def _bits(value: int) -> int:

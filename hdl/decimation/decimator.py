@@ -20,6 +20,14 @@ start from zero, a reset clears sums and combs instead, and nothing is filled.
 A sample that completes a result is not accepted before the core has taken the result before; all others are, one a
 clock. `s_axis_tready` comes from registers only.
 
+With protection, each sum and comb has a parity bit, [sum1_parity] and so on, which is compared at every clock, and
+`sosmith.hdl.shell.kept` holds the phase and the flags since the last result. A wrong bit in a sum or a comb is
+forgotten: once N combs hold what came after it, no result has it any more. So nothing is cleared, and no phase is lost.
+The result that may be inside and the N after it have `o_fault`, with which the core behind restarts, the last time for
+the first result that no wrong bit reaches::
+
+    wrong ---> [marked] = N + 1 ---> one less with each result ---> any: [o_fault]
+
 A calibration is a core of its own before all this, which works on every sample::
 
     s_axis --> ahead (calibration) --> CIC filter --> core --> m_axis
@@ -45,9 +53,11 @@ from sosmith.hdl.cores.folded import FoldedCore
 from sosmith.hdl.cores.parallel import Core
 from sosmith.hdl.decimation.channel_decimator import ChannelDecimator
 from sosmith.hdl.plan.streams import width
-from sosmith.hdl.status import OF_INPUT, at_rail
+from sosmith.hdl.shell.kept import Kept
+from sosmith.hdl.status import NEVER, OF_INPUT, at_rail
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.decimator import Decimator
+from sosmith.model.dataflow.status import Flag
 from sosmith.model.reload.registers import ADDRESS_BITS
 
 
@@ -62,6 +72,8 @@ class CicDecimator(wiring.Component):
         What it computes.
     flags : int
         How many flags come with a sample; 0 to find out whether it is at the end of its range.
+    guarded : bool
+        Whether each sum and comb has a parity bit, and what counts samples corrects a wrong bit.
 
     Members
     -------
@@ -70,6 +82,11 @@ class CicDecimator(wiring.Component):
         flags, as the code.
     i_flags
         Flags of a sample; only if there are any.
+    i_fault, o_fault
+        Whether a wrong bit was found for a sample, and whether one may have changed a result; only if guarded, the
+        first one with flags.
+    corrected
+        Whether a wrong bit is corrected at this clock; only if guarded.
     o_data, o_rail, o_valid, o_ready
         Results: the code of `decimator.output`, and whether a sample since the result before was at the end of its
         range.
@@ -77,10 +94,13 @@ class CicDecimator(wiring.Component):
         In place of `o_rail`: the flags of any sample since the result before.
     """
 
-    def __init__(self, decimator: Decimator, flags: int = 0) -> None:
+    def __init__(self, decimator: Decimator, flags: int = 0, *, guarded: bool = False) -> None:
         self.decimator = decimator
         self.flags = flags
+        self.guarded = guarded
         flag_ports = {"i_flags": In(flags), "o_flags": Out(flags)} if flags else {"o_rail": Out(1)}
+        if guarded:
+            flag_ports |= {"o_fault": Out(1), "corrected": Out(1), **({"i_fault": In(1)} if flags else {})}
         super().__init__(
             {
                 "i_data": In(decimator.input.bits if flags else width([decimator.input])),
@@ -97,7 +117,9 @@ class CicDecimator(wiring.Component):
         """Build control, integrators and combs."""
         m = Module()
         cic = self.decimator
-        phase = Signal(range(cic.factor))
+        gathered = {"found": self.flags} if self.flags else {"rail": 1}
+        kept = Kept(m, {"phase": cic.factor.bit_length() - 1, **gathered}, guarded=self.guarded)
+        phase = kept.values["phase"]
         waiting = Signal()
         completes = Signal()
         enters = Signal()
@@ -108,16 +130,20 @@ class CicDecimator(wiring.Component):
             enters.eq(self.i_valid & (filling | self.i_ready)),
         ]
         with m.If(enters):
-            m.d.sync += phase.eq(phase + 1)  # the factor is a power of two
+            kept.load("phase", phase + 1)  # the factor is a power of two
         with m.If(enters & completes & ~filling):
             m.d.sync += waiting.eq(1)
         with m.Elif(self.o_valid & self.o_ready):
             m.d.sync += waiting.eq(0)
         if self.flags:
-            self._gather(m, enters & ~filling, completes)
+            self._gather(m, kept, enters & ~filling, completes)
         else:
-            self._flag_rails(m, enters & ~filling, completes)
-        value, moves, counts = self._filter(m, enters, completes, ~filling)
+            self._flag_rails(m, kept, enters & ~filling, completes)
+        value, moves, counts, wrong = self._filter(m, enters, completes, ~filling)
+        if self.guarded:
+            given = enters & self.i_fault if self.flags else NEVER
+            self._mark(m, Cat(wrong, kept.failed, given).any(), moves & counts)
+            m.d.comb += self.corrected.eq(kept.corrected)
         with m.If(moves & counts):
             m.d.sync += [self.o_data.eq((value + (1 << cic.dropped >> 1)) >> cic.dropped), self.o_valid.eq(1)]
         with m.Elif(self.o_ready):
@@ -135,46 +161,71 @@ class CicDecimator(wiring.Component):
                 m.d.sync += filling.eq(0)
         return filling
 
-    def _flag_rails(self, m: Module, accepted: Value, completes: Value) -> None:
+    def _flag_rails(self, m: Module, kept: Kept, accepted: Value, completes: Value) -> None:
         """Hold whether any sample of a result is at the end of the range, from the last of them on."""
         at_end = at_rail([self.decimator.input], self.i_data)
-        rail = Signal()
+        rail = kept.values["rail"]
         with m.If(accepted):
-            m.d.sync += rail.eq((rail | at_end) & ~completes)
+            kept.load("rail", (rail | at_end) & ~completes)
             with m.If(completes):
                 m.d.sync += self.o_rail.eq(rail | at_end)
 
-    def _gather(self, m: Module, accepted: Value, completes: Value) -> None:
+    def _gather(self, m: Module, kept: Kept, accepted: Value, completes: Value) -> None:
         """Hold the flags of all samples of a result, from the last of them on."""
-        found = Signal(self.flags)
+        found = kept.values["found"]
         with m.If(accepted):
-            m.d.sync += found.eq(found | self.i_flags)
+            kept.load("found", found | self.i_flags)
             with m.If(completes):
-                m.d.sync += [self.o_flags.eq(found | self.i_flags), found.eq(0)]
+                m.d.sync += self.o_flags.eq(found | self.i_flags)
+                kept.load("found", 0)
 
-    def _filter(self, m: Module, enters: Value, completes: Value, counts: Value) -> tuple[Value, Value, Value]:
-        """Integrate and comb; return the difference behind the last comb, whether it is new, and whether it counts."""
+    def _mark(self, m: Module, wrong: Value, gives: Value) -> None:
+        """Mark the results that a wrong bit may reach: the one that may be inside, and N more."""
+        marked = Signal(range(self.decimator.stages + 2))
+        with m.If(gives):
+            m.d.sync += [self.o_fault.eq(wrong | marked.any()), marked.eq(marked - marked.any())]
+        with m.If(wrong):
+            m.d.sync += marked.eq(self.decimator.stages + 1)
+
+    def _filter(self, m: Module, enters: Value, completes: Value, counts: Value) -> tuple[Value, Value, Value, Value]:
+        """Integrate and comb.
+
+        Return the difference behind the last comb, whether it is new, whether it counts, and whether a state is wrong.
+        """
         cic = self.decimator
         (code,) = codes_of([cic.input], self.i_data)
         value: Value = Signal(cic.width, name="code")
         m.d.comb += value.eq(extended(code, cic.width))
         # From zero, every result counts.
         valid, last, *real = (enters, completes, counts) if cic.steady else (enters, completes)
+        wrong: list[Value] = []
+        reset_less = cic.steady and not self.guarded  # a parity bit must be that of what is there
         for k in range(1, cic.stages + 1):
-            total = Signal(cic.width, name=f"sum{k}", reset_less=cic.steady)
+            total = Signal(cic.width, name=f"sum{k}", reset_less=reset_less)
             with m.If(valid):
                 m.d.sync += total.eq(total + value)
+            wrong += self._check(m, total, total + value, valid)
             value = total
             valid, last, *real = self._later(m, f"integrator{k}", valid, last, *real)
         moves = valid & last
         for k in range(1, cic.stages + 1):
-            before = Signal(cic.width, name=f"comb{k}", reset_less=cic.steady)
+            before = Signal(cic.width, name=f"comb{k}", reset_less=reset_less)
             difference = Signal(cic.width, name=f"difference{k}", reset_less=True)
             with m.If(moves):
                 m.d.sync += [difference.eq(value - before), before.eq(value)]
+            wrong += self._check(m, before, value, moves)
             value = difference
             moves, *real = self._later(m, f"comb{k}", moves, *real)
-        return value, moves, real[0] if real else Const(1, 1)
+        return value, moves, real[0] if real else Const(1, 1), Cat(*wrong).any()
+
+    def _check(self, m: Module, state: Signal, following: Value, loads: Value) -> list[Value]:
+        """Give a state a parity bit if it is guarded; return whether it is wrong at this clock."""
+        if not self.guarded:
+            return []
+        parity = Signal(name=f"{state.name}_parity")
+        with m.If(loads):
+            m.d.sync += parity.eq(following[: len(state)].xor())
+        return [state.xor() ^ parity]
 
     def _later(self, m: Module, name: str, valid: Value, *others: Value) -> tuple[Value, ...]:
         """Return bits of the control a clock later; the first, the valid bit, is 0 from a reset on."""
@@ -283,7 +334,11 @@ class DecimatedCore(wiring.Component):
         m.d.comb += [ClockSignal("front").eq(self.aclk), ResetSignal("front").eq(~self.aresetn)]
         flags = 0 if self.calibration is None else OF_INPUT
         several, core, cic = self.channels > 1, self.core, self.datapath.decimator
-        decimator = ChannelDecimator(cic, self.channels, flags) if several else CicDecimator(cic, flags)
+        decimator = (
+            ChannelDecimator(cic, self.channels, flags, protect=core.protect)
+            if several
+            else CicDecimator(cic, flags, guarded=core.is_guarded)
+        )
         if self.calibration is not None:
             m.submodules.ahead = self.calibration
         m.submodules.decimator = DomainRenamer("front")(decimator)
@@ -300,14 +355,18 @@ class DecimatedCore(wiring.Component):
         if isinstance(decimator, ChannelDecimator):
             source = self.s_axis_tdest if self.calibration is None else self.calibration.m_axis_tdest
             m.d.comb += [decimator.i_dest.eq(source), core.s_axis_tdest.eq(decimator.o_dest)]
+        told = decimator.o_flags if flags or several else decimator.o_rail
         m.d.comb += [
             core.aclk.eq(self.aclk),
             core.aresetn.eq(self.aresetn),
             core.s_axis_tdata.eq(decimator.o_data),
-            core.s_axis_tuser.eq(decimator.o_flags if flags or several else decimator.o_rail),
+            core.s_axis_tuser.eq(Cat(told, decimator.o_fault) if core.is_guarded else told),
             core.s_axis_tvalid.eq(decimator.o_valid),
             decimator.o_ready.eq(core.s_axis_tready),
         ]
+        if core.is_guarded:
+            before = Const(0, 1) if self.calibration is None else self.calibration.o_corrected
+            m.d.comb += core.i_corrected.eq(decimator.corrected | before)
         word = {"data": core.m_axis_tdata, "user": core.m_axis_tuser}
         if several:
             word["dest"] = core.m_axis_tdest
@@ -342,6 +401,8 @@ class DecimatedCore(wiring.Component):
             decimator.i_valid.eq(calibration.m_axis_tvalid),
             calibration.m_axis_tready.eq(decimator.i_ready),
         ]
+        if calibration.is_guarded:
+            m.d.comb += decimator.i_fault.eq(calibration.m_axis_tuser[Flag.FAULT])
         if isinstance(decimator, ChannelDecimator):
             m.d.comb += calibration.s_axis_tdest.eq(self.s_axis_tdest)
             self._open(m, calibration.s_axis_tvalid, calibration.s_axis_tready)

@@ -27,6 +27,7 @@ from sosmith.hdl.plan.streams import channel_bits, width
 from sosmith.hdl.reload import ReloadPort
 from sosmith.hdl.shell.fault_guard import FaultGuard
 from sosmith.hdl.status import (
+    NEVER,
     OF_INPUT,
     at_rail,
     flag_count,
@@ -70,7 +71,11 @@ class Shell(wiring.Component):
     s_axis_tdata, s_axis_tvalid, s_axis_tready
         Input samples, the first one lowest; in each, one field per input port, extended to whole bytes.
     s_axis_tuser : In(flags_given)
-        Flags of the sample; only if they are given.
+        Flags of the sample; only if they are given. With protection there is one more bit, which says whether a wrong
+        bit may have changed the sample.
+    i_corrected, o_corrected : In(1), Out(1)
+        Whether a wrong bit is corrected at this clock, in what stands before the core, and in one before a decimator;
+        only with protection.
     m_axis_tdata, m_axis_tvalid, m_axis_tready
         Output samples: one field each, extended likewise.
     m_axis_tuser : Out(8 * lanes)
@@ -100,8 +105,9 @@ class Shell(wiring.Component):
         self.protect = protect
         self.lock = lock
         self.flags_given = flags_given
+        self.before_decimator = before_decimator
         members = core_members(datapath.inputs, datapath.output, channels, lanes=lanes)
-        members |= members_beside_decimator(datapath, flags_given, before=before_decimator)
+        members |= members_beside_decimator(datapath, flags_given, before=before_decimator, guarded=self.is_guarded)
         super().__init__(members if fingerprint is None else members | slave_members(ADDRESS_BITS))
 
     def elaborate(self, platform: object) -> Module:
@@ -135,6 +141,16 @@ class Shell(wiring.Component):
     def codes(self, tdata: Value) -> list[Value]:
         """Return the codes of a sample on `s_axis_tdata`."""
         return codes_of(self.datapath.inputs, tdata)
+
+    @property
+    def given_flags(self) -> Value:
+        """The flags that come with a sample."""
+        return self.s_axis_tuser[: self.flags_given]
+
+    @property
+    def given_fault(self) -> Value:
+        """Whether a wrong bit may have changed the sample before it came here."""
+        return self.s_axis_tuser[self.flags_given] if self.flags_given and self.is_guarded else NEVER
 
     def status_of_inputs(self, tdata: Value, given: Value | None = None) -> Value:
         """Return the flags that are known with a sample as it comes in: two, the first of which may be `given`."""
@@ -185,13 +201,21 @@ class Shell(wiring.Component):
         m.submodules.reload_port = port
         forward_slave(m, self, port)
 
-    @staticmethod
-    def report(m: Module, guard: FaultGuard, port: ReloadPort | None, corrected: Value, failed: Value) -> None:
-        """Tell the guard, and the registers if there are any, what was corrected and what was not, at this clock."""
+    def report(
+        self, m: Module, guard: FaultGuard, port: ReloadPort | None, found: tuple[Value, Value], begins: Value
+    ) -> None:
+        """Tell the guard, and the registers if there are any, what was corrected and what was not, at this clock.
+
+        Before a decimator, the fault of a sample ends when the next one `begins`: which results it reaches is counted
+        there.
+        """
+        corrected, failed = found
         m.d.comb += guard.failed.eq(failed)
+        if self.before_decimator:
+            m.d.comb += [guard.acknowledge.eq(begins), self.o_corrected.eq(corrected)]
         if port is not None:
             m.d.comb += [
-                port.corrected.eq(corrected),
+                port.corrected.eq(corrected | self.i_corrected if self.flags_given else corrected),
                 port.failed.eq(guard.failed),
                 guard.acknowledge.eq(port.acknowledge),
             ]

@@ -3,9 +3,10 @@
 from fractions import Fraction
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import pytest
-from amaranth.hdl import Assert, Assume, Cat, Module, Signal, Value, signed
+from amaranth.hdl import Assert, Assume, Cat, Const, Module, Mux, Signal, Value, signed
 from tests.formal.prover import Proof, broken, combinational_outputs, prove
 
 from sosmith.hdl.decimation import decimator as hardware
@@ -25,8 +26,11 @@ class MovingSums(Proof):
     - While the sink is ready, a result is not longer away than is stated.
     """
 
-    def __init__(self, made: Decimator, module: ModuleType, *, values: bool, flags: int = 0) -> None:
-        super().__init__(module.CicDecimator(made, flags))
+    def __init__(
+        self, made: Decimator, module: ModuleType, *, values: bool, flags: int = 0, guarded: bool = False
+    ) -> None:
+        super().__init__(module.CicDecimator(made, flags, guarded=guarded))
+        self.excused: Value = self.design.o_fault if guarded else Const(0, 1)
         self.made = made
         self.flags = flags
         self.values = values
@@ -62,7 +66,7 @@ class MovingSums(Proof):
             with m.If(d.o_valid):
                 m.d.comb += [Assert(pending), Assert(told == rail)]
                 if self.values:
-                    m.d.comb += Assert(d.o_data == expected)
+                    m.d.comb += Assert(self.excused | (d.o_data == expected))
             with m.If(completes):
                 m.d.comb += Assert(~pending)
             m.d.comb += Assert(waited < latency_cycles(made))
@@ -102,6 +106,48 @@ class MovingSums(Proof):
         return expected, rail, completes
 
 
+class OneUpset(MovingSums):
+    """What has no flag is right, if one bit of a sum or a comb is turned over at any clock, or none.
+
+    Parameters
+    ----------
+    made : Decimator
+    changes : sequence of (str, str)
+        What is replaced in the text of the decimator.
+    upsets : bool
+        Whether a bit may be turned over; if not, nothing has the flag.
+    """
+
+    def __init__(self, made: Decimator, *changes: tuple[str, str], upsets: bool = True) -> None:
+        self.upsets, self.upset = upsets, Signal(2 * made.stages * made.width)
+        left = iter(range(0, len(self.upset), made.width))
+
+        def upset(m: Module, state: Signal, following: Value, loads: Value) -> None:
+            """Let a state be what it would be at the end of this clock, but for the bits of its upset."""
+            start = next(left)
+            own = self.upset[start : start + len(state)]
+            with m.If(own.any()):
+                m.d.sync += state.eq(Mux(loads, following, state) ^ own)
+
+        found = "        return [state.xor() ^ parity]\n"
+        module: Any = broken(hardware, found, f"        UPSET(m, state, following, loads)\n{found}", *changes)
+        module.UPSET = upset
+        super().__init__(made, module, values=True, guarded=True)
+        self._inputs.append(self.upset)
+
+    def state(self, m: Module) -> None:
+        """State it."""
+        super().state(m)
+        happened = Signal()
+        m.d.proof += happened.eq(happened | self.upset.any())
+        m.d.comb += Assume((self.upset & (self.upset - 1)) == 0)
+        with m.If(happened | self.reset if self.upsets else Const(1)):
+            m.d.comb += Assume(self.upset == 0)
+        if not self.upsets:
+            with m.If(self.started & self.design.o_valid):
+                m.d.comb += Assert(~self.excused)
+
+
 def small(factor: int = 2, stages: int = 1, dropped: int = 1) -> Decimator:
     port = Port(name="x", bits=2, signed=True, lsb=Fraction(1), zero=Fraction(0))
     return Decimator(input=port, factor=factor, stages=stages, dropped=dropped)
@@ -129,7 +175,7 @@ def test_flags_that_come_with_samples_are_gathered(tmp_path: Path) -> None:
     ("right", "wrong"),
     [
         ("self.o_flags.eq(found | self.i_flags)", "self.o_flags.eq(found)"),  # that of the last sample forgotten
-        ("found.eq(0)]", "found.eq(self.i_flags)]"),  # told of the next result too
+        ('kept.load("found", 0)', 'kept.load("found", self.i_flags)'),  # told of the next result too
     ],
 )
 def test_flags_lost_are_found_out(right: str, wrong: str, tmp_path: Path) -> None:
@@ -150,6 +196,27 @@ def test_flags_lost_are_found_out(right: str, wrong: str, tmp_path: Path) -> Non
 )
 def test_a_broken_decimator_is_found_out(right: str, wrong: str, tmp_path: Path) -> None:
     assert prove(MovingSums(small(), broken(hardware, right, wrong), values=True), tmp_path) == "FAIL"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("upsets", [False, True])
+def test_what_has_no_flag_is_right(upsets: bool, tmp_path: Path) -> None:
+    """So a decimator forgets a wrong bit before its flag ends."""
+    assert prove(OneUpset(small(dropped=0), upsets=upsets), tmp_path) == "PASS"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("marked.eq(self.decimator.stages + 1)", "marked.eq(0)"),  # the result inside alone
+        ("self.o_fault.eq(wrong | marked.any())", "self.o_fault.eq(wrong)"),  # that of this clock alone
+        ("Cat(wrong, kept.failed, given).any()", "wrong & enters"),  # looked at with a sample alone
+        ("following[: len(state)].xor()", "state.xor()"),  # parity of what was there
+    ],
+)
+def test_a_flag_that_is_missing_is_found_out(right: str, wrong: str, tmp_path: Path) -> None:
+    assert prove(OneUpset(small(dropped=0), (right, wrong)), tmp_path) == "FAIL"
 
 
 def test_no_output_follows_an_input_within_a_clock(tmp_path: Path) -> None:

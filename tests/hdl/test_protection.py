@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -14,7 +15,9 @@ from benchmarks.upset_simulation import Fate, Hit, Target
 from tests.formal.small import leaky, resonator
 from tests.gen.architectures.one_filter import design_in
 
+import sosmith
 from sosmith.gen.architectures.architecture import Architecture
+from sosmith.gen.architectures.folded_fir import FoldedFir
 from sosmith.gen.architectures.registry import ARCHITECTURES
 from sosmith.gen.core import design_core
 from sosmith.gen.output.core_facts import StreamFacts
@@ -22,11 +25,14 @@ from sosmith.hdl.plan.streams import dest_width, fields
 from sosmith.instrument.scenarios.traces import traces_for
 from sosmith.model.arrays import Codes
 from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.dataflow.decimator import Decimator
 from sosmith.sim.beats import Beats
 from sosmith.sim.simulation import simulate
 from sosmith.sim.stream_packing import Order, pack, random_order, unpack
 
 FAULT = 1 << 6
+DECIMATOR_FORGETS = 7
+"""Results of a channel, those on their way among them, until none has anything of a wrong bit in a decimator."""
 
 
 class Case(NamedTuple):
@@ -41,9 +47,9 @@ class Case(NamedTuple):
     @property
     def core(self) -> Architecture:
         """The core itself."""
-        made = {"leaky": leaky, "resonator": resonator, "audio": audio, "steady": steady}[self.datapath]()
-        named = replace(made, name="core")  # "small" is a word of Verilog
-        return ARCHITECTURES[self.architecture](named, self.channels, self.reload, self.protect)
+        named = replace(DATAPATHS[self.datapath](), name="core")  # "small" is a word of Verilog
+        kind = FoldedFir if self.datapath == "rings" else ARCHITECTURES[self.architecture]
+        return kind(named, self.channels, self.reload, self.protect)
 
 
 def steady() -> Datapath:
@@ -54,7 +60,37 @@ def audio() -> Datapath:
     return design_in("folded").datapath
 
 
-FAST = (Case("leaky", "folded", 3, "correct"), Case("resonator", "parallel", 1, "detect"))
+def decimated() -> Datapath:
+    made = leaky()
+    return replace(made, decimator=Decimator(input=made.inputs[0], factor=4, stages=3, dropped=6))
+
+
+def rings() -> Datapath:
+    tree = {
+        "name": "core",
+        "sample_rate": 1000.0,
+        "input": {"x": {"bits": 6, "range": [-1.0, 1.0], "signed": True}},
+        "filter": {"taps": [0.3, 0.17, 0.05, -0.17, 0.3], "decimate": 3},
+        "output": {"bits": 8, "range": [-1.0, 1.0], "signed": True},
+        "hardware": {"start": "zero"},
+    }
+    return sosmith.design(sosmith.Specification.load(tree)).core.datapath
+
+
+DATAPATHS = {
+    "leaky": leaky,
+    "resonator": resonator,
+    "audio": audio,
+    "steady": steady,
+    "decimated": decimated,
+    "rings": rings,
+}
+
+FAST = (
+    Case("leaky", "folded", 3, "correct"),
+    Case("resonator", "parallel", 1, "detect"),
+    Case("decimated", "parallel", 1, "detect"),
+)
 CASES = [
     pytest.param(case, id="-".join(map(str, case)), marks=[] if case in FAST else [pytest.mark.slow])
     for case in (
@@ -71,6 +107,25 @@ CASES = [
         Case("steady", "parallel", 3, "correct", True),
         Case("steady", "folded", 3, "correct"),
         Case("steady", "serial", 1, "detect"),
+        *(
+            Case("decimated", *core)
+            for core in (
+                ("parallel", 3, "detect"),
+                ("parallel", 2, "correct"),
+                ("folded", 1, "correct"),
+                ("folded", 3, "detect"),
+                ("serial", 3, "correct"),
+            )
+        ),
+        *(
+            Case("rings", "folded", channels, protect, reload)
+            for channels, protect, reload in (
+                (1, "detect", False),
+                (3, "correct", False),
+                (1, "correct", True),
+                (2, "detect", True),
+            )
+        ),
     )
 ]
 
@@ -84,6 +139,17 @@ class Built(NamedTuple):
     codes: Codes
     order: Order
 
+    @property
+    def turns(self) -> Order:
+        """The channel of each result: that of the samples which bring any."""
+        factor, counts = self.core.datapath.samples_per_result, Counter[int]()
+        turns = []
+        for channel in self.order.tolist():
+            if counts[channel] % factor == 0:
+                turns.append(channel)
+            counts[channel] += 1
+        return np.array(turns)
+
 
 @pytest.fixture(scope="module", params=CASES)
 def built(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Built:
@@ -91,7 +157,7 @@ def built(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
     core = case.core
     ports = core.datapath.inputs
     samples = 60 if case.datapath not in {"audio", "steady"} else 240 if case.architecture == "parallel" else 24
-    samples = max(3, samples // case.channels)
+    samples = max(3, samples // case.channels) * core.datapath.samples_per_result
     rng = np.random.default_rng(1)
     codes = np.stack([rng.integers(p.lowest, p.highest + 1, (samples, case.channels)) for p in ports], axis=2)
     order = random_order(samples, case.channels, 1)
@@ -111,23 +177,28 @@ def beats_of(built: Built, hits: list[Hit]) -> list[Beats]:
 
 
 def from_reset(built: Built, first: int) -> list[int]:
-    """Return the codes that come out if the samples from number `first` on are the first ones after a reset."""
-    datapath, order = built.core.datapath, built.order
+    """Return the codes that come out if the core begins anew with result number `first`; a decimator does not."""
+    datapath, turns = built.core.datapath, built.turns
     results = []
     for channel in range(built.case.channels):
-        skipped = int((order[:first] == channel).sum())
-        left = built.codes[skipped:, channel, :]
-        results.append(iter(datapath.compute(left).tolist() if len(left) else []))
-    return [next(results[channel]) for channel in order[first:]]
+        skipped, codes = int((turns[:first] == channel).sum()), built.codes[:, channel, :]
+        if datapath.downsampler is not None:
+            results.append(iter(datapath.compute(codes)[skipped:].tolist()))
+            continue
+        if datapath.decimator is not None:
+            codes = datapath.decimator.compute(codes[:, 0])[:, np.newaxis]
+        left = codes[skipped:]
+        results.append(iter(datapath.behind_decimator.compute(left).tolist() if len(left) else []))
+    return [next(results[channel]) for channel in turns[first:]]
 
 
 def codes_of(built: Built, beats: Beats) -> list[int]:
     output = built.core.datapath.output
     facts = StreamFacts(fields=fields((output,)), dest_width=dest_width(built.case.channels))
-    codes, _ = unpack(beats, built.order, facts)
+    codes, _ = unpack(beats, built.turns, facts)
     turns = np.zeros(built.case.channels, dtype=int)
     found = []
-    for channel in built.order:
+    for channel in built.turns:
         found.append(int(codes[turns[channel], channel, 0]))
         turns[channel] += 1
     return found
@@ -142,10 +213,11 @@ def test_without_an_upset_it_is_the_model(built: Built) -> None:
 
 def test_no_upset_in_a_memory_is_silent(built: Built) -> None:
     memories = built.target.memories
-    assert bool(memories) == (built.case.architecture != "parallel" or built.case.channels > 1 or built.case.reload)
+    case = built.case
+    assert bool(memories) == (case.architecture != "parallel" or case.channels > 1 or case.reload)
     if memories:
         counts = upsets.counted(built.target.run(memories, 600, 1))
-        noticed, other = ("corrected", "detected") if built.case.protect == "correct" else ("detected", "corrected")
+        noticed, other = ("corrected", "detected") if case.protect == "correct" else ("detected", "corrected")
         assert counts["silent"] == counts["lost"] == counts[other] == 0
         assert bool(counts[noticed]) == any(place.width > 3 for place in memories)  # bits that are there three times
 
@@ -173,18 +245,29 @@ def test_the_scrubber_mends_the_first_of_two_bits_before_the_second(built: Built
 
 
 def test_no_upset_in_a_state_of_one_channel_is_silent(built: Built) -> None:
-    states = built.target.states
-    assert bool(states) == (built.case.architecture == "parallel" and (built.case.channels == 1 or built.case.reload))
+    states = [place for place in built.target.states if not place.name.endswith(".kept_word")]
+    case, decimates = built.case, built.core.decimator is not None
+    one = case.channels == 1 and (decimates or case.architecture == "parallel")
+    assert bool(states) == (one or (case.architecture == "parallel" and case.reload))
     if states:
         counts = upsets.counted(built.target.run(states, 600, 2))
         assert counts["silent"] == counts["lost"] == counts["corrected"] == 0
         assert counts["detected"] > 60
 
 
+def test_what_counts_samples_is_mended_in_any_case(built: Built) -> None:
+    kept = [place for place in built.target.states if place.name.endswith(".kept_word")]
+    assert bool(kept) == (built.core.datapath.samples_per_result > 1 and built.case.channels == 1)
+    if kept:
+        counts = upsets.counted(built.target.run(kept, 200, 5))
+        assert counts["masked"] + counts["corrected"] == 200
+
+
 def test_after_a_fault_the_core_restarts(built: Built) -> None:
     """Those flagged first may still have met the old states; from one of them on all is as after a reset."""
     places = (*built.target.memories, *built.target.states)
-    kept = [place for place in places if not re.search("bank|instructions|reload_port", place.name)]
+    lasting = "bank|instructions|reload_port|coefficients|steps|control|kept"
+    kept = [place for place in places if not re.search(lasting, place.name)]
     found = built.target.run(kept, 60, 3, double=built.case.protect == "correct")
     hits = [upset for upset in found if upset.fate is Fate.DETECTED]
     assert hits
@@ -192,7 +275,10 @@ def test_after_a_fault_the_core_restarts(built: Built) -> None:
         assert upset.flagged is not None
         assert (beats.tuser[upset.flagged :] & FAULT).all()
         codes = codes_of(built, beats)
-        starts = range(upset.flagged, min(upset.flagged + built.core.latency_cycles + 2, len(codes) + 1))
+        late = (
+            built.core.latency_cycles + 2 if built.core.decimator is None else DECIMATOR_FORGETS * built.case.channels
+        )
+        starts = range(upset.flagged, min(upset.flagged + late, len(codes) + 1))
         assert any(codes[start:] == from_reset(built, start) for start in starts)
 
 

@@ -156,6 +156,38 @@ def test_a_wrong_bit_in_a_core_of_several(
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("start", ["steady", "zero"])
+def test_an_upset_in_the_decimator_of_a_stage_is_flagged_and_forgotten(
+    start: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A bit of an integrator is turned over with the sample of number 400; no result of the chain is lost."""
+    whole, loaded = simulation.whole_text, "else if (enters) sum1 <= sum1_next[15:0];"
+
+    def upset(design: Any, directory: Path) -> str:
+        text = whole(design, directory)
+        assert text.count(loaded) == 1
+        counter = (
+            "reg [9:0] hits = 0;\n  always @(posedge front_clk) if (enters) hits <= hits + 1;\n  reg [15:0] sum1 ="
+        )
+        assert text.count("reg [15:0] sum1 =") == 1
+        return text.replace(loaded, loaded.replace(";", " ^ (hits == 400);")).replace("reg [15:0] sum1 =", counter)
+
+    monkeypatch.setattr(simulation, "whole_text", upset)
+    low = {"name": "slow", "kind": "iir", "family": "butterworth", "order": 2, "cutoff": 200.0, "decimate": 4}
+    out = {"name": "out", "kind": "fir", "taps": [0.25, 0.5, 0.25], "decimate": 2}
+    tree = PLAIN | {"stage": [low, out], "hardware": {"protect": "detect", "start": start}}
+    chain = sosmith.design_chain(tree)
+    codes = stimulus(chain, 800, 1)
+    (port,) = chain.core.spec.base.inputs
+    report = chain.simulate({"x": port.decode(codes)}, folder=tmp_path, simulator="icarus", seed=3)
+    wrong = np.flatnonzero(report.run.received[:, 0] != report.run.expected[:, 0])
+    first = 400 // chain.factor
+    assert report.summary["samples"] == 100
+    assert first - 16 < wrong[0] < wrong[-1] < first + 16
+    assert len(report.run.received) - wrong[0] <= report.summary["mismatches"] <= 100 - wrong[0] + 4  # all are flagged
+
+
+@pytest.mark.slow
 def test_a_shallow_queue_of_flags_is_slow_and_not_wrong(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Pipelines hold more results than two entries are for, so that the gate holds samples back again and again."""
     tree = PLAIN | {"stage": [{"name": f"s{k}", "kind": "fir", "taps": [0.25, 0.5, 0.25]} for k in range(4)]}

@@ -190,11 +190,13 @@ def _files_proven(
 def _hardware_proven(
     certificate: Certificate, item: ItemEntry, text: str, progress: Progress
 ) -> tuple[Proofs, DecimatorVerdict | None]:
+    if item.protect != "none":
+        return Proofs(), None
     decimator = None
     if certificate.decimation is not None:
         progress("decimator", 0, 0)
         decimator = check_decimator(text, certificate, item.channels)
-    if item.reload or item.protect != "none":
+    if item.reload:
         return Proofs(calibration=_ahead(certificate, item, text, progress)), decimator
     program: ProgramVerdict | None = None
     hardware: HardwareVerdict | None = None

@@ -93,7 +93,9 @@ def with_named_ports(text: str) -> str:
                 names = _passed_on(modules[inside], taken) | names
             if names:
                 renamed = partial(_renamed, names)
-                modules[inside] = re.sub(r"(?<=\\)\S+", renamed, modules[inside])
+                # Ports of the cells in it are those of other modules, also where they are called the same.
+                own = r"(?<!^    connect \\)(?<=\\)\S+"
+                modules[inside] = re.sub(own, renamed, modules[inside], flags=re.MULTILINE)
                 connected = re.sub(r"(?<=^    connect \\)\S+", renamed, cell[0], flags=re.MULTILINE)
                 modules[name] = modules[name].replace(cell[0], connected)
     return _MODULE.sub(lambda module: modules[module["name"]], text)

@@ -75,7 +75,7 @@ def draw(seed: int) -> dict[str, Any]:
         start = {"start": "zero"}
     for stage in stages:
         guards: list[dict[str, Any]] = [{"protect": "detect"}, {"protect": "correct"}]
-        stage.update(options.choice([{}, {"reload": True}, *([] if "decimate" in stage else guards)]))
+        stage.update(options.choice([{}, {"reload": True}, *guards]))
     bits, low = rng.randint(6, 16), rng.choice([0.0, -1.0])
     return {
         "name": f"chain{seed}",

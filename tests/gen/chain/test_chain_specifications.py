@@ -216,18 +216,20 @@ def test_what_a_chain_does_not_take_is_refused(name: str) -> None:
 
 def test_what_a_decimating_stage_does_not_take_is_refused_with_its_name() -> None:
     with pytest.raises(SpecificationError) as refused:
-        loaded(hardware(protect="detect"))
+        loaded(hardware(multipliers=0))
     assert str(refused.value) == (
-        "specification: stage slow: not yet available: hardware.protect must be 'none' with an FIR filter that "
-        "decimates, not 'detect'"
+        "specification: stage slow: not yet available: hardware.multipliers must be 'auto' with an FIR filter that "
+        "decimates, not 0"
     )
+
+
+def test_stages_that_decimate_are_protected_like_others() -> None:
     tree = copy.deepcopy(TREE)
     tree["hardware"] = {"protect": "detect"}
-    for k in (0, 2):
-        tree["stage"][k]["protect"] = "none"
+    tree["stage"][2]["protect"] = "none"
     spec = sosmith.ChainSpecification.load(tree).checked
     stages = [each.ordinary(spec, (ANY_INPUT,), ANY_OUTPUT) for each in spec.stages]
-    assert [each.hardware.protect for each in stages] == ["none", "detect", "none", "detect"]
+    assert [each.hardware.protect for each in stages] == ["detect", "detect", "none", "detect"]
 
 
 def test_a_stage_that_breaks_a_rule_of_filters_is_named() -> None:

@@ -630,12 +630,6 @@ BAD = [
         "not yet available: filter.decimate must be left out unless the filter is given by order and cutoff, not 2",
     ),
     (
-        "decimation with protection",
-        CLOCK,
-        f'{CLOCK}\nprotect = "detect"\n{DECIMATED}',
-        "not yet available: hardware.protect must be 'none' with filter.decimate, not 'detect'",
-    ),
-    (
         "decimation before on-line arithmetic",
         CLOCK,
         f'{CLOCK}\narchitecture = "online"\n{DECIMATED}',

@@ -37,12 +37,6 @@ WRONG: list[tuple[str, str, Any, str]] = [
         "parallel",
         f"{LATER}hardware.architecture must be 'auto' or 'folded' with an FIR filter that decimates, not 'parallel'",
     ),
-    (
-        "hardware",
-        "protect",
-        "detect",
-        f"{LATER}hardware.protect must be 'none' with an FIR filter that decimates, not 'detect'",
-    ),
 ]
 
 

@@ -58,8 +58,8 @@ def test_one_start_is_not_the_other(case: Case) -> None:
 
 
 BROKEN = [
-    ("sums that a reset leaves", 'name=f"sum{k}", reset_less=cic.steady', 'name=f"sum{k}", reset_less=True'),
-    ("combs that a reset leaves", 'name=f"comb{k}", reset_less=cic.steady', 'name=f"comb{k}", reset_less=True'),
+    ("sums that a reset leaves", 'name=f"sum{k}", reset_less=reset_less', 'name=f"sum{k}", reset_less=True'),
+    ("combs that a reset leaves", 'name=f"comb{k}", reset_less=reset_less', 'name=f"comb{k}", reset_less=True'),
     ("a sum that begins with 1", 'name=f"sum{k}", reset_less', 'name=f"sum{k}", init=1, reset_less'),
 ]
 
@@ -70,7 +70,7 @@ def test_hardware_that_is_wrong_is_rejected(right: str, wrong: str, monkeypatch:
 
 
 def test_states_of_channels_that_have_not_started_are_zero(monkeypatch: pytest.MonkeyPatch) -> None:
-    right, wrong = "state.eq(Mux(started, read.data, 0))", "state.eq(read.data)"
+    right, wrong = "state.eq(Mux(started, word.data, 0))", "state.eq(word.data)"
     check_rejected_as_made(
         CASES[2], monkeypatch, decimator, "ChannelDecimator", broken(channel_decimator, right, wrong).ChannelDecimator
     )

@@ -1,7 +1,7 @@
 """Decides whether two literals of gates are the same function, by binary decision diagrams.
 
 Gates that both have are taken for variables first: what is the same for all values of these is the same. If that does
-not decide, all gates are followed down to the variables, as far as there are few.
+not decide, so are those below them, and then all gates are followed down to the variables, as far as there are few.
 """
 
 from __future__ import annotations
@@ -14,6 +14,9 @@ from sosmith.verify.reader.gates import LOW, Gates
 _MOST_NODES = 20_000
 _MOST_GATES = 4_000
 _TRIES = 1024
+_PEELED = 2
+"""Times that a cut is moved down by a gate, as those met first may depend on each other."""
+
 _ALL = (1 << _TRIES) - 1
 
 
@@ -58,8 +61,10 @@ class Equality:
 
     def _decided(self, a: int, b: int) -> bool:
         left, right = self._cone(a), self._cone(b)
-        shared = (left & right) - {a >> 1, b >> 1}
-        for cut in (shared, frozenset[int]()):
+        cuts = [(left & right) - {a >> 1, b >> 1}]
+        for _ in range(_PEELED):
+            cuts.append(cuts[-1] - self._first(a, b, cuts[-1]))
+        for cut in (*cuts, frozenset[int]()):
             try:
                 diagrams = _Diagrams(self._gates, cut)
                 if diagrams.of(a) == diagrams.of(b):
@@ -69,6 +74,20 @@ class Equality:
             if len(left | right) > _MOST_GATES:
                 return False
         return False
+
+    def _first(self, a: int, b: int, cut: Collection[int]) -> set[int]:
+        """Return the gates of a cut that are met first on the way down from two literals."""
+        met, gates, left = set[int](), set[int](), [a >> 1, b >> 1]
+        while left:
+            gate = left.pop()
+            if gate in gates:
+                continue
+            gates.add(gate)
+            if gate in cut:
+                met.add(gate)
+            else:
+                left += [each >> 1 for each in self._gates.inputs(2 * gate) or ()]
+        return met
 
     def _cone(self, literal: int) -> set[int]:
         gates, left = set[int](), [literal >> 1]

@@ -136,17 +136,13 @@ def test_limits_that_cannot_be_met_are_refused_with_what_comes_closest(
     assert str(refused.value) == HEAD + sentence
 
 
-@pytest.mark.parametrize(
-    ("hardware", "sentence"),
-    [
-        ({"protect": "detect"}, "hardware.protect must be 'none' with an FIR filter that decimates, not 'detect'"),
-        ({"multipliers": 0}, "hardware.multipliers must be 'auto' with an FIR filter that decimates, not 0"),
-    ],
-)
-def test_hardware_that_no_decimator_has_is_refused(hardware: dict[str, Any], sentence: str) -> None:
+def test_hardware_that_no_decimator_has_is_refused() -> None:
     with pytest.raises(SpecificationError) as refused:
-        sosmith.ChainSpecification.load(TREE | {"hardware": hardware})
-    assert str(refused.value) == f"specification: stage down: not yet available: {sentence}"
+        sosmith.ChainSpecification.load(TREE | {"hardware": {"multipliers": 0}})
+    assert str(refused.value) == (
+        "specification: stage down: not yet available: hardware.multipliers must be 'auto' with an FIR filter that "
+        "decimates, not 0"
+    )
 
 
 @pytest.mark.slow

@@ -148,6 +148,38 @@ def test_a_port_has_the_name_of_the_net_outside() -> None:
     assert re.findall(r"put \d \\(\S+)", found) == ["word", "word_1_0", "o"]
 
 
+PASSED = r"""
+module \top
+
+  wire width 4 \word
+  cell \middle \middle
+    connect \port$3$0 \word [3:0]
+  end
+end
+module \middle
+
+  wire width 4 input 0 \port$3$0
+
+  cell \inner \inner
+    connect \port$3$0 \port$3$0 [3:0]
+  end
+end
+module \inner
+
+  wire width 4 input 0 \port$3$0
+
+  wire width 4 output 1 \word
+end
+"""
+
+
+def test_ports_that_are_called_the_same_in_two_modules_may_get_two_names() -> None:
+    """The one inside has an output with the name of the net outside."""
+    found = with_named_ports(PASSED)
+    assert re.findall(r"put \d \\(\S+)", found) == ["word", "port$3$0", "word"]
+    assert re.findall(r"connect \\(\S+) \\(\S+)", found) == [("word", "word"), ("port$3$0", "word")]
+
+
 def test_a_net_has_no_second_name() -> None:
     found = without_second_names(INNER)
     assert "\\again" not in found

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
+from tests.verify.multirate.decimators import Case
 from tests.verify.small_specifications import PLAIN, STEADY
 
 from sosmith.gen.core import design_core
@@ -28,7 +29,9 @@ TEXTS = {
     "channels": PLAIN.replace("sample_rate", "channels = 3\nsample_rate", 1) + FIXED + '"parallel"\n',
     "ahead": PLAIN + 'hardware.architecture = "parallel"\nhardware.pipeline = "look-ahead"\n',
     "protected": STEADY + FIXED + '"folded"\nhardware.protect = "detect"\n',
+    "protected channels": Case(channels=3).text + 'protect = "correct"\n',
 }
+"""The last one has sums of words with check bits, which are the same only below the gates that both texts have."""
 
 
 FAST = ("parallel", "folded", "channels", "ahead")
@@ -54,7 +57,9 @@ def texts() -> Callable[[str], Texts]:
 
 
 @pytest.mark.sweep(1)
-@pytest.mark.parametrize("name", [*FAST, pytest.param("protected", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "name", [*FAST, *(pytest.param(name, marks=pytest.mark.slow) for name in ("protected", "protected channels"))]
+)
 def test_what_is_written_is_the_same(name: str, texts: Callable[[str], Texts]) -> None:
     found = texts(name).check()
     assert found.register_bits > 100
