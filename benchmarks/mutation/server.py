@@ -10,7 +10,7 @@ run sees the files as they are. Reads requests and writes answers, one JSON obje
               limits     CPU seconds of a test by its identifier, after which it counts as timed out
               limit      the same for the import of the tests, and for all other tests
               wall       seconds of everything together
-    answer    outcome    "passed", "failed", "timed out"
+    answer    outcome    "passed", also by files in which all tests are slow, "failed", "timed out"
               test       the test that failed or timed out, empty if that was before the first one
               why        its message, shortened
               seconds    CPU seconds of each test that was not left out
@@ -219,7 +219,7 @@ def summary(notes: Path, late: bool) -> Answer:
         elif kind == "failed":
             found["test"], found["why"] = values
             return found
-        elif kind == "end" and values[0] == 0:
+        elif kind == "end" and values[0] in {pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED}:
             found["outcome"], found["test"] = "passed", ""
         elif kind in {"seconds", "lines"}:
             found[kind][values[0]] = values[1]

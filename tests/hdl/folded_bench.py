@@ -121,6 +121,11 @@ class Line:
         found = [int(self.ctx.get(signal)) for signal in (dut.m_axis_tdata, dut.m_axis_tuser, *dest)]
         return (*found, *[0] * (3 - len(found)))
 
+    @property
+    def waiting(self) -> int:
+        """Number of samples that have not been accepted."""
+        return len(self._queue)
+
     def put(self, samples: Iterable[Sample]) -> None:
         """Have samples offered one after the other."""
         self._queue += samples

@@ -37,6 +37,13 @@ def test_parallel(make: Callable[[], Datapath], channels: int) -> None:
     assert taken(Core(datapath, channels)) == {parallel_clocks.latency_cycles(datapath, channels)}
 
 
+def test_a_protected_core_waits_for_a_scrub_at_most() -> None:
+    """Of a sample's own channel: one has come at a clock at which it does, another at one at which it does not."""
+    states = [parallel_clocks.latency_cycles(resonator(), 2, protect=protect) for protect in ("none", "correct")]
+    assert states[1] == states[0] + 1
+    assert taken(Core(resonator(), 2, protect="correct")) == {*states}
+
+
 @pytest.mark.sweep(1)
 @pytest.mark.parametrize("realization", ["df1_ef2", "df2t", "lattice_wdf"])
 def test_parallel_filters(realization: str) -> None:

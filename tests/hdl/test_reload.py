@@ -452,6 +452,18 @@ def test_impossible_sizes_are_refused(options: dict[str, int], message: str) -> 
         ReloadPort(**options)
 
 
+def simulated(dut: Any, testbench: Any) -> None:
+    """Run a core, out of reset and with a sink that is ready, in the clock domain `bench`."""
+    m = Module()
+    m.domains.bench = ClockDomain()
+    m.submodules.core = dut
+    m.d.comb += [dut.aclk.eq(ClockSignal("bench")), dut.aresetn.eq(1), dut.m_axis_tready.eq(1)]
+    simulator = Simulator(m)
+    simulator.add_clock(1e-6, domain="bench")
+    simulator.add_testbench(testbench)
+    simulator.run()
+
+
 @pytest.mark.parametrize("wrong", [1, 2])
 def test_a_core_loads_the_idle_bank_and_flags_what_the_wrong_one_gives(
     wrong: int, monkeypatch: pytest.MonkeyPatch
@@ -469,10 +481,6 @@ def test_a_core_loads_the_idle_bank_and_flags_what_the_wrong_one_gives(
 
     monkeypatch.setattr(core, "ConstantBanks", Banks)
     dut: Any = core.Core(replace(small_design(PLAIN, "df1_ef1").datapath, wear=((10, 20),)), 1, 1, protect="detect")
-    m = Module()
-    m.domains.bench = ClockDomain()
-    m.submodules.core = dut
-    m.d.comb += [dut.aclk.eq(ClockSignal("bench")), dut.aresetn.eq(1), dut.m_axis_tready.eq(1)]
 
     async def testbench(ctx: Any) -> None:
         for name, value in {"awaddr": VERSION.address, "awvalid": 1, "wvalid": 1, "wstrb": 15}.items():
@@ -488,10 +496,32 @@ def test_a_core_loads_the_idle_bank_and_flags_what_the_wrong_one_gives(
         assert FAULTS.field("CORRECTED").of(faults) == 0
         assert (FAULTS.field("UNCORRECTED").of(faults) > 0) == (wrong == 1)
 
-    simulator = Simulator(m)
-    simulator.add_clock(1e-6, domain="bench")
-    simulator.add_testbench(testbench)
-    simulator.run()
+    simulated(dut, testbench)
+
+
+def test_a_core_whose_samples_take_any_constants_swaps_at_once() -> None:
+    """It has nothing to wait for: what was loaded is active when the load has been answered."""
+    dut: Any = core.Core(small_design(PLAIN, "df1_ef1").datapath, 1, 1)
+
+    async def write(ctx: Any, address: int, word: int) -> int:
+        for name, value in {"awaddr": address, "wdata": word, "awvalid": 1, "wvalid": 1, "wstrb": 15}.items():
+            ctx.set(getattr(dut, f"s_axil_{name}"), value)
+        (response,) = await ctx.tick("bench").sample(dut.s_axil_bresp).until(dut.s_axil_bvalid)
+        for name, value in {"awvalid": 0, "wvalid": 0, "bready": 1}.items():
+            ctx.set(getattr(dut, f"s_axil_{name}"), value)
+        await ctx.tick("bench")
+        ctx.set(dut.s_axil_bready, 0)
+        return int(response)
+
+    async def testbench(ctx: Any) -> None:
+        for register, word in ((VERSION, 7), (DATA, 0), (DATA, 0), (CRC, crc_of(7, [0, 0]))):
+            assert await write(ctx, register.address, word) == OKAY
+        for name, value in {"araddr": VERSION.address, "arvalid": 1}.items():
+            ctx.set(getattr(dut, f"s_axil_{name}"), value)
+        (version,) = await ctx.tick("bench").sample(dut.s_axil_rdata).until(dut.s_axil_rvalid)
+        assert version == 7
+
+    simulated(dut, testbench)
 
 
 # The lock.

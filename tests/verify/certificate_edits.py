@@ -26,6 +26,8 @@ def proven(quantized: Quantized, max_error: Fraction | None = None) -> None:
     assert verdict.budget.keys() == quantized.budget.keys()
     for part, value in quantized.budget.items():
         assert -(2**-60) < value - verdict.budget[part] < 2**-16
+    if not quantized.sections:
+        assert (verdict.ranges, verdict.margin) == (0, 0)
 
 
 PLACE = tuple[str | int, ...]

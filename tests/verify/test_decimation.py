@@ -14,8 +14,8 @@ from sosmith.gen.core import design_core
 from sosmith.gen.output.generate import generate
 from sosmith.gen.specification.specification import load
 from sosmith.interface.certificate import Certificate
-from sosmith.verify.certificate_file import on_grid
-from sosmith.verify.decimation import at_lower_rate, behind_decimator, folding_gain
+from sosmith.verify.certificate_file import DecimationEntry, on_grid
+from sosmith.verify.decimation import at_lower_rate, behind_decimator, folding_gain, remembered
 from sosmith.verify.graph import RejectedError
 from sosmith.verify.specified.stated_specification import check_specification
 from sosmith.verify.verification import verify
@@ -216,6 +216,13 @@ def test_another_specification_is_rejected(text: str, sentence: str) -> None:
     certificate = read(tree())
     with rejected(sentence):
         check_specification(certificate, text, verify(certificate).margin)
+
+
+@pytest.mark.parametrize(("factor", "stages", "results"), [(2, 1, 1), (2, 5, 3), (4, 3, 3), (4, 4, 3), (16, 4, 4)])
+def test_results_that_depend_on_what_was_before_a_start(factor: int, stages: int, results: int) -> None:
+    """Result n of N boxes of R samples in a row ends with sample n R, and begins N (R - 1) samples before."""
+    assert remembered(DecimationEntry.model_construct(factor=factor, stages=stages)) == results
+    assert sum(n * factor - stages * (factor - 1) < 0 for n in range(99)) == results
 
 
 def test_a_filter_without_the_correction_is_not_the_stated_one() -> None:

@@ -55,7 +55,6 @@ def test_examples(name: str) -> None:
     proven(design.quantized, design.spec.max_error)
 
 
-@pytest.mark.slow
 def test_a_range_without_zero_and_a_gain_that_is_not_1() -> None:
     proven(plain(ripple(), inputs=CURRENT, output=Port.from_range("y", 12, Fraction(4), Fraction(20)), steady=True))
 

@@ -16,6 +16,7 @@ from sosmith.gen.proof.nodes import LONGEST
 from sosmith.gen.proof.peak_gain import Drive, Extent, extent, peak_gain
 from sosmith.gen.proof.poles import Coefficients, pole_radii
 from sosmith.gen.proof.response import IMPULSE
+from sosmith.gen.proof.sums import Recursion
 from sosmith.model.errors import ShortfallError
 from sosmith.verify.bounds.l1_response import inverse, is_stable, response
 
@@ -177,7 +178,7 @@ def response_of(*samples: float) -> Drive:
     return Drive(IMPULSE.taps(dyadic(*samples)), Fraction(0), Fraction(1))
 
 
-def near(found: Extent, low: float, high: float) -> bool:
+def near(found: Extent, low: float | Fraction, high: float | Fraction) -> bool:
     slack = Fraction(1, 2**24)
     return Fraction(low) - slack <= found.low <= Fraction(low) and Fraction(high) <= found.high <= high + slack
 
@@ -197,6 +198,14 @@ def test_drives_that_balance_at_every_sample_do_so() -> None:
     constants = [Drive(drive.response, Fraction(1), Fraction(1)) for drive in (up, down)]
     assert near(extent(constants), 0, 0)
     assert near(extent([up, down]), -3, 3)
+
+
+def test_what_cannot_overshoot_is_not_followed_from_sample_to_sample(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Beside a drive of both signs, a small constant one, of which less is to come than the other still takes."""
+    monkeypatch.setattr(Recursion, "highest", lambda *_: pytest.fail("followed"))
+    large = Drive(response_of(3, -1, 2, -4).response, Fraction(-1), Fraction(1))
+    small = Drive(response_of(1, 1, 1).response, Fraction(1, 8), Fraction(1, 8))
+    assert near(extent([large, small]), Fraction(3, 8) - 10, Fraction(3, 8) + 10)
 
 
 def test_nothing_drives_nothing() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from fractions import Fraction
-from itertools import product
+from itertools import combinations, product
 from typing import Any
 
 import numpy as np
@@ -97,6 +97,25 @@ def test_coefficients_are_chosen_for_all_of_the_error(case: Case) -> None:
     alone = tuple(tuple(round(a * 2**case.frac) for a in row) for row in case.rows)
     plain = HornerPolynomial(coefficients=alone, frac=case.frac, variables=case.variables, finer=case.finer)
     assert horner_error(case.rows, case.horner) <= horner_error(case.rows, plain)
+
+
+@pytest.mark.parametrize("case", CASES, ids=range(len(CASES)))
+def test_no_neighbour_of_the_coefficients_is_better(case: Case) -> None:
+    """Nor any two together; looked at with so many bits between the stages that only coefficients are rounded."""
+    chosen = case.horner.coefficients
+
+    def bound(*steps: tuple[int, int, int]) -> Fraction:
+        rows = [list(row) for row in chosen]
+        for i, j, by in steps:
+            rows[i][j] += by
+        horner = HornerPolynomial(
+            coefficients=tuple(map(tuple, rows)), frac=case.frac, variables=case.variables, finer=32
+        )
+        return horner_error(case.rows, horner)
+
+    moves = [(i, j, by) for i, row in enumerate(chosen) for j in range(len(row)) for by in (-1, 1)]
+    least = min(bound(*steps) for steps in (*((move,) for move in moves), *combinations(moves, 2)))
+    assert least >= bound() * (1 - Fraction(1, 1 << 20))
 
 
 def test_a_variable_from_zero_counts_half() -> None:

@@ -4,6 +4,7 @@ import math
 from fractions import Fraction
 from itertools import accumulate, pairwise
 
+import numpy as np
 import pytest
 from flint import arb, arb_mat, ctx, fmpq_poly
 
@@ -94,7 +95,10 @@ def test_responses_that_take_turns_each_have_nodes(monkeypatch: pytest.MonkeyPat
 
 
 def test_a_precision_that_never_suffices_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    """With all pivots said to be 0, the precision rises by what is missing and half the guard bits, up to 65,536."""
+    """With all pivots said to be 0, the precision rises by what is missing and half the guard bits, up to 65,536.
+
+    The first one leaves room for the gain, for the error of the samples, and the guard bits.
+    """
     tried: list[int] = []
 
     def flat(matrix: nodes.Integers, bits: int) -> tuple[list[int], int]:
@@ -104,7 +108,10 @@ def test_a_precision_that_never_suffices_is_given_up(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(nodes, "_pivots", flat)
     with pytest.raises(ShortfallError, match=r"^the poles must not lie so close to each other that a response cannot"):
         Nodes((dyadic(1, -0.5),), ACCURACY, 20_000)
-    missing = 20_000 + (2 * (1 + 2) * 2).bit_length() + 16
+    gain = 2
+    spread = 2 * (1 + 2) * gain
+    assert tried[0] == 20_000 + gain.bit_length() + spread.bit_length() + 64
+    missing = 20_000 + spread.bit_length() + 16
     assert [b - a for a, b in pairwise(tried)] == [missing + 32] * 3
     assert tried[-2] <= 1 << 16 < tried[-1]
 
@@ -156,10 +163,10 @@ def test_the_uncertainty_of_a_sum_is_what_it_was(name: str, uncertainties: tuple
 @pytest.mark.parametrize("accuracy", [40, 128])
 @pytest.mark.parametrize("name", DENOMINATORS)
 def test_the_largest_sum_up_to_any_sample(name: str, accuracy: int) -> None:
-    """Two responses, one with a constant drive, which may cancel."""
+    """Three responses, one with a constant drive, which may cancel; weights with many bits, as of ranges in codes."""
     parts = [
         (dyadic(1, -2, 1), Fraction(1, 2), Fraction(1, 2)),
-        (dyadic(0, 1), Fraction(3, 4), Fraction(0)),
+        (dyadic(0, 1), Fraction(3, 4) + Fraction(1, 1 << 50), Fraction(0)),
         (dyadic(0, 0, 0, 0.5), Fraction(-1), Fraction(1, 8)),
     ]
     responses = [exact(n, DENOMINATORS[name], 6000) for n, _, _ in parts]
@@ -181,6 +188,13 @@ def test_the_last_sample_above_a_limit() -> None:
     assert made.last_above([((polynomial(dyadic(1, -1)),), Fraction(3))], Fraction(1, 2**200)) is None
 
 
+@pytest.mark.parametrize("name", ["one pole", "close to each other"])
+def test_without_responses_there_is_nothing(name: str) -> None:
+    made = Recursion([DENOMINATORS[name]], ACCURACY)
+    assert made.totals([]) == []
+    assert made.last_above([], Fraction(1)) == 0
+
+
 def test_a_response_without_poles_is_summed_as_it_is() -> None:
     made = Recursion([()], ACCURACY)
     (found,) = made.totals([(polynomial(dyadic(3, -0.5, 0, -2)),)])
@@ -189,13 +203,18 @@ def test_a_response_without_poles_is_summed_as_it_is() -> None:
     assert 3 <= largest < 3 + Fraction(1, 2**60)
 
 
-def test_samples_too_close_to_zero_for_doubles_get_their_sign_from_integers(monkeypatch: pytest.MonkeyPatch) -> None:
-    """With a coarse bound on the doubles' error, all signs near zero are looked at again, and the sum is the same."""
-    numerators = [(polynomial(dyadic(1, -1)),)]
-    (before,) = Recursion([(SLOW,)], ACCURACY).totals(numerators)
-    monkeypatch.setattr("sosmith.gen.proof.sums._ROUNDING", 2.0**-10)
-    (after,) = Recursion([(SLOW,)], ACCURACY).totals(numerators)
-    assert after == before
+@pytest.mark.parametrize("name", ["the same pair three times", "slow and fast"])
+def test_samples_too_close_to_zero_for_doubles_get_their_sign_from_integers(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With weights of six bits and a bound to match, all signs near zero are looked at again: the sums are the same."""
+    numerators = [(polynomial(one),) for one in NUMERATORS]
+    before = Recursion([DENOMINATORS[name]], ACCURACY).totals(numerators)
+    monkeypatch.setattr("sosmith.gen.proof.sums._ROUNDING", 2.0**-6)
+    made = Recursion([DENOMINATORS[name]], ACCURACY)
+    mantissas, exponents = np.frexp(made._weights)
+    made._weights = np.ldexp(np.round(mantissas * 2.0**6), exponents - 6)
+    assert made.totals(numerators) == before
 
 
 def test_sums_of_responses_share_what_they_have_in_common() -> None:

@@ -7,12 +7,14 @@ import numpy as np
 
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.filter.design import Filter, design
-from sosmith.gen.proof.fading import RESIDUE
 from sosmith.gen.reload.transient import transient
 from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.graph import Graph, Op
 from sosmith.model.reload.constants import with_ranges
+
+RESIDUE = 1 / 256
+"""What a swap may leave behind once it counts as over, in output LSBs, as `docs/registers.md` has it."""
 
 
 def moved(hardware: CoreDesign, ratio: str) -> Filter:
@@ -60,7 +62,7 @@ def left_behind(active: Quantized, other: Quantized, samples: int) -> np.ndarray
             node = new.graph.nodes[index]
             if new.graph.nodes[node.operands[0]].op is not Op.FRACTION:  # an error may be any in either set
                 ends = (node.low, node.high, before[node.name].low, before[node.name].high)
-                starts.append((number, k, (max(ends) - min(ends)) * 2.0**-node.frac + float(RESIDUE)))
+                starts.append((number, k, (max(ends) - min(ends)) * 2.0**-node.frac + RESIDUE))
     states = [[np.zeros(len(starts)) for _ in section.graph.delays] for section in other.sections]
     for run, (number, k, size) in enumerate(starts):
         states[number][k][run] = size

@@ -5,10 +5,9 @@ from functools import cache
 import numpy as np
 import pytest
 from tests.gen.designs import zero_design
-from tests.gen.reload.swaps import during, left_behind, moved, worst_input
+from tests.gen.reload.swaps import RESIDUE, during, left_behind, moved, worst_input
 from tests.model.reload.swapping import compute_swapping
 
-from sosmith.gen.proof.fading import RESIDUE
 from sosmith.gen.reload import transient as module
 from sosmith.gen.reload.other_constants import with_constants
 from sosmith.gen.reload.transient import transient
@@ -78,7 +77,7 @@ def test_a_transient_ends_when_it_is_said_to() -> None:
     after = np.array(compute_swapping(active.datapath, [(swap, during(active, other))], codes))
     always = other.datapath.compute(codes)
     assert other.proof is not None
-    most = 2 * (other.proof.rounding.magnitude + RESIDUE) + 1
+    most = 2 * (float(other.proof.rounding.magnitude) + RESIDUE) + 1
     difference = np.abs(after - always)[swap:]
     assert difference[length:].max() <= most
     assert difference[: length // 8].max() > 100 * most
@@ -90,7 +89,7 @@ def test_a_transient_lasts_as_long_as_the_states_are_remembered(realization: str
     """Until the old states have faded, and then for as many samples as a section has states; but hardly longer."""
     active, other = sets(realization, "1.2")
     found = transient(active, other).samples
-    faded = 1 + int(np.flatnonzero(left_behind(active, other, found + 100) > float(RESIDUE))[-1])
+    faded = 1 + int(np.flatnonzero(left_behind(active, other, found + 100) > RESIDUE)[-1])
     states = len(other.sections[-1].graph.delays)
     assert faded + states <= found <= faded + states + 1
 

@@ -401,6 +401,30 @@ def test_poles_and_zeros_are_roots_the_larger_of_two_real_ones_first() -> None:
     assert response.poles(sos).tolist() == [-0.5, -0.25, 0.5 + 0.5j, 0.5 - 0.5j]
 
 
+def test_zeros_of_many_taps_and_no_poles() -> None:
+    fir = np.array([[2.0, -7.0, 7.0, -2.0, 1.0, 0.0, 0.0, 0.0]])
+    assert sorted(response.zeros(fir).tolist(), key=abs) == pytest.approx([0.5, 1.0, 2.0], abs=1e-12)
+    assert response.poles(fir).tolist() == []
+    assert response.measure_response(facts(ideal_sos=fir, quantized_sos=fir)).largest_pole_radius == 0.0
+
+
+@pytest.mark.parametrize("kind", ["lowpass", "highpass", "bandpass", "bandstop"])
+def test_a_cutoff_of_the_stopband_leaves_the_passband_to_the_response(kind: str) -> None:
+    """It reaches as far as the gain is above 0.707, to the nearest frequencies of the grid on that side."""
+    edges = (20.0,) if kind.endswith("pass") and kind != "bandpass" else (10.0, 30.0)
+    sos = signal.cheby2(3, 40, edges if len(edges) == 2 else edges[0], kind, output="sos", fs=100)
+    bands = response.passbands(facts(kind=kind, ideal_sos=sos, cutoff=edges, cutoff_of_stopband=True))
+    step = 100 / 2 / 4000
+    fine = np.linspace(0, 50, 200_001)
+    gains = np.abs(signal.freqz_sos(sos, fine, fs=100)[1])
+    inside = np.flatnonzero(np.diff(np.concatenate([[0], gains >= gains.max() / math.sqrt(2), [0]])))
+    wanted = [(fine[a], fine[b - 1]) for a, b in inside.reshape(-1, 2)]
+    assert len(bands) == len(wanted) == (2 if kind == "bandstop" else 1)
+    for (low, high), (least, most) in zip(bands, wanted, strict=True):
+        assert least - 1e-3 <= low <= least + step
+        assert most - step <= high <= most + 1e-3
+
+
 def test_stopband_attenuation_an_octave_beyond_the_cutoff() -> None:
     """Butterworth: 10 log10(1 + (tan(pi 2 fc/fs) / tan(pi fc/fs))^14), the smallest in the stopband."""
     ratio = math.tan(2 * math.pi * 0.2587803 / 100) / math.tan(math.pi * 0.2587803 / 100)

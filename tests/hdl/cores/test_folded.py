@@ -8,18 +8,22 @@ from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
+import numpy as np
 import pytest
 from tests.formal.small import leaky, limiter
 from tests.hdl.bus.reload_benches import crc_of
-from tests.hdl.core_bench import simulate
+from tests.hdl.core_bench import Pace, run_core, simulate
 from tests.hdl.folded_bench import Line, Model, Probed, Result, Sample
+from tests.verify.program.programs import small
+from tests.verify.small_specifications import INSTRUMENT
 
+from sosmith.gen.architectures.registry import ARCHITECTURES
 from sosmith.hdl.plan import folded_clocks
 from sosmith.hdl.plan.instructions import encoded
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.folding.fold import program
 from sosmith.model.dataflow.graph import GraphBuilder
-from sosmith.model.dataflow.program import Program
+from sosmith.model.dataflow.program import Opcode, Program
 from sosmith.model.dataflow.status import Flag
 from sosmith.model.port import Port
 from sosmith.model.reload.registers import CRC, DATA, FAULTS, VERSION, Register
@@ -104,6 +108,56 @@ def test_every_sample_at_any_pace(serial: bool, channels: int, protect: str, pro
         assert await line.finish(len(expected)) == expected
 
     simulate(dut, testbench)
+
+
+@pytest.mark.parametrize("share", [-8, -5, -1, 3, 7])
+def test_a_serial_core_multiplies_by_factors_of_either_sign(share: int) -> None:
+    datapath = lowpass(share)
+    made = program(datapath, 3)
+    dut = Probed(datapath, made, serial=True)
+    samples = some(datapath, 12, 1)
+    expected = Model(datapath, made, 1).results(made, samples)
+
+    async def testbench(ctx: Any) -> None:
+        line = Line(ctx, dut, 0.0, 0.0)
+        line.put(samples)
+        assert await line.finish(len(expected)) == expected
+
+    simulate(dut, testbench)
+
+
+@pytest.mark.parametrize("protect", ["none", "detect"])
+@pytest.mark.parametrize("serial", [False, True])
+def test_a_sample_is_accepted_at_the_clock_that_is_stated(serial: bool, protect: str) -> None:
+    datapath = lowpass(5)
+    made = program(datapath, 3)
+    dut = Probed(datapath, made, serial=serial, protect=protect)
+
+    async def testbench(ctx: Any) -> None:
+        line = Line(ctx, dut)
+        for sample in some(datapath, 3, 1):
+            await line.wait(100)  # all words have been cleared, and the sample before has left
+            line.put([sample])
+            await line.wait(folded_clocks.taken_cycles(made, serial=serial, protect=protect))
+            assert line.waiting == 1
+            await line.wait(1)
+            assert line.waiting == 0
+
+    simulate(dut, testbench)
+
+
+def test_flags_of_a_filter_that_starts_from_zero() -> None:
+    """Settling for as long as it is stated, and outside the calibration by the codes alone."""
+    design = small(INSTRUMENT).design
+    inside = replace(design.datapath, calibrated=((500, 3500), (0, 1023)))
+    codes = np.stack([np.linspace(p.lowest, p.highest, 40).astype(int) for p in inside.inputs], axis=1)
+    results, flags = inside.compute_with_status(codes[:, np.newaxis])
+    found = run_core(ARCHITECTURES["folded"](inside), [(0, row) for row in codes.tolist()], Pace())
+    assert [(beat.code, beat.status) for beat in found] == list(
+        zip(results[:, 0].tolist(), flags[:, 0].tolist(), strict=True)
+    )
+    for flag in (Flag.SETTLING, Flag.OUTSIDE_CALIBRATION):
+        assert {*(flags >> flag & 1).ravel().tolist()} == {0, 1}
 
 
 @pytest.mark.slow
@@ -271,6 +325,27 @@ def test_another_program_takes_over_between_two_samples(serial: bool, count: int
             samples = some(datapath, 5, 2, seed=version)
             line.put(samples)
             assert await line.finish(5) == model.results(now, samples)
+
+    simulate(dut, testbench)
+
+
+def test_a_program_that_judges_inputs_takes_over_from_one_that_does_not() -> None:
+    datapath = lowpass(5)
+    plain = program(datapath, 3, spare_words=8)
+    judging = program(replace(lowpass(3), calibrated=((-4, 3),)), 3, like=plain)
+    assert [any(i.opcode is Opcode.JUDGE for i in one.instructions) for one in (plain, judging)] == [False, True]
+    first, new = (one.padded(len(judging.instructions)) for one in (plain, judging))
+    dut = Probed(datapath, first, serial=False, fingerprint=7)
+    samples = some(datapath, 12, 1)
+
+    async def testbench(ctx: Any) -> None:
+        line = Line(ctx, dut, 0.0, 0.0)
+        for register, word in loading(1, [encoded(instruction, new) for instruction in new.instructions]):
+            await line.write(register.address, word)
+        line.put(samples)
+        found = await line.finish(len(samples))
+        assert found == Model(datapath, new, 1).results(new, samples)
+        assert {result.status >> Flag.OUTSIDE_CALIBRATION & 1 for result in found} == {0, 1}
 
     simulate(dut, testbench)
 

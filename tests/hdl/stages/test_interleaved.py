@@ -133,6 +133,29 @@ def test_what_is_found_wrong_goes_with_what_has_read_it(monkeypatch: pytest.Monk
     assert [clock for clock, (_, fault) in enumerate(seen) if fault] == [2 * depth, 3 * depth]
 
 
+def test_channel_and_bank_leave_with_their_sample() -> None:
+    dut: Any = InterleavedStage(leaky().stages[0], 3)
+    depth = dut.schedule.depth
+    chance = random.Random(2)
+    went_in = [(1, clock % 3, chance.randrange(2)) for clock in range(3 * depth)]
+    came_out: list[tuple[int, int, int]] = []
+
+    async def bench(ctx: Any) -> None:
+        ctx.set(dut.advance, 1)
+        for valid, channel, bank in went_in:
+            for name, value in (("valid", valid), ("channel", channel), ("bank", bank)):
+                ctx.set(getattr(dut, f"i_{name}"), value)
+            came_out.append(tuple(ctx.get(getattr(dut, f"o_{name}")) for name in ("valid", "channel", "bank")))
+            await ctx.tick()
+
+    simulator = Simulator(dut)
+    simulator.add_clock(1e-6)
+    simulator.add_testbench(bench)
+    simulator.run()
+    assert [valid for valid, *_ in came_out[:depth]] == [0] * depth
+    assert came_out[depth:] == went_in[:-depth]
+
+
 @pytest.mark.parametrize(("coefficient", "fits"), [((1 << 18) - 1, True), (-(1 << 16), True), (-(1 << 17), False)])
 def test_the_sign_of_a_coefficient_counts_among_its_bits(coefficient: int, fits: bool) -> None:
     """With 19 bits it takes more than a block."""

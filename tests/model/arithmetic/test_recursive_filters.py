@@ -5,7 +5,7 @@ import pytest
 from scipy import signal
 
 from sosmith.model.arithmetic import recursive_filters
-from sosmith.model.arithmetic.recursive_filters import lfilter, sosfilt
+from sosmith.model.arithmetic.recursive_filters import dc_gain, lfilter, sosfilt
 
 
 @pytest.fixture(name="places", params=["where they are", "elsewhere"], autouse=True)
@@ -34,3 +34,23 @@ def test_they_are_those_of_scipy() -> None:
 def test_the_compiled_functions_are_found() -> None:
     assert recursive_filters._compiled("_sigtools", "no_such_function") is None
     assert recursive_filters._compiled("_no_such_module", "sosfilt") is None
+
+
+def test_sections_with_more_taps_and_no_poles() -> None:
+    """Whole numbers, so that nothing is rounded; in one piece and in several, of which one is empty."""
+    random = np.random.default_rng(2)
+    taps, x = random.integers(-9, 10, (3, 5)).astype(float), random.integers(-99, 100, 40).astype(float)
+    sections = np.hstack([taps, np.zeros((3, 5))])
+    sections[:, 5] = 2, 1, 4
+    expected = x
+    for row in sections:
+        expected = np.convolve(expected, row[:5] / row[5])[:40]
+    assert np.array_equal(sosfilt(sections, x), expected)
+    states = np.zeros((3, 4))
+    pieces = [sosfilt(sections, piece, states) for piece in np.split(x, [2, 2, 3, 20])]
+    assert np.array_equal(np.concatenate(pieces), expected)
+    assert np.array_equal(states[0], x[-4:])
+    assert dc_gain(sections) == np.prod(taps.sum(axis=1)) / 8
+    sections[1, 6] = 0.5
+    with pytest.raises(ValueError, match=r"^sections of 5 taps must have no poles$"):
+        sosfilt(sections, x)

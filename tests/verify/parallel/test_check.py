@@ -157,6 +157,11 @@ BREAKS = {
         rf"bit 2 of m_axis_tuser must be output_saturated, as the ports and {NODE}output_stage say, "
         "not another value",
     ),
+    "a wider port": (
+        r"output \[7:0\] m_axis_tuser;\n  wire \[7:0\] m_axis_tuser;",
+        "output [8:0] m_axis_tuser;\n  wire [8:0] m_axis_tuser;",
+        "the port m_axis_tuser must have 8 bits, not 9",
+    ),
     "a clock": (
         r"always_ff @\(posedge clk\)\n(    if \(take1\))",
         r"always_ff @(posedge rst)\n\1",
@@ -217,6 +222,11 @@ CHANNEL_BREAKS = {
         r"(assign \w+_write_data = clear \? \d+'h0+)0 :",
         r"\g<1>1 :",
         rf"section0\.\w+_memory must hold {NODE}section0 and be cleared to 0",
+    ),
+    "a word written twice": (
+        r"( +if \(x1_memory_write_enable\)\n +x1_memory\[)(x1_memory_write_address)(\] <= .*;\n)",
+        r"\1\2\3\1clear_channel\3",
+        r"section0\.x1_memory must be written in one place",
     ),
     "too few words": (
         r"(clear_channel == 2'h)2;",

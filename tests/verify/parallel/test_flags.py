@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from functools import cache
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 from tests.verify.parallel.cores import Made, made, specified
@@ -15,6 +16,10 @@ from tests.verify.unit.units import SEVERAL, WORN
 
 from sosmith.gen.core import design_core
 from sosmith.verify.certificate_file import AboutEntry, ItemEntry
+from sosmith.verify.graph import RejectedError
+from sosmith.verify.parallel.flags import wear_limits
+from sosmith.verify.parallel.forms import Forms
+from sosmith.verify.program.normal_form import constant, scaled
 
 
 @cache
@@ -60,6 +65,36 @@ def test_a_range_that_is_not_everything() -> None:
     for other in (((101, 4000), (0, 1000)), ((100, 4001), (0, 1000)), ((100, 4000), (1, 1000)), ()):
         said = rejection(stated(narrow, calibrated=other), narrow.text)
         assert re.fullmatch("bit 1 of m_axis_tuser must be .*", said)
+
+
+def test_limits_are_read_from_the_word_of_the_channel() -> None:
+    """The lower half of a word is the warning, the upper one the limit, both signed or not as the output is."""
+    forms = Forms()
+    word = forms.variable("word", 0, (1 << 16) - 1)
+    words = cast(
+        "Any", SimpleNamespace(forms=forms, constant_word=lambda name: word if name == "a.wear_limits" else {})
+    )
+
+    def read(wear: Any, *, signed: bool = True, first: Any = (), width: int = 16) -> Any:
+        item = None if wear is None else SimpleNamespace(wear=wear)
+        certificate = SimpleNamespace(about=SimpleNamespace(item=item), output=SimpleNamespace(bits=8, signed=signed))
+        memories = {"a.wear_limits": SimpleNamespace(first=first, width=width)} if first else {}
+        netlist = SimpleNamespace(memories=memories)
+        return wear_limits(words, cast("Any", netlist), cast("Any", certificate), "a.")
+
+    assert read(None) is read(()) is None
+    assert read([(-3, 5)]) == (constant(-3), constant(5))
+    wear, right = [(-3, 5), (7, -128)], (0x05FD, 0x8007)
+    halves = [forms.floor(scaled(word, -8 * k)) for k in range(2)]
+    assert read(wear, first=right) == tuple(forms.signed(half, 8) for half in halves)
+    assert read(wear, first=right, signed=False) == tuple(forms.unsigned(half, 8) for half in halves)
+    for wrong in ({"first": right[::-1]}, {"first": (0x05FD, 0x8006)}, {"first": right, "width": 17}):
+        with pytest.raises(RejectedError, match=r"^a\.wear_limits must hold the limits of all channels$"):
+            read(wear, **wrong)
+    with pytest.raises(
+        RejectedError, match=r"^a core whose channels have limits of their own must have a memory a\.wear_limits$"
+    ):
+        read(wear)
 
 
 @pytest.mark.slow

@@ -19,7 +19,11 @@ from sosmith.gen.specification.specification import load
 from sosmith.hdl.plan.instructions import address_bits, encoded, instruction_bits
 from sosmith.model.dataflow.program import EARLY_WRITES, LATE_WRITES, PRODUCTS, Instruction, Opcode, Program
 from sosmith.verify.graph import RejectedError
-from sosmith.verify.program.check import check_program
+from sosmith.verify.program.check import _check_order, _Run, check_program
+from sosmith.verify.program.graph_forms import joined
+from sosmith.verify.program.normal_form import constant, plus, scaled
+from sosmith.verify.program.run import one_bit_away, samples
+from sosmith.verify.program.text import read_program
 
 FOLDABLE = ("df1", "df1_ef1", "df1_ef2", "df2t", "delta", "state_space")
 LOCOMOTIVE = "flange_wear_locomotive.toml"
@@ -179,6 +183,96 @@ def test_a_wrong_field_is_named(opcode: Opcode, field: dict[str, int], sentence:
         core.check(text)
 
 
+def test_nothing_that_is_added_as_it_is_may_be_left_out() -> None:
+    """One of them is what a counter counts by: of the node with it, the sum without it lacks just a 1."""
+    core = small(PLAIN)
+    graph = joined(core.certificate)
+    added = [k for k, i in enumerate(core.program.instructions) if (i.opcode, i.constant) == (Opcode.MULTIPLY, 1)]
+    assert len(added) == 2
+    for number in added:
+        without = encoded(core.program.instructions[number]._replace(constant=0), core.program)
+        run = _Run(read_program(changed(core, number, without), core.certificate.name), graph, core.certificate)
+        with pytest.raises(RejectedError, match=r"^instruction"):
+            run.all()
+
+
+def test_a_word_that_is_read_right_after_it_is_stored() -> None:
+    core = small(PLAIN)
+    program = read_program(core.text, core.certificate.name)
+    numbers = [k for k, one in enumerate(program.instructions) if one.end == "finish" and k + 4 < len(program.codes)]
+    assert any(k & 4 for k in numbers)  # so that the number and what is added to it have a digit in common
+    for number in numbers:
+        for later in range(number + 1, number + 4):
+            early = core.program.instructions[later]._replace(
+                opcode=Opcode.MULTIPLY, address=core.program.instructions[number].target, constant=3
+            )
+            changes = (*program.codes[:later], encoded(early, core.program), *program.codes[later + 1 :])
+            sentence = (
+                rf"^instruction {later} \(.*\) must (read its word 4 or more instructions after it is stored, not "
+                rf"{later - number}|take digit 0 of the sample, which must be taken first)$"
+            )
+            with pytest.raises(RejectedError, match=sentence):
+                _check_order(replace(program, codes=changes))
+
+
+def test_a_program_that_is_one_bit_away_is_found() -> None:
+    core = small(PLAIN)
+    program, graph = read_program(core.text, core.certificate.name), joined(core.certificate)
+    states = dict.fromkeys(graph.delays, 0)
+    results = [graph.step(row, states) for row in samples(core.certificate, 30)]
+
+    def found(code: int) -> list[tuple[int, int]]:
+        wrong = replace(program, codes=(*program.codes[:3], code, *program.codes[4:]))
+        return list(one_bit_away(wrong, core.certificate, results, []))
+
+    top = 1 << program.code_bits - 4
+    assert found(program.codes[3] ^ top) == [(3, program.codes[3])]
+    assert found(program.codes[3] ^ top ^ top >> 4) == []
+    assert found(program.codes[3]) == []
+
+
+def test_what_is_taken_is_one_digit_of_an_input() -> None:
+    core = small(PLAIN)
+    run = _Run(read_program(core.text, core.certificate.name), joined(core.certificate), core.certificate)
+    code = [("s_axis_tdata", k) for k in range(8)]
+    (x,) = (scaled(run._of[node], run._frac(node)) for node in run.graph.inputs)
+    whole = run._taken(0, [*code, *[code[7]] * 8])
+    assert (whole.form, whole.low, whole.high) == (x, -128, 127)
+    upper = run._taken(0, [0, 0, *code[3:], code[7]])
+    assert (upper.form, upper.low, upper.high) == (scaled(run._forms.floor(scaled(x, -3)), 2), -64, 60)
+    lower = run._taken(0, [0, *code[1:3], 0, 0])
+    floors = [run._forms.floor(scaled(x, -k)) for k in (1, 3)]
+    assert (lower.form, lower.low, lower.high) == (scaled(plus(floors[0], floors[1], -4), 1), 0, 6)
+    assert run._taken(0, [0, 0]).form == {}
+    sentence = r"^instruction 0 .* must take a digit of an input, not bits of several$"
+    for wrong in ([*code[:3], code[0]], code[:3], [*code[:3], 0, code[3]], [code[1], code[0], 0], [*code, code[6]]):
+        with pytest.raises(RejectedError, match=sentence):
+            run._taken(0, wrong)
+
+
+@pytest.mark.parametrize(("low", "high"), [(-128, 0), (-65, 0), (0, 127), (0, 64)])
+def test_a_result_without_room_for_what_it_is(low: int, high: int) -> None:
+    core = small(PLAIN)
+    program, graph = read_program(core.text, core.certificate.name), joined(core.certificate)
+    node = graph.nodes[graph.output]
+    other = replace(node, entry=node.entry.model_copy(update={"low": low, "high": high}))
+    nodes = (*graph.nodes[: graph.output], other, *graph.nodes[graph.output + 1 :])
+    run = _Run(replace(program, results=(7,)), replace(graph, nodes=nodes), core.certificate)
+    sentence = rf"^the result must have room for node \d+ \(.*\) of output_stage, in {low}\.\.{high}, not 7 bits$"
+    with pytest.raises(RejectedError, match=sentence):
+        run._check_result()
+
+
+def test_the_word_that_holds_1_adds_just_the_constant() -> None:
+    core = small(PLAIN)
+    run = _Run(read_program(core.text, core.certificate.name), joined(core.certificate), core.certificate)
+    for factor in (-5, 7):
+        run._add(run._words[-1], constant(factor), (factor, factor))
+    assert (run._acc.total, run._acc.low, run._acc.high) == (constant(2), 2, 2)
+    base = 1 << run.program.digit_bits
+    assert run._forms.extent(run._operand.form) == (run._operand.low, run._operand.high) == (-base, base - 1)
+
+
 def test_an_opcode_that_does_not_exist() -> None:
     core = small(PLAIN)
     with pytest.raises(RejectedError, match=r"^instruction 3 must have an opcode below 13, not 14$"):
@@ -212,6 +306,8 @@ def test_other_limits_of_the_calibration() -> None:
     sentence = r"^the program must judge voltage by the codes 5\.\.4000, not 0\.\.4095$"
     with pytest.raises(RejectedError, match=sentence):
         check_program(core.text, core.certificate, calibrated=[(5, 4000), (0, 1023)])
+    with pytest.raises(ValueError, match=r"^zip\(\) argument 3 is shorter than arguments 1-2$"):
+        check_program(core.text, core.certificate, calibrated=[(0, 4095)])
 
 
 def test_the_limits_of_the_calibration_are_read() -> None:

@@ -9,7 +9,7 @@ from tests.verify.small_specifications import PLAIN
 from sosmith.hdl.plan.instructions import encoded
 from sosmith.model.dataflow.program import Opcode
 from sosmith.verify.graph import RejectedError
-from sosmith.verify.program.logic import Logic
+from sosmith.verify.program.logic import Logic, _all, _any
 from sosmith.verify.program.text import read_program
 
 
@@ -17,6 +17,16 @@ def test_the_parts_of_a_sum_that_is_assigned_to_several_signals() -> None:
     logic = Logic("  wire [2:0] high;\n  wire low;\n  assign { high, low } = 2'h3;\n")
     assert logic.value("low", {}) == [1]
     assert logic.value("high", {}) == [1, 0, 0]
+
+
+def test_a_bit_that_decides_counts_beside_one_that_is_not_known() -> None:
+    a, b = ("a", 0), ("b", 0)
+    for of, decides in ((_any, 1), (_all, 0)):
+        neutral = 1 - decides
+        assert of([neutral, neutral]) == [neutral]
+        assert of([decides, None]) == of([None, decides]) == of([a, decides, b]) == [decides]
+        assert of([neutral, a]) == of([a, neutral, a]) == [a]
+        assert of([a, b]) == of([a, None]) == of([neutral, None]) == [None]
 
 
 def test_a_second_write_port_is_rejected() -> None:
