@@ -314,7 +314,10 @@ class Forms:
         return remainder
 
     def _unnested(self, form: Form) -> Form:
-        """Use ``floor((floor(a) + j) / m) = floor((a + j) / m)`` for an integer j, if there is one such floor."""
+        """Use ``floor((floor(a) + j) / m) = floor((a + j) / m)`` for an integer j, if there is such a floor.
+
+        Of several, it is that of the finest argument: a value that is floored after others were that went into it.
+        """
         below = lcm(*(value.denominator for value in form.values())) if form else 1
         unit = Fraction(1, below)
         inner = [
@@ -322,11 +325,14 @@ class Forms:
             for monomial, value in form.items()
             if len(monomial) == 1 and value == unit and self._is_floor(monomial[0])
         ]
-        if len(inner) != 1 or any(inner[0][0] in monomial for monomial in form.keys() - {inner[0]}):
+        if not inner:
             return form
-        inside = self._atoms[inner[0][0]].inside
+        finest = max(inner, key=lambda monomial: (self.grain({monomial: 1}), monomial))
+        if any(finest[0] in monomial for monomial in form.keys() - {finest}):
+            return form
+        inside = self._atoms[finest[0]].inside
         assert inside is not None
-        others = {monomial: value for monomial, value in form.items() if monomial != inner[0]}
+        others = {monomial: value for monomial, value in form.items() if monomial != finest}
         return plus(others, inside, unit)
 
     def _sign(self, rest: Form) -> int:

@@ -49,7 +49,7 @@ from sosmith.verify.reader.syntax import Bits, Choice, Statement
 
 DATA = "s_axis_tdata"
 
-_MOST_OPENED = 4
+_MOST_OPENED = 8
 """Most variables that are replaced by what they stand for, one after the other, for one comparison."""
 
 

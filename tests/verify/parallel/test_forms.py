@@ -153,3 +153,25 @@ def test_the_reader_understands_what_icarus_does(channels: int, tmp_path: Path) 
             for name, cell in zip(seen, found, strict=True)
         )
     assert len({row["m_axis_tdata"] for row in expected}) > 30
+
+
+def test_what_was_taken_apart_ranges_no_further_than_the_whole() -> None:
+    """``6 (x mod 8) + x`` is as large as its parts allow, though its form has x seven times and a floor 48 times."""
+    forms = Forms()
+    x = forms.variable("x", -32, 31)
+    assert forms.limits(plus(x, forms.unsigned(x, 3), 6)) == (-32, 31 + 6 * 7)
+    assert forms.limits(plus(x, forms.unsigned(x, 3), -6)) == (-32 - 6 * 7, 31)
+    assert forms.unsigned(plus(plus(x, forms.unsigned(x, 3), 6), constant(32)), 7) == plus(
+        plus(x, forms.unsigned(x, 3), 6), constant(32)
+    )
+
+
+def test_of_several_floors_in_one_that_of_the_finest_argument_is_left_out() -> None:
+    forms = Forms()
+    x, z = forms.variable("x", -100, 100), forms.variable("z", -100, 100)
+    coarse = forms.floor(shifted(x, -2))
+    for last in (forms.floor(shifted(z, -4)), forms.floor(plus(shifted(z, -4), constant(Fraction(1, 2))))):
+        ((monomial, _),) = last.items()
+        inside = forms.atom(monomial[0]).inside
+        assert inside is not None
+        assert forms.floor(shifted(plus(coarse, last), -3)) == forms.floor(shifted(plus(coarse, inside), -3))
