@@ -76,6 +76,24 @@ def test_products_in_pieces_fit_blocks_and_give_the_same_codes(seed: int, bits: 
         assert node.parameter > 0 or operand.signed
 
 
+@pytest.mark.parametrize("low", [0, -2048])
+@pytest.mark.parametrize("constants", [(45, 23), (-45, 23), (45, -23), (-45, -23), (-717, -4813)])
+def test_pieces_have_the_right_sign_wherever_products_are_used(constants: tuple[int, int], low: int) -> None:
+    g = GraphBuilder()
+    x, a = g.input("x", 0, low, 2047), g.input("a", 0, -9, 9)
+    outputs = []
+    for constant in constants:
+        users = [g.scale(x, constant, 2) for _ in range(5)]
+        outputs += [users[0], g.add(a, users[1]), g.add(users[2], a), g.subtract(a, users[3]), g.subtract(users[4], a)]
+    p, q, r, s, t, _ = (g.scale(x, constant, 2) for constant in constants * 3)
+    graph = g.build([*outputs, g.add(p, q), g.subtract(r, s), g.add(t, t)])
+    pieces, blocks = with_blocks(graph, range(len(graph.nodes)), 5)
+    rows = [[value, k % 19 - 9] for k, value in enumerate(range(low, 2048, 97))]
+    assert pieces.run(rows) == graph.run(rows)
+    factors = [(pieces.nodes[pieces.nodes[i].operands[0]].signed, pieces.nodes[i].parameter) for i in blocks]
+    assert all(signed or factor > 0 for signed, factor in factors)
+
+
 @pytest.mark.parametrize("lanes", [2, 3, 4, 8, 16])
 @pytest.mark.parametrize("seed", range(6))
 def test_unfolded_graphs_give_the_same_codes(seed: int, lanes: int) -> None:
