@@ -15,6 +15,7 @@ from sosmith.gen.specification.combinations import Terms
 from sosmith.gen.word_lengths.cost import Cost, cost_of_graphs, products_from_adders
 from sosmith.gen.word_lengths.objective import Objective
 from sosmith.hdl.plan import decimator_clocks
+from sosmith.hdl.plan.look_ahead import Products
 from sosmith.hdl.plan.unfolding import unfolded_stages
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.decimator import Decimator
@@ -211,6 +212,11 @@ class Architecture(ABC):
         where products share a unit.
         """
         return products_from_adders(self.graphs, None, self.blocks.bits)
+
+    @property
+    def products(self) -> Products | None:
+        """How products by constants are made with look-ahead; None without."""
+        return None
 
     @property
     def _sized(self) -> tuple[Sequence[Graph], Sequence[frozenset[int]]]:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from sosmith.gen.architectures.blocks import Blocks
-from sosmith.gen.word_lengths.cost import bits_by_digits, cost_of_graphs, multiplication_of, scalings
+from sosmith.gen.word_lengths.cost import bits_by_digits, cost_of_graphs, multiplication_of
 from sosmith.hdl.plan.block_products import blocks_of, with_blocks
 from sosmith.hdl.plan.look_ahead import Products
+from sosmith.model.dataflow.adder_graph import scalings
 from sosmith.model.dataflow.graph import Graph, GraphBuilder, Op
 
 _WORTH_A_BLOCK = 18

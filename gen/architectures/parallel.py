@@ -12,10 +12,11 @@ from sosmith.gen.architectures.blocks import NO_LIMIT, Blocks
 from sosmith.gen.architectures.look_ahead_products import products_for
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.specification.combinations import PARALLEL
-from sosmith.gen.word_lengths.cost import products_from_adders, scalings
+from sosmith.gen.word_lengths.cost import products_from_adders
 from sosmith.gen.word_lengths.objective import FEW_ADDERS, SMALL_AREA, Objective
 from sosmith.hdl.plan import parallel_clocks
 from sosmith.hdl.plan.look_ahead import Products, in_pieces
+from sosmith.model.dataflow.adder_graph import scalings
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.graph import Graph
 from sosmith.model.reload.constants import with_room

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 
 from sosmith.gen.architectures.architecture import Architecture
 from sosmith.gen.architectures.folded_fir import FoldedFir
-from sosmith.gen.architectures.parallel import Parallel
 from sosmith.gen.estimate.graphs import of_pipelined, of_start
 from sosmith.gen.estimate.memories import of_memory
 from sosmith.gen.estimate.online import of_units
@@ -82,7 +81,7 @@ def _of_stages(architecture: Architecture, device: Device) -> Quantities:
 def _pipelined(architecture: Architecture, datapath: Datapath) -> Sequence[Pipelined]:
     """Return the stages with their pipeline stages."""
     stages = unfolded_stages(datapath, architecture.samples_per_clock)
-    if isinstance(architecture, Parallel) and architecture.products is not None:
+    if architecture.products is not None:
         return [Pipelined.of_turns(plan) for plan in plans(stages, architecture.products)]
     graphs = [(stage.graph, made) for stage, made in zip(stages, architecture.adders, strict=True)]
     if _starts(architecture, datapath):  # no stage passes the first sample on

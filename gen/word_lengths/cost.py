@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from sosmith.hdl.plan.used_bits import used_bits
-from sosmith.model.dataflow.adder_graph import adder_bits, adder_graph, by_operand, signed_digits
+from sosmith.model.dataflow.adder_graph import adder_bits, adder_graph, by_operand, scalings, signed_digits
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.graph import Graph, Node, Op
 
@@ -182,11 +182,6 @@ def area_by_digits(graph: Graph) -> int:
     take less, but not in the time that a search among thousands of constants has.
     """
     return cost_of_graphs([graph], [scalings(graph)], bits_by_digits).area
-
-
-def scalings(graph: Graph) -> frozenset[int]:
-    """Return the products by constants that can be made of adders: all but those by 0."""
-    return frozenset(index for index, node in enumerate(graph.nodes) if node.op is Op.SCALE and node.parameter)
 
 
 def products_from_adders(

@@ -16,9 +16,9 @@ from sosmith.gen.word_lengths.cost import (
     bits_by_digits,
     cost_of,
     cost_of_graphs,
-    scalings,
 )
 from sosmith.hdl.plan.block_products import with_blocks
+from sosmith.model.dataflow.adder_graph import scalings
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.folding.fold import columns_of, program
 from sosmith.model.dataflow.folding.values import FoldingError

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 
-from sosmith.model.dataflow.adder_graph import adder_graph, by_operand, multiple_range, odd_part
+from sosmith.model.dataflow.adder_graph import adder_graph, by_operand, multiple_range, odd_part, scalings
 from sosmith.model.dataflow.graph import Graph, GraphBuilder, Op, Wire
 
 
@@ -30,9 +30,7 @@ def with_sums(graph: Graph, apart: Collection[int] = ()) -> Graph:
     Those in `apart` stay as they are.
     """
     g = GraphBuilder()
-    scaled = [
-        index for index, node in enumerate(graph.nodes) if node.op is Op.SCALE and node.parameter and index not in apart
-    ]
+    scaled = sorted(scalings(graph) - {*apart})
     groups = {index: group for group in by_operand(graph, scaled) for index in group[1]}
     multiples: dict[int, dict[int, Wire]] = {}
     wires: list[Wire] = []

@@ -6,9 +6,9 @@ samples of T channels do (`sosmith.hdl.plan.interleaving`). The loop then has T 
 pipeline stages as it likes; its delays are registers that move with every sample.
 
 Products by constants are sums (`sosmith.hdl.plan.constant_products`), between which pipeline stages may end, or pieces
-for multiplier blocks (`sosmith.hdl.plan.block_products`). A pipeline stage ends behind each block, so that its own
-register takes the product. All stages of a core get pipeline stages of the time that its slowest loop needs: shorter
-ones would take registers for nothing.
+for multiplier blocks (`sosmith.hdl.plan.block_products`), each alone in a pipeline stage: registers of its block are on
+both sides. All stages of a core get pipeline stages of the time that its slowest loop needs: shorter ones would take
+registers for nothing.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from sosmith.hdl.plan.block_products import is_product, with_blocks
 from sosmith.hdl.plan.constant_products import with_sums
 from sosmith.hdl.plan.pipeline import ADDITION, NO_LOGIC, loop_delays, operation_time, recursive
 from sosmith.hdl.plan.reassociation import with_places
+from sosmith.model.dataflow.adder_graph import scalings
 from sosmith.model.dataflow.graph import Graph, GraphBuilder, Op, Wire
 from sosmith.model.dataflow.structure import Stage
 
@@ -80,11 +81,7 @@ class Products:
     @classmethod
     def of_adders(cls, stages: Sequence[Stage]) -> Products:
         """Make all of adders."""
-        scaled = (
-            frozenset(index for index, node in enumerate(stage.graph.nodes) if node.op is Op.SCALE and node.parameter)
-            for stage in stages
-        )
-        return cls(tuple(scaled), 2)
+        return cls(tuple(scalings(stage.graph) for stage in stages), 2)
 
 
 def plans(stages: Sequence[Stage], products: Products) -> tuple[TurnPlan, ...]:
@@ -200,7 +197,7 @@ _Moment = tuple[int, int]
 def _spread(graph: Graph, turns: int, loops: frozenset[int], longest: int) -> TurnPlan:
     """Plan with pipeline stages of the time `longest`; an operation that takes longer has one of its own.
 
-    A register follows each block, but in loops that have no clock for it.
+    Blocks have their registers, but in loops that have no clock for them.
     """
     products = frozenset(index for index, node in enumerate(graph.nodes) if is_product(node))
     plan = _spread_with(graph, turns, loops, longest, products)

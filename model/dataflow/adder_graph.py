@@ -141,6 +141,11 @@ def adder_bits(adders: Iterable[Adder], low: int, high: int) -> int:
     return sum(_bits(adder.multiple, (adder.left[1], adder.right[1]), adder.subtract, low, high) for adder in adders)
 
 
+def scalings(graph: Graph) -> frozenset[int]:
+    """Return the products by constants that can be made of adders: all but those by 0."""
+    return frozenset(index for index, node in enumerate(graph.nodes) if node.op is Op.SCALE and node.parameter)
+
+
 def multiple_range(multiple: int, low: int, high: int) -> tuple[int, int]:
     """Return the smallest and the largest multiple of an operand in low..high."""
     ends = multiple * low, multiple * high

@@ -13,9 +13,9 @@ from sosmith.gen.core import design_core
 from sosmith.gen.fpga.boards import find_board
 from sosmith.gen.realizations.coefficients import with_fewer_digits
 from sosmith.gen.specification.combinations import NO_MULTIPLIERS, SEVERAL, Option
-from sosmith.gen.word_lengths.cost import area_by_digits, cost_of_graphs, products_from_adders, scalings
+from sosmith.gen.word_lengths.cost import area_by_digits, cost_of_graphs, products_from_adders
 from sosmith.gen.word_lengths.objective import FEW_ADDERS, SMALL_AREA
-from sosmith.model.dataflow.adder_graph import signed_digits
+from sosmith.model.dataflow.adder_graph import scalings, signed_digits
 from sosmith.model.dataflow.graph import Graph, GraphBuilder
 
 
