@@ -11,14 +11,15 @@
 
 from __future__ import annotations
 
+from amaranth.hdl import Signal
 from amaranth.lib.memory import Memory, ReadPort, WritePort
 
 _MEMBERS = {"addr": "address", "data": "data", "en": "enable"}
 
 
-def read_port(memory: Memory, name: str) -> ReadPort:
-    """Return a port that reads a memory, one clock later."""
-    port = memory.read_port()
+def read_port(memory: Memory, name: str, domain: str = "sync") -> ReadPort:
+    """Return a port that reads a memory, one clock later; at once in the domain "comb", where nothing enables it."""
+    port = memory.read_port(domain=domain)
     _name(port, f"{name}_read")
     return port
 
@@ -32,4 +33,5 @@ def write_port(memory: Memory, name: str) -> WritePort:
 
 def _name(port: ReadPort | WritePort, name: str) -> None:
     for member, word in _MEMBERS.items():
-        getattr(port, member).name = f"{name}_{word}"
+        if isinstance(signal := getattr(port, member), Signal):
+            signal.name = f"{name}_{word}"

@@ -17,6 +17,7 @@ FLOOR, TRUNCATE and FRACTION. What is added below all bits of a number is put th
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from types import MappingProxyType
 
 from amaranth.hdl import Cat, Const, Module, Mux, Shape, Signal, Value
 from amaranth.lib.wiring import Component
@@ -31,6 +32,9 @@ from sosmith.model.dataflow.graph import Graph, Node, Op
 def shape_of(node: Node) -> Shape:
     """Shape that holds the range of `node`: unsigned if it cannot be negative."""
     return Shape(node.width, signed=node.signed)
+
+
+_NO_WORDS: Mapping[int, Value] = MappingProxyType({})
 
 
 class PipelinedLogic:
@@ -56,6 +60,8 @@ class PipelinedLogic:
         Whether each pipeline stage holds a sample; asked where one uses a state that belongs to a later one.
     adders : collection of int
         Products by constants that are made of adders, see `sosmith.hdl.adders`.
+    words : dict of int to Value
+        What stands for the signals of some DELAY nodes, by node.
 
     Attributes
     ----------
@@ -76,11 +82,12 @@ class PipelinedLogic:
         takes: Sequence[Value],
         valid: Sequence[Value],
         adders: Collection[int] = (),
+        words: Mapping[int, Value] = _NO_WORDS,
     ) -> None:
         self._m, self._graph, self._pipeline_stages = m, graph, pipeline_stages
         self._constants, self._banks, self._takes, self._valid = constants, banks, takes, valid
         self._passed: dict[tuple[int, int], Value] = {}
-        self._adders = adders
+        self._adders, self._words = adders, words
         self._multiples: dict[int, Value] = {}
         self._used = used_bits(graph)
         self._awaited: dict[int, Signal] = {}
@@ -123,6 +130,8 @@ class PipelinedLogic:
             own = self._pipeline_stages[index]
             if node.op is Op.INPUT:
                 self.wires.append(next(given))
+            elif index in self._words:
+                self.wires.append(self._words[index])
             elif node.op is Op.SHIFT or self._is_once(index):  # the same code
                 self.wires.append(self.at(node.operands[0], own))
             else:

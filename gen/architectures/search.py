@@ -271,8 +271,8 @@ class Search:
         fastest = 0.0
         refused = ShortfallError("look-ahead must have more samples than a beat, and responses that are not too long")
         for samples, realization in LOOK_AHEAD.items():
-            if samples <= self.budget.samples_per_clock:
-                continue
+            if samples <= self.budget.samples_per_clock or samples % self.budget.samples_per_clock:
+                continue  # a loop would go back to other lanes of a beat
             planned = self._plan_of(realization.name).under(objective)
             if planned.is_long and not patient:
                 continue

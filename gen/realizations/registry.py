@@ -14,7 +14,7 @@ from typing import Any, Protocol
 from sosmith.gen.realizations.direct_form import direct_form
 from sosmith.gen.realizations.fir import fir_section
 from sosmith.gen.realizations.lattice import Part, lattice_parts, lattice_stage
-from sosmith.gen.realizations.look_ahead import look_ahead
+from sosmith.gen.realizations.look_ahead import look_ahead, look_ahead_parts
 from sosmith.gen.realizations.section_format import WIDE, SectionFormat
 from sosmith.gen.realizations.state_space import minimum_noise, normal, state_space
 from sosmith.gen.realizations.transposed import transposed_form
@@ -61,7 +61,10 @@ class Realization:
         Turns the ideal sections into one part for each stage: the rows themselves for a cascade. Raises
         ShortfallError if the filter has no such realization.
     cascade : bool
-        Whether every stage is one of several ideal sections, in any order, for which words are searched together.
+        Whether every stage is one of several ideal sections, in any order.
+    transfer : callable or None
+        Returns numerator and denominator of a part, in rising powers of 1/z; None for rows, and where the word lengths
+        of a filter that is no cascade are not searched.
     not_decimated : str
         Why a filter that corrects a decimator's droop is not made so, half a sentence; empty if it is.
     """
@@ -70,12 +73,18 @@ class Realization:
     build: Callable[[Any, SectionFormat, str], Section]
     parts: Callable[[Sequence[Row]], Sequence[Any]] = tuple
     cascade: bool = True
+    transfer: Callable[[Any], tuple[Sequence[Any], Sequence[Any]]] | None = None
     not_decimated: str = ""
 
     @property
     def name(self) -> str:
         """As in the specification."""
         return self.terms.name
+
+    @property
+    def searched(self) -> bool:
+        """Whether the word lengths of all stages are searched together."""
+        return self.cascade or self.transfer is not None
 
 
 def _section(make: Callable[..., Section], **options: Any) -> Callable[[Row, SectionFormat, str], Section]:
@@ -153,9 +162,13 @@ def realizations_for(*, fir: bool) -> dict[str, Realization]:
 LOOK_AHEAD: dict[int, Realization] = {
     samples: Realization(
         terms=RealizationTerms(
-            f"look_ahead_{samples}", f"direct form with scattered look-ahead over {samples} samples"
+            f"look_ahead_{samples}",
+            f"zeros in one FIR filter, recursions with scattered look-ahead over {samples} samples",
         ),
-        build=_section(look_ahead, doublings=samples.bit_length() - 1),
+        build=look_ahead,
+        parts=partial(look_ahead_parts, distance=samples),
+        cascade=False,
+        transfer=lambda part: part.transfer,
     )
     for samples in choices.LOOK_AHEAD
 }

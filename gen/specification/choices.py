@@ -51,7 +51,7 @@ STARTS = ("steady", "zero")
 ARCHITECTURES = (AUTO, *TERMS)
 PIPELINES = (AUTO, "plain", "look-ahead")
 SAMPLES_PER_CLOCK = (1, 2, 4, 8, 16)
-LOOK_AHEAD = (2, 4, 8, 16)
+LOOK_AHEAD = (2, 3, 4, 6, 8, 12, 16)
 """Samples over which recursions can look ahead: more than a beat holds."""
 
 CORES = ("instrument", "filter", "calibration")

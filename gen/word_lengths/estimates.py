@@ -1,4 +1,4 @@
-"""Double-precision estimates of a cascade's errors: by coefficient, by quantizer, and the ranges of its nodes.
+"""Double-precision estimates of a filter's errors: by coefficient, by quantizer, and the ranges of its nodes.
 
 The gain to the output for a quantizer, the response of the derivative for a coefficient, so that errors of several
 coefficients may cancel. They only guide the choice of word lengths; the result is proven afterwards.
@@ -10,15 +10,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import zip_longest
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.gen.filter.design import estimated_length
 from sosmith.gen.proof.linear_model import Source, linear_model, quantizers, transfer_function
 from sosmith.gen.realizations.registry import Section, realization_of
 from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
-from sosmith.model.arithmetic.recursive_filters import lfilter, sosfilt
+from sosmith.gen.word_lengths.part_responses import responses_around
+from sosmith.model.arithmetic.recursive_filters import lfilter
 from sosmith.model.dataflow.graph import Op
 from sosmith.model.errors import ShortfallError
 
@@ -85,13 +86,13 @@ class Estimate:
         return low - spread, high + spread
 
 
-def estimates_of(rows: Sequence[Sequence[float]], realization: str, windows: Sequence[Window]) -> list[Estimate]:
-    """Estimate every section of a cascade.
+def estimates_of(parts: Sequence[Any], realization: str, windows: Sequence[Window]) -> list[Estimate]:
+    """Estimate every stage of a filter.
 
     Parameters
     ----------
-    rows : sequence of sequence of float
-        b0, b1, b2, 1, a1, a2 of each section.
+    parts : sequence
+        What the realization makes its stages from, in their order: b0, b1, b2, 1, a1, a2 of each section of a cascade.
     realization : str
         Its name, known to `sosmith.gen.realizations.registry.realization_of`.
     windows : sequence of Window
@@ -102,15 +103,12 @@ def estimates_of(rows: Sequence[Sequence[float]], realization: str, windows: Seq
     ShortfallError
         If a section cannot be built, or its response does not decay in time.
     """
-    sos = np.array(rows, dtype=np.float64)
-    impulse = np.zeros(estimated_length(sos))
+    around = responses_around(parts, realization)
+    impulse = np.zeros(len(around[0].behind))
     impulse[0] = 1.0
-    through = [sosfilt(sos[:k], impulse) if k else impulse for k in range(len(rows))]
-    behind = [sosfilt(sos[k + 1 :], impulse) if k + 1 < len(rows) else impulse for k in range(len(rows))]
-    others = [sosfilt(np.delete(sos, k, axis=0), impulse) if len(rows) > 1 else impulse for k in range(len(rows))]
     result = []
-    for k, row in enumerate(rows):
-        section = _exact(row, realization)
+    for k, part in enumerate(parts):
+        section = _exact(part, realization)
         model = linear_model(section.graph)
         poles = _floats(model.denominator)
         names = {i: section.graph.nodes[i].name for i in model.bounds}
@@ -118,10 +116,12 @@ def estimates_of(rows: Sequence[Sequence[float]], realization: str, windows: Seq
         result.append(
             Estimate(
                 ideal={name: integer * 2.0**-frac for name, (integer, frac) in section.coefficients.items()},
-                slopes={name: _slope(row, realization, section, name, others[k]) for name in section.coefficients},
-                gains={s.name: _gain(s, model.output, poles, behind[k]) for s in quantizers},
+                slopes={
+                    name: _slope(part, realization, section, name, around[k].others) for name in section.coefficients
+                },
+                gains={s.name: _gain(s, model.output, poles, around[k].behind) for s in quantizers},
                 limits={
-                    name: _limits(_filtered(model.sources[0].numerators[i], poles, through[k]), windows)
+                    name: _limits(_filtered(model.sources[0].numerators[i], poles, around[k].through), windows)
                     for i, name in names.items()
                 },
                 spreads={name: {s.name: _gain(s, i, poles, impulse) for s in quantizers} for i, name in names.items()},
@@ -177,29 +177,27 @@ def _gain(quantizer: Source, node: int, poles: Sequence[float], behind: Array) -
     return unit * float(np.abs(_filtered(quantizer.numerators[node], poles, behind)).sum())
 
 
-def _exact(
-    row: Sequence[float], realization: str, coefficients: Mapping[str, tuple[int, int]] | None = None
-) -> Section:
+def _exact(part: Any, realization: str, coefficients: Mapping[str, tuple[int, int]] | None = None) -> Section:
     """Build a section with exact coefficients, except for those given, in which every quantizer drops bits."""
     build = realization_of(realization).build
     # An operand has bits to drop only if its terms have fraction bits: those of the input, too, as b0's has no others.
     formats = SectionFormat(coefficient_bits=_EXACT_BITS, coefficients=coefficients or {}, x=unknown_range(1))
-    section = build(row, formats, "section")
+    section = build(part, formats, "section")
     fracs = dict.fromkeys(quantizers(section.graph), 1) | dict.fromkeys(section.optional_quantizers, 0)
     fracs |= dict.fromkeys(_products(section), 2)  # more than v keeps, which would drop nothing otherwise
-    return build(row, replace(formats, fracs=fracs), "section")
+    return build(part, replace(formats, fracs=fracs), "section")
 
 
-def _slope(row: Sequence[float], realization: str, section: Section, name: str, others: Array) -> Array:
+def _slope(part: Any, realization: str, section: Section, name: str, others: Array) -> Array:
     """Impulse response of the derivative of a section by a coefficient, filtered by all other sections."""
     integer, frac = section.coefficients[name]
     shift = max(0, 30 - abs(integer).bit_length())
     step = max(1, abs(integer) << shift >> 24)
     moved = (integer << shift) + step, frac + shift
     try:
-        moved_to = _exact(row, realization, {name: moved})
+        moved_to = _exact(part, realization, {name: moved})
     except ShortfallError:
-        moved_to = _exact(row, realization, {name: (moved[0] - 2 * step, moved[1])})
+        moved_to = _exact(part, realization, {name: (moved[0] - 2 * step, moved[1])})
         step = -step
     (b, a), (changed_b, changed_a) = transfer_function(section.graph), transfer_function(moved_to.graph)
     delta = step * Fraction(2) ** -moved[1]

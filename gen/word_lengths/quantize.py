@@ -40,6 +40,9 @@ _BITS_TO_ORDER = 24
 _MOST_WORK = 1_000_000
 """Samples of all coefficients' responses together up to which formats with look-ahead are trimmed."""
 
+_FINER = 4
+"""How much smaller the errors are that trimming starts with where a stage has many coefficients: room to choose."""
+
 _ATTEMPTS = 4
 """How often formats are chosen again with estimates before exact figures are used."""
 
@@ -173,10 +176,11 @@ def plan(
     if steady:
         before = tuple(starting(stage, gain_at_zero(cast("Filter", ideal)), share) for stage in before)
     search, start = None, None
-    if ideal is not None and realization_of(realization).cascade:
-        ideal = _ordered(ideal, realization)
-        search = Search(ideal.rows, realization, before, gain, steady=steady)
-        start = search.start(float(share), MAX_BITS)
+    if ideal is not None and realization_of(realization).searched:
+        ideal = _ordered(ideal, realization) if realization_of(realization).cascade else ideal
+        search = Search(parts_of(ideal, realization), realization, before, gain, steady=steady)
+        fine = 1 if realization_of(realization).cascade else _FINER
+        start = search.start(float(share) / fine, MAX_BITS)
     planned = Plan(
         name=name,
         inputs=inputs,

@@ -21,7 +21,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import combinations, pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -53,6 +53,10 @@ _STEPS = (1, 2, 3)
 """Bits that one step may drop: several, as a shorter fraction may save something only once it is the shortest one."""
 
 
+_MANY, _ALIKE = 10, 0.5
+"""Coefficients of a stage beyond which one look at all steps takes several, and how much of the best one's merit."""
+
+
 class _Input(NamedTuple):
     """Output range of an input stage, its error at the filter's output in LSBs, and its estimated size."""
 
@@ -81,8 +85,8 @@ class Search:
 
     Parameters
     ----------
-    rows : sequence of sequence of float
-        b0, b1, b2, 1, a1, a2 of each section.
+    parts : sequence
+        What the realization makes its stages from, in their order: b0, b1, b2, 1, a1, a2 of each section of a cascade.
     realization : str
         Its name, known to `sosmith.gen.realizations.registry.realization_of`.
     input_stages : sequence of InputStage
@@ -102,7 +106,7 @@ class Search:
 
     def __init__(
         self,
-        rows: Sequence[Sequence[float]],
+        parts: Sequence[Any],
         realization: str,
         input_stages: Sequence[InputStage],
         gain: Fraction,
@@ -110,8 +114,8 @@ class Search:
         *,
         steady: bool = False,
     ) -> None:
-        self._build = realization_of(realization).build
-        self._rows = rows
+        self._build, self._transfer = realization_of(realization).build, realization_of(realization).transfer
+        self._parts = parts
         self._input_stages = input_stages
         self._gain = gain
         self._objective = objective
@@ -119,7 +123,7 @@ class Search:
         x = self._inputs[0].x
         low, high = x.low * 2.0**-x.frac, x.high * 2.0**-x.frac
         self._windows = [(0.0, high), (low, 0.0)] if steady else [(low, high)]
-        self._estimates = estimates_of(rows, realization, self._windows)
+        self._estimates = estimates_of(parts, realization, self._windows)
         self._base: _Base | None = None
         self._ranges: dict[tuple[object, ...], dict[str, tuple[int, int]]] = {}
         self._known: dict[tuple[object, ...], tuple[float, Range, dict[str, int]]] = {}
@@ -134,9 +138,10 @@ class Search:
     @property
     def key(self) -> tuple[object, ...]:
         """All that `trimmed` depends on besides the realization, with equal representations where it is equal."""
-        rows = [[float(value) for value in row] for row in self._rows]
+        plain = self._transfer is None  # rows, of numbers that may have other types
+        parts = [[float(value) for value in part] if plain else part for part in self._parts]
         inputs = [(*each.x, float(each.error), float(each.size)) for each in self._inputs]
-        return rows, inputs, self._windows, self._objective
+        return parts, inputs, self._windows, self._objective
 
     def under(self, objective: Objective) -> Search:
         """Return the same search for another objective."""
@@ -232,7 +237,7 @@ class Search:
         choice, error, size = start, self.error(start), self.size(start)
         while error <= allowed:
             self._base = self._based(choice.formats)
-            best: tuple[float, Choice, float, float] | None = None
+            steps: list[tuple[float, Choice, float, float]] = []
             for candidate in self._steps(choice, calibration=calibration):
                 after = self.error(candidate)
                 if after > allowed:
@@ -240,18 +245,38 @@ class Search:
                 saved = size - self.size(candidate)
                 if saved <= 0:
                     continue
-                merit = saved / max(after - error, 1e-6 * allowed)
-                if best is None or merit > best[0]:
-                    best = merit, candidate, after, size - saved
-            if best is None:
+                steps.append((saved / max(after - error, 1e-6 * allowed), candidate, after, size - saved))
+            if not steps:
                 exchange = self._exchange(choice, size, allowed, calibration=calibration)
                 if exchange is None:
                     break
                 choice, size = exchange
                 error = self.error(choice)
                 continue
-            _, choice, error, size = best
+            before = choice
+            best, choice, error, size = max(steps, key=lambda step: step[0])
+            if len(self._estimates[0].ideal) > _MANY:
+                likely = sorted((step for step in steps if step[0] > best * _ALIKE), key=lambda step: -step[0])
+                choice, error, size = self._further(before, (choice, error, size), likely[1:], allowed)
         return choice
+
+    def _further(
+        self,
+        before: Choice,
+        taken: tuple[Choice, float, float],
+        likely: Sequence[tuple[float, Choice, float, float]],
+        allowed: float,
+    ) -> tuple[Choice, float, float]:
+        """Take steps of other places too, as far as they save something together with what has been taken."""
+        choice, error, size = taken
+        for _, candidate, _, _ in likely:
+            other = _with_step(choice, before, candidate)
+            if other is None:
+                continue
+            after, smaller = self.error(other), self.size(other)
+            if after <= allowed and smaller < size:
+                choice, error, size = other, after, smaller
+        return choice, error, size
 
     def _exchange(
         self, choice: Choice, size: float, allowed: float, *, calibration: bool
@@ -489,7 +514,7 @@ class Search:
     def _built(self, k: int, x: Range, form: SectionFormat) -> tuple[float, Range, dict[str, int]]:
         name = f"section{k}"
         ranges = self._ranges_of(k, x.frac, form, name)
-        section = self._build(self._rows[k], replace(form, ranges=ranges, x=x), name)
+        section = self._build(self._parts[k], replace(form, ranges=ranges, x=x), name)
         graph = section.graph
         output = graph.nodes[graph.outputs[0]]
         optional = section.optional_quantizers
@@ -511,12 +536,30 @@ class Search:
         key = (k, frac, kinds, tuple(form.fracs.items()))
         if key not in self._ranges:
             ranges = {}
-            section = self._build(self._rows[k], replace(form, x=unknown_range(frac)), name)
+            section = self._build(self._parts[k], replace(form, x=unknown_range(frac)), name)
             for node, bits in section.stated_fracs.items():
                 low, high = self._estimates[k].limits_of(node, form.fracs)
                 ranges[node] = math.floor(low * 2.0**bits), math.ceil(high * 2.0**bits)
             self._ranges[key] = ranges
         return self._ranges[key]
+
+
+def _with_step(choice: Choice, before: Choice, candidate: Choice) -> Choice | None:
+    """Return a choice with the step from `before` to a candidate; None if that place has another format by now."""
+    if candidate.input_stage != before.input_stage:
+        return None
+    for k, (old, new) in enumerate(zip(before.formats, candidate.formats, strict=True)):
+        if new is old:
+            continue
+        now = choice.formats[k]
+        for field in ("coefficients", "fracs"):
+            values, others, current = (dict(getattr(form, field)) for form in (old, new, now))
+            changed = {name: value for name, value in others.items() if values.get(name) != value}
+            if any(current.get(name) != values.get(name) for name in changed):
+                return None
+            now = replace(now, **{field: current | changed}) if changed else now
+        choice = choice.with_format(k, now)
+    return choice
 
 
 def _kind(integer: int) -> int | None:

@@ -55,6 +55,8 @@ def with_blocks(graph: Graph, products: Collection[int], bits: int) -> tuple[Gra
         if index in products and is_product(node):
             wanted = node._replace(parameter=-node.parameter, name=f"minus_{node.name}") if index in negated else node
             wires.append(_product(g, operands[0], wanted, bits, pieces))
+        elif index in negated:
+            wires.append(g.scale(operands[0], -node.parameter, node.parameter_frac, f"minus_{node.name}"))
         elif negated & {*node.operands} and node.op is not Op.DELAY:
             wires.append(_turned_sum(g, node, operands, first=node.operands[0] in negated))
         else:
@@ -65,14 +67,17 @@ def with_blocks(graph: Graph, products: Collection[int], bits: int) -> tuple[Gra
 
 
 def _to_negate(graph: Graph, products: Collection[int]) -> set[int]:
-    """Return the products by negative numbers that every user adds to something else, or takes off something else."""
+    """Return the products by negative numbers that every user adds to something else, or takes off something else.
+
+    Those by other numbers than powers of two must be in `products`.
+    """
     negated: set[int] = set()
-    for index in products:
-        node = graph.nodes[index]
+    for index, node in enumerate(graph.nodes):
         users = [other for other in graph.nodes if index in other.operands]
         if (
-            is_product(node)
+            node.op is Op.SCALE
             and node.parameter < 0
+            and (index in products or not is_product(node))
             and index not in graph.outputs
             and all(
                 (user.op is Op.ADD or (user.op is Op.SUBTRACT and user.operands[0] != index))
@@ -93,6 +98,10 @@ def _turned_sum(g: GraphBuilder, node: Node, operands: list[Wire], *, first: boo
 
 def _product(g: GraphBuilder, operand: Wire, node: Node, bits: int, pieces: set[int]) -> Wire:
     """Make a product by a constant, and note its pieces."""
+    if g[operand].width - g[operand].signed < bits and abs(node.parameter) < 1 << (bits - 1):
+        whole = g.scale(operand, node.parameter, node.parameter_frac, node.name)
+        pieces.add(int(whole))
+        return whole
     upper, dropped, rest = _factors(node.parameter, bits)
     frac = node.parameter_frac
     parts = _parts(g, operand, bits)

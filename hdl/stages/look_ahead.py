@@ -7,11 +7,11 @@ registers::
 
     i0 -+--> [x1] -+
         |          v
-        +--------> + --[early_passed1]------------------[early_passed2]--> + ---[v_register]--> o0
-                        +-----------+                                      ^  |
-      [turn] -- read -->| v4, 4 x v |--> Mux(warm1) --[v4_passed2]-> floor(/2)|
-                        +-----------+                                         |
-                             ^ write <-- [turn2], data: v <-------------------+
+        +--------> + --[early_passed1]-----------------[early_passed2]---> + ---[v_register]--> o0
+                +-----------+                                              ^  |
+      [turn] -->| v4, 4 x v |--> & warm --[v4_word]--[v4_passed2]--> floor(/2)|
+                +-----------+                                                 |
+                     ^ write <-- [turn2], data: v <---------------------------+
 
     i_valid --[valid1]--[valid2]--[valid3]--> o_valid       [turn] counts samples: 0, 1, 2, 3, 0, ..
     [warm] is set when it has come around: the samples before have no past, and find 0 whatever the memory holds
@@ -22,14 +22,16 @@ ready at once. A loop that goes back a single sample has a register instead of a
 
 from __future__ import annotations
 
-from amaranth.hdl import Cat, Module, Mux, Signal, Value
+from collections.abc import Mapping
+
+from amaranth.hdl import Cat, Module, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from sosmith.hdl.constant_banks import NO_CONSTANTS
 from sosmith.hdl.memory_ports import read_port, write_port
-from sosmith.hdl.pipelined_logic import PipelinedLogic, limits, name_ports, shape_of
+from sosmith.hdl.pipelined_logic import PipelinedLogic, limits, name_ports, shape_of, unique_names
 from sosmith.hdl.plan.look_ahead import TurnPlan
 from sosmith.model.dataflow.graph import Op
 
@@ -79,6 +81,12 @@ class LookAheadStage(wiring.Component):
         m = Module()
         plan, graph = self.plan, self.plan.graph
         valid = self._passed(m, self.i_valid, "valid", plan.depth, resets=True)
+        names = unique_names(graph)
+        words = {
+            i: Signal(shape_of(graph.nodes[i]), name=f"{names[i]}_word", reset_less=True)
+            for i in plan.loops
+            if plan.turns > 1
+        }
         logic = PipelinedLogic(
             m,
             graph,
@@ -87,6 +95,7 @@ class LookAheadStage(wiring.Component):
             banks=valid,
             takes=[self.advance] * plan.depth,
             valid=valid,
+            words=words,
         )
         sums = [index for index, node in enumerate(graph.nodes) if node.op in {Op.ADD, Op.SUBTRACT}]
         # Synthesis would merge sums that follow each other, and lose the carry chains that they share.
@@ -98,8 +107,8 @@ class LookAheadStage(wiring.Component):
                 following = at(graph.nodes[i].operands[0], stage)
                 with m.If(self.advance & valid[stage]):
                     m.d.sync += wires[i].eq(following)
-        if plan.loops and plan.turns > 1:
-            self._connect_memories(m, logic, valid)
+        if words:
+            self._connect_memories(m, logic, words, valid)
         last = plan.depth - 1
         flags: list[Value] = []
         for k, i in enumerate(graph.outputs):
@@ -124,8 +133,10 @@ class LookAheadStage(wiring.Component):
                 m.d.sync += delayed_by[k].eq(delayed_by[k - 1])
         return delayed_by
 
-    def _connect_memories(self, m: Module, logic: PipelinedLogic, valid: list[Value]) -> None:
-        """Give each state of a loop a memory with one word for each turn."""
+    def _connect_memories(
+        self, m: Module, logic: PipelinedLogic, words: Mapping[int, Signal], valid: list[Value]
+    ) -> None:
+        """Give each state of a loop a memory with one word for each turn, of which `words` takes over one."""
         plan, graph = self.plan, self.plan.graph
         turn, warm = Signal(range(plan.turns), name="turn"), Signal(name="warm")
         with m.If(self.advance & self.i_valid):
@@ -133,18 +144,19 @@ class LookAheadStage(wiring.Component):
             with m.If(turn == plan.turns - 1):
                 m.d.sync += [turn.eq(0), warm.eq(1)]
         turns = self._passed(m, turn, "turn", max(plan.writes.values()))
-        warms = self._passed(m, warm, "warm", max(plan.pipeline_stages[i] for i in plan.loops))
-        for i in sorted(plan.loops):
+        warms = self._passed(m, warm, "warm", max(plan.pipeline_stages[i] for i in plan.loops) - 1)
+        for i in sorted(words):
             node, own, written = graph.nodes[i], plan.pipeline_stages[i], plan.writes[i]
             memory = Memory(shape=shape_of(node), depth=plan.turns, init=[])
             name = f"{logic.names[i]}_memory"
             m.submodules[name] = memory
-            read, write = read_port(memory, name), write_port(memory, name)
+            read, write = read_port(memory, name, domain="comb"), write_port(memory, name)
             following = logic.at(node.operands[0], written)
+            with m.If(self.advance):
+                # Not a multiplexer: synthesis would make a reset of it, with which no register moves into a block.
+                m.d.sync += words[i].eq(read.data.as_unsigned() & warms[own - 1].replicate(node.width))
             m.d.comb += [
                 read.addr.eq(turns[own - 1]),
-                read.en.eq(self.advance),
-                logic.wires[i].eq(Mux(warms[own], read.data, 0)),
                 write.addr.eq(turns[written]),
                 write.data.eq(following),
                 write.en.eq(self.advance & valid[written]),

@@ -1,22 +1,21 @@
-"""Sections with scattered look-ahead: a recursion that goes back M samples at once, so that it has M clocks.
+"""Recursions with scattered look-ahead: they go back M samples at once, so that they have M clocks.
 
-Numerator and denominator of a section are multiplied by the same polynomials, one for each doubling (Parhi and
-Messerschmitt 1989, the decomposition into powers of two). With ``A(w) = 1 + a1 w + a2 w**2`` and w = 1/z::
+The denominator of a section is multiplied by a polynomial that makes of it one in powers of ``w**M``, with w = 1/z. Its
+poles are the M-th powers of those of the section, so that it is as stable as before. The filter's numerator times these
+polynomials stands in front (`sosmith.gen.realizations.look_ahead`), without feedback, as one FIR filter. For a large M
+that would have many taps; the section then doubles its M a few times more. With ``A(w) = 1 + a1 w + a2 w**2``, of which
+w is a power of 1/z already (Parhi and Messerschmitt 1989, the decomposition into powers of two)::
 
     A(w) A(-w) = 1 + (2 a2 - a1**2) w**2 + a2**2 w**4
 
-Its poles are the squares of those of A, in powers of w**2. After log2 M such steps, the denominator is one in powers
-of w**M, and as stable as before. The polynomials that were multiplied stand in front of the recursion, without
-feedback::
+    x --[u0]--> A(-w) --[u1]--> A2(-w**2) --[u2]--> .. --> + --[v]--------+--> y
+                                                           ^              |
+                                                           +-- -A1, -A2 <-+-- z**-M, z**-2M
 
-    x --> B(w) --[u0]--> A(-w) --[u1]--> A2(-w**2) --[u2]--> .. --> + --[v]--------+--> y
-                                                                    ^              |
-                                                                    +-- -A1, -A2 <-+-- w**M, w**2M
-
-Each bracket is a quantizer; a half is added before it to centre its error. What is rounded behind the last of them
-passes the recursion alone, whose gain is far smaller than that of 1/A. The coefficients of every step are rounded on
-their own. The zeros then no longer lie exactly on the poles that were added; that is part of the error of the
-coefficients, and is proven with it.
+Each bracket is a quantizer; without such polynomials, that is v alone. A half is added before it to centre its error.
+What is rounded behind the last of them passes the recursion alone, whose gain is far smaller than that of 1/A. The
+coefficients of every step are rounded on their own. The zeros then no longer lie exactly on the poles that were added;
+that is part of the error of the coefficients, and is proven with it.
 """
 
 from __future__ import annotations
@@ -28,7 +27,6 @@ from functools import cached_property
 from typing import NamedTuple
 
 from sosmith.model.dataflow.graph import Graph, GraphBuilder, Range, Wire
-from sosmith.model.sections.direct_form import Product
 
 Limits = tuple[int, int]
 """Smallest and largest code."""
@@ -50,22 +48,22 @@ class Tap(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class LookAhead:
-    """A first- or second-order section with scattered look-ahead; a stage of a datapath.
+    """The recursion of a first- or second-order section with scattered look-ahead; a stage of a datapath.
 
     Attributes
     ----------
     name : str
         Name of the section.
-    numerator : tuple of Product
-        Products of B, with taps on x alone.
+    distance : int
+        Samples M that the recursion goes back at once.
     factors : tuple of tuple of Tap
         Each polynomial in front of the recursion, without its leading one.
     recursion : tuple of Tap
-        The denominator likewise: ``1 + A1 w**M + A2 w**2M``.
+        The denominator likewise: ``1 + A1 z**-M + A2 z**-2M``.
     x : Range
         Range of the input.
     fracs : tuple of int
-        Most fraction bits that u0, u1, .. keep.
+        Most fraction bits that u0, u1, .. keep; empty without factors.
     ranges : tuple of tuple of int
         Ranges of the codes of u0, u1, .. before their quantizers, from peak gains.
     y_frac : int
@@ -75,7 +73,7 @@ class LookAhead:
     """
 
     name: str
-    numerator: tuple[Product, ...]
+    distance: int
     factors: tuple[tuple[Tap, ...], ...]
     recursion: tuple[Tap, ...]
     x: Range
@@ -94,21 +92,14 @@ class LookAhead:
     @property
     def _feedback(self) -> tuple[Fraction, Fraction]:
         """A1 and A2."""
-        least = self.distance
-        values = {tap.delay // least: tap.value for tap in self.recursion}
+        values = {tap.delay // self.distance: tap.value for tap in self.recursion}
         return values.get(1, Fraction(0)), values.get(2, Fraction(0))
-
-    @property
-    def distance(self) -> int:
-        """Samples M that the recursion goes back at once."""
-        return 1 << len(self.factors)
 
     @property
     def coefficients(self) -> dict[str, tuple[int, int]]:
         """Integer and fraction bits of every coefficient, by name."""
         taps = [tap for factor in (*self.factors, self.recursion) for tap in factor]
-        numerator = {p.name: (p.coefficient, p.frac) for p in self.numerator}
-        return numerator | {tap.name: (tap.coefficient, tap.frac) for tap in taps}
+        return {tap.name: (tap.coefficient, tap.frac) for tap in taps}
 
     @property
     def optional_quantizers(self) -> tuple[str, ...]:
@@ -118,7 +109,7 @@ class LookAhead:
     @cached_property
     def stated_fracs(self) -> dict[str, int]:
         """Fraction bits of the nodes with a stated range, by name, which follow without the graph."""
-        frac = max(self.x.frac + p.frac + p.shift - _least_zeros(p.x) for p in self.numerator)
+        frac = self.x.frac
         fracs = {}
         for k, kept in enumerate(self.fracs):
             fracs[f"u{k}"] = frac
@@ -131,16 +122,13 @@ class LookAhead:
     def graph(self) -> Graph:
         """The section as a dataflow graph with the input ``x`` and the output ``y``."""
         g = GraphBuilder()
-        x = g.input("x", *self.x)
-        before = [x, *_delayed(g, x, "x", max(max(k for k in range(3) if p.x[k]) for p in self.numerator))]
-        terms = []
-        for p in self.numerator:
-            operand = g.combine(list(zip(p.x, before, strict=False)), p.operand if p.is_sum else "")
-            terms.append((1, g.shift(g.scale(operand, p.coefficient, p.frac, f"product_{p.name}"), -p.shift)))
-        wire = self._quantized(g, g.combine(terms), 0)
-        for k, taps in enumerate(self.factors, start=1):
-            past = _delayed(g, wire, f"x{k}", max((tap.delay for tap in taps), default=0))
-            wire = self._quantized(g, g.combine([(1, wire), *_products(g, taps, past)]), k)
+        wire = g.input("x", *self.x)
+        for k in range(len(self.fracs)):
+            if k:
+                taps = self.factors[k - 1]
+                past = _delayed(g, wire, f"x{k}", max((tap.delay for tap in taps), default=0))
+                wire = g.combine([(1, wire), *_products(g, taps, past)])
+            wire = self._quantized(g, wire, k)
         limits = (end >> (self.stated_fracs["v"] - self._kept) for end in self.v_range)
         first = g.delay("y_1", self._kept, *limits)
         past = [first, *_delayed(g, first, "y", max((tap.delay for tap in self.recursion), default=1) - 1, 1)]
@@ -180,8 +168,3 @@ def _delayed(g: GraphBuilder, wire: Wire, name: str, count: int, before: int = 0
     for k in range(1, count + 1):
         samples.append(g.previous(samples[-1] if samples else wire, f"{name}_{before + k}"))
     return samples
-
-
-def _least_zeros(taps: Sequence[int]) -> int:
-    """Trailing zeros of all taps together: bits by which their sum is coarser than what it is made of."""
-    return min((tap & -tap).bit_length() - 1 for tap in taps if tap)

@@ -293,6 +293,11 @@ class Evaluation:
         neutral = constant((1 << width) - 1 if value.symbol == "&" else 0)
         if neutral in (a, b):
             return a if b == neutral else b
+        if value.symbol == "&":
+            for word, other in ((a, b), (b, a)):
+                repeated = self._repeated_bit(word, width)
+                if repeated is not None:
+                    return self._forms.times(repeated, other)
         total: Form = {}
         for place in range(width):
             x, y = (self._forms.unsigned(self._cut(word, place), 1) for word in (a, b)) if width > 1 else (a, b)
@@ -300,6 +305,15 @@ class Evaluation:
             one = both if value.symbol == "&" else plus(plus(x, y), both, -1 if value.symbol == "|" else -2)
             total = plus(total, self._forms.bit(one), 1 << place)
         return total
+
+    def _repeated_bit(self, word: Form, width: int) -> Form | None:
+        """Return the bit that a word repeats in all its places; None if it does not."""
+        ones = (1 << width) - 1
+        if any(value % ones for value in word.values()):
+            return None
+        bit = {monomial: value // ones for monomial, value in word.items()}
+        low, high = self._forms.limits(bit)
+        return bit if low >= 0 and high <= 1 else None
 
     def _any(self, value: Expression) -> Form:
         """Whether a bit is set."""

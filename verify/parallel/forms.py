@@ -162,20 +162,29 @@ class Forms:
     def _limits_without_floors(self, form: Form) -> Iterator[Limits]:
         """Yield limits of a form with floors of what else is in it: ``c floor(a)`` is ``c a`` less c times a remainder.
 
-        Each by itself, the parts of a number that was taken apart seem to range further than what is made of them.
+        Each by itself, the parts of a number that was taken apart seem to range further than what is made of them. A
+        sum may have parts of several numbers: each floor is replaced alone, and all of them together.
         """
         atoms = {atom for monomial in form for atom in monomial}
-        for monomial, factor in form.items():
-            if len(monomial) != 1 or not self._is_floor(monomial[0]):
-                continue
-            inside = self._atoms[monomial[0]].inside
-            assert inside is not None
-            if not atoms & {atom for inner in inside for atom in inner}:
-                continue
-            whole = plus({m: value for m, value in form.items() if m != monomial}, inside, factor)
+        floors = [
+            (monomial, inside)
+            for monomial in form
+            if len(monomial) == 1 and self._is_floor(monomial[0])
+            for inside in [self._atoms[monomial[0]].inside]
+            if inside is not None and atoms & {atom for inner in inside for atom in inner}
+        ]
+        for replaced in ([floor] for floor in floors) if len(floors) < 2 else (*([floor] for floor in floors), floors):
+            gone = {monomial for monomial, _ in replaced}
+            whole: Form = {m: value for m, value in form.items() if m not in gone}
+            below: int | Fraction = 0
+            above: int | Fraction = 0
+            for monomial, inside in replaced:
+                factor = form[monomial]
+                whole = plus(whole, inside, factor)
+                remainder = factor * (1 - Fraction(1, lcm(*(value.denominator for value in inside.values()))))
+                below, above = below + max(remainder, Fraction(0)), above + min(remainder, Fraction(0))
             low, high = self._limits_by_atoms(whole)
-            remainder = factor * (1 - Fraction(1, lcm(*(value.denominator for value in inside.values()))))
-            yield low - max(remainder, Fraction(0)), high - min(remainder, Fraction(0))
+            yield low - below, high - above
 
     def _limits_by_atoms(self, form: Form) -> Limits:
         """Return limits of a form from those of its atoms, as if each were by itself."""

@@ -132,7 +132,7 @@ def distant(turns: int, additions: int) -> Stage:
         delays.append(g.previous(delays[-1], f"y{k}"))
     wire = delays[-1]
     for _ in range(additions):
-        wire = g.add(wire, x)
+        wire = g.shift(g.shift(g.add(wire, x), 1), -1)  # which keeps the sums apart
     y = g.clamp(wire, -100, 100)
     g.connect(delays[0], y)
     return HornerStep("loop", g.build([y]))
