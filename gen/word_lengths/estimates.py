@@ -16,9 +16,9 @@ import numpy as np
 import numpy.typing as npt
 
 from sosmith.gen.proof.linear_model import Source, linear_model, quantizers, transfer_function
+from sosmith.gen.realizations.part_responses import responses_around
 from sosmith.gen.realizations.registry import Section, realization_of
 from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
-from sosmith.gen.word_lengths.part_responses import responses_around
 from sosmith.model.arithmetic.recursive_filters import lfilter
 from sosmith.model.dataflow.graph import Op
 from sosmith.model.errors import ShortfallError
