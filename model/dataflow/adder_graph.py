@@ -38,6 +38,9 @@ _SEARCHED = 72
 _MANY = 8
 """Multiples beyond which one that is there is tried only where it leaves another that is there: bounds the time too."""
 
+_MOST_TRIED = 1 << 21
+"""Terms that are split off for all constants; beyond a share of it, one is taken apart by factors and digits only."""
+
 _COMPARED = 8
 """Most constants that are compared for which is to be made next, those with the fewest signed digits."""
 
@@ -105,8 +108,9 @@ def adder_graph(constants: tuple[int, ...]) -> tuple[Adder, ...]:
     levels = {1: 0}
     splits: dict[int, _Split] = {}
     wanted = {odd_part(constant)[0] for constant in constants} - {1}
+    most = _MOST_TRIED // max(len(wanted), 1)
     while wanted:
-        search = _Search(levels)
+        search = _Search(levels, most)
         simplest = sorted(wanted, key=lambda number: (len(signed_digits(number)), _by_size(number)))[:_COMPARED]
         candidates = [search.cheapest(number, _most_levels(number)) for number in sorted(simplest, key=_by_size)]
         for number, split in min(candidates, key=lambda candidate: candidate.bits).splits.items():
@@ -163,8 +167,9 @@ def _bits(multiple: int, shifts: tuple[int, int], subtract: bool, low: int, high
 class _Search:
     """Finds out what odd numbers take, given the multiples that are there, and on which level of sums each is."""
 
-    def __init__(self, there: Mapping[int, int]) -> None:
+    def __init__(self, there: Mapping[int, int], most_tried: int) -> None:
         self._there = dict(there)
+        self._tried, self._most_tried = 0, most_tried
         self._known: dict[tuple[int, int], _Solution | None] = {}
 
     def cheapest(self, number: int, levels: int) -> _Solution:
@@ -213,7 +218,9 @@ class _Search:
         for cut in range(1, len(digits)):
             low = sum(sign << power for sign, power in digits[:cut])
             yield from _signed((low, 0), odd_part(number - low))
-        places = range(top + 1) if top * len(digits) <= _SEARCHED else ()
+        searched = top * len(digits) <= _SEARCHED and self._tried < self._most_tried
+        places = range(top + 1) if searched else ()
+        self._tried += 2 * len(places) * len(self._there)
         fewer = len(digits) if len(self._there) <= _MANY else 0
         for there in self._there:
             for term in ((sign * there, place) for place in places for sign in (1, -1)):

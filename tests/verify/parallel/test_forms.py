@@ -8,7 +8,7 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
-from tests.verify.parallel.cores import small
+from tests.verify.parallel.cores import looking_ahead, small
 from tests.verify.parallel.simulated import Inputs, run
 
 from sosmith.verify.graph import RejectedError
@@ -164,6 +164,25 @@ def test_what_was_taken_apart_ranges_no_further_than_the_whole() -> None:
     assert forms.unsigned(plus(plus(x, forms.unsigned(x, 3), 6), constant(32)), 7) == plus(
         plus(x, forms.unsigned(x, 3), 6), constant(32)
     )
+
+
+def test_parts_of_several_numbers_in_one_sum_range_no_further_than_the_numbers() -> None:
+    """A sum of lower parts of two states: each floor alone leaves the other state too wide for the word."""
+    forms = Forms()
+    x, z = forms.variable("x", -32, 31), forms.variable("z", -64, 63)
+    total = plus(shifted(forms.unsigned(x, 3), 1), forms.unsigned(z, 4), -1)
+    assert forms.limits(total) == (-15, 14)
+    assert forms.signed(total, 5) == total
+    assert not same_word(forms, forms.signed(total, 4), total, 5)
+
+
+def test_a_word_of_one_repeated_bit_selects_another_word() -> None:
+    """``{ 4{ bit } } & word`` is a product, however many bits the word has."""
+    core = looking_ahead()
+    whole = re.search(r"y_6_memory_read_data & \{ (warm1(?:, warm1)*) \}", core.text)
+    assert whole is not None
+    assert whole[1].count("warm1") == 13
+    core.check()
 
 
 def test_of_several_floors_in_one_that_of_the_finest_argument_is_left_out() -> None:
