@@ -173,7 +173,7 @@ def test_the_mask_is_dragged_and_moved_by_keys(tab: Tab, page: Session) -> None:
     until(page, lambda known: known["preview"]["spec"]["filter"]["passband_loss"] == 0.95)
     tab.value("document.querySelector('input[value=order]').click()")
     tab.until("document.getElementById('handle-cutoff0') !== null && " + PROVEN)
-    assert asked(page, "order") == state(page)["preview"]["filter"]["order"]
+    assert asked(page, "order") == state(page)["preview"]["stages"][0]["filter"]["order"]
 
 
 def test_numbers_are_typed_and_a_wrong_one_is_told(tab: Tab, page: Session) -> None:

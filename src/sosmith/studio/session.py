@@ -9,12 +9,14 @@ from io import StringIO
 from pathlib import Path
 from typing import Any
 
-from sosmith import SosmithError, Specification, SpecificationError
+from sosmith import ChainSpecification, SosmithError, Specification, SpecificationError
 from sosmith.host.loopback import MessageError
-from sosmith.interface.chain.specification import describes_chain
 from sosmith.interface.files import read_text, write_file, write_files
+from sosmith.studio.document import described, told
 from sosmith.studio.edits import changed
+from sosmith.studio.history import History
 from sosmith.studio.lane import Lane, warm_up
+from sosmith.studio.stage_list import added, chosen, moved, removed, split, stages_of
 
 MAX_TEXT = 1 << 16
 """Longest text of a specification, in characters."""
@@ -24,6 +26,8 @@ MAX_FILE = 8 << 20
 
 LATE = 1.0
 """Seconds after which a preview is given up for a newer one; before that, the newer one waits."""
+
+_NO_ERROR: dict[str, Any] = {"error": None, "wrong": [], "elsewhere": ""}
 
 
 class Session:
@@ -46,7 +50,7 @@ class Session:
 
     def __init__(self, file: Path, text: str, on_disk: str | None, folder: Path) -> None:
         self.file = file
-        self._text, self._on_disk = text, on_disk
+        self._history, self._on_disk = History(text), on_disk
         self._folder = folder
         warm_up()
         lock = threading.RLock()
@@ -58,13 +62,17 @@ class Session:
         self._previews, self._proofs, self._others = Lane(lock), Lane(lock), Lane(lock)
         self._previewed, self._begun = "", 0.0
         self._queued: Callable[[], None] | None = None
-        self._side_by_side = False
+        self._side_by_side, self._compared = False, 0
         self._closed = False
-        self._tell("preview", {"error": None})
+        self._tell("preview", _NO_ERROR)
         self._tell("realizations", {"state": "off", "rows": []})
         for topic in ("trace", "report", "calibration"):
             self._tell(topic, {"state": "none"})
         self._renew(moving=False)
+
+    @property
+    def _text(self) -> str:
+        return self._history.text
 
     @property
     def report(self) -> Path:
@@ -126,6 +134,9 @@ class Session:
         actions: dict[str, Callable[[dict[str, Any]], None]] = {
             "change": self._change,
             "text": self._replace,
+            "stages": self._rearrange,
+            "undo": lambda message: self._step(self._history.undone),
+            "redo": lambda message: self._step(self._history.redone),
             "save": self._save,
             "reread": self._reread,
             "realizations": self._compare,
@@ -142,24 +153,50 @@ class Session:
     # What pages ask for
 
     def _change(self, message: dict[str, Any]) -> None:
+        changes = _typed(message, "changes", dict)
+        self._take(self._edited(lambda text: changed(text, changes)), moving=_typed(message, "moving", bool, False))
+
+    def _edited(self, edit: Callable[[str], str]) -> str:
+        """Return the text after an edit; as it is where that cannot be made."""
         from tomlkit.exceptions import TOMLKitError
 
-        changes = _typed(message, "changes", dict)
         try:
-            text = changed(self._text, changes)
-        except (TOMLKitError, TypeError, ValueError, AttributeError, LookupError, ArithmeticError):
-            text = self._text  # it is no TOML, a table is none, or a number is none of ours: the preview says so
-        self._take(text, moving=_typed(message, "moving", bool, False))
+            return edit(self._text)
+        except (TOMLKitError, TypeError, ValueError, AttributeError, LookupError, ArithmeticError, RecursionError):
+            return self._text  # it is no TOML, a table is none, or a number is none of ours: the preview says so
 
     def _replace(self, message: dict[str, Any]) -> None:
         self._take(_typed(message, "text", str), moving=False)
 
+    def _rearrange(self, message: dict[str, Any]) -> None:
+        """Add, remove or move a stage, make stages of a single core, or write those that were chosen."""
+        what, at, to = _typed(message, "what", str), _typed(message, "at", int, 0), _typed(message, "to", int, 0)
+        result = self._state["proof"].get("result") or {}
+        choice = result.get("chosen") if self._state["proof"]["state"] == "proven" else None
+        edits: dict[str, Callable[[str], str]] = {
+            "add": lambda text: added(text, _kind(message), at),
+            "remove": lambda text: removed(text, at),
+            "move": lambda text: moved(text, at, to),
+            "split": split,
+            "chosen": lambda text: text if choice is None else chosen(text, choice["stage"], choice["limits"]),
+        }
+        if what not in edits or min(at, to) < 0:
+            raise MessageError
+        self._take(self._edited(edits[what]), moving=False)
+
+    def _step(self, step: Callable[[], str | None]) -> None:
+        if step() is None:
+            self._document()
+        else:
+            self._renew(moving=False)
+
     def _take(self, text: str, *, moving: bool) -> None:
         _short(text, MAX_TEXT)
-        if text == self._text and self._state["proof"]["state"] in {"working", "proven"}:
+        same = text == self._text
+        self._history.take(text, moving=moving)
+        if same and self._state["proof"]["state"] in {"working", "proven"}:
             self._document()
             return
-        self._text = text
         self._renew(moving=moving)
 
     def _save(self, message: dict[str, Any]) -> None:
@@ -192,7 +229,9 @@ class Session:
         self._take(text, moving=False)
 
     def _compare(self, message: dict[str, Any]) -> None:
-        self._side_by_side = _typed(message, "on", bool)
+        self._side_by_side, self._compared = _typed(message, "on", bool), _typed(message, "stage", int, 0)
+        if self._compared < 0:
+            raise MessageError
         if not self._side_by_side:
             self._others.cancel()
             self._tell("realizations", {"state": "off", "rows": []})
@@ -244,9 +283,8 @@ class Session:
             with self._changed:
                 self._noted("calibration")(kind, value)
                 if kind == "result":
-                    self._change(
-                        {"changes": {"calibration.data": None, "calibration.coefficients": value["coefficients"]}}
-                    )
+                    table = "calibration" if stages_of(self._text) is None else "stage.0"
+                    self._change({"changes": {f"{table}.data": None, f"{table}.coefficients": value["coefficients"]}})
 
         self._tell("calibration", {"state": "working", "step": "fitting"})
         self._others.run(news, "calibrate", measurements=place)
@@ -285,10 +323,14 @@ class Session:
 
     def _document(self, **more: str) -> None:
         client, n = self._last
+        former, (before, after) = self._state.get("document", {}), self._history.steps
         self._tell(
             "document",
             {
                 "text": self._text,
+                **described(self._text, former),
+                "undo": before,
+                "redo": after,
                 "file": self.file.name,
                 "saved": self._text == self._on_disk,
                 "client": client,
@@ -308,10 +350,10 @@ class Session:
         with self._changed:
             request = {"client": last[0], "n": last[1]}
             if kind == "result":
-                self._tell("preview", request | {"error": None, **value})
+                self._tell("preview", request | _NO_ERROR | value)
             else:
                 error = value if kind == "refused" else "the preview must live until it is done, and has ended before"
-                self._tell("preview", self._state["preview"] | request | {"error": error})
+                self._tell("preview", self._state["preview"] | request | told(error, self._previewed))
             if self._text != self._previewed:
                 self._preview()
 
@@ -326,7 +368,7 @@ class Session:
                     self._begin_side_by_side()
             else:
                 error = value if kind == "refused" else "the proof must live until it is done, and has ended before"
-                self._tell("proof", {"state": "refused", "error": error, "result": former})
+                self._tell("proof", {"state": "refused", "result": former, **told(error, self._text)})
             if kind != "step" and self._queued is not None:
                 begin, self._queued = self._queued, None
                 begin()
@@ -343,7 +385,7 @@ class Session:
                 self._tell("realizations", {"state": state, "step": step, "rows": list(rows)})
 
         self._tell("realizations", {"state": "working", "step": "", "rows": []})
-        self._others.run(news, "side_by_side", text=self._text, path=str(self.file))
+        self._others.run(news, "side_by_side", text=self._text, path=str(self.file), stage=self._compared)
 
     def _noted(self, topic: str) -> Callable[[str, Any], None]:
         """Return what tells a topic about a job."""
@@ -386,11 +428,6 @@ def opened(spec: Path | None, output: Path | None, folder: Path) -> Session:
         raise SpecificationError(f"{spec}: the specification must be a readable file") from None
     if len(text) > MAX_TEXT:
         raise SpecificationError(f"{spec}: the specification must be at most {MAX_TEXT} characters, not longer")
-    if describes_chain(text):
-        raise SpecificationError(
-            f"{spec}: the specification must be that of a single core, not of a chain: `sosmith design {spec}` shows a "
-            f"chain, and `sosmith generate {spec}` writes a specification of each stage, which the studio opens"
-        )
     same = output is None or output.resolve() == spec.resolve()
     return Session(output or spec, text, text if same else None, folder)
 
@@ -400,6 +437,14 @@ def _typed(message: dict[str, Any], key: str, kind: type, default: Any = None) -
     if not isinstance(value, kind):
         raise MessageError
     return value
+
+
+def _kind(message: dict[str, Any]) -> str:
+    """Return the kind of a new stage."""
+    kind: str = _typed(message, "kind", str)
+    if kind not in ChainSpecification.kinds():
+        raise MessageError
+    return kind
 
 
 def _short(text: str, longest: int) -> str:
