@@ -36,7 +36,7 @@ def change(session: Session, changes: dict[str, Any], **more: Any) -> None:
 def test_what_is_shown_is_what_the_interface_computes(session: Session) -> None:
     known = proven(session)
     design = sosmith.design(FILTER)
-    preview, proof = known["preview"], known["proof"]["result"]
+    preview, proof = known["preview"], known["design"]
     assert (preview["error"], preview["name"], preview["spec"]["filter"]) == (None, "plain", FILTER["filter"])
     (stage,), (shown,) = preview["stages"], proof["stages"]
     assert preview["describe"] == stage["filter"]["describe"] == "Butterworth lowpass, order 2, 100 Hz at 1000 Hz"
@@ -60,7 +60,7 @@ def test_a_change_is_answered_and_proven(session: Session) -> None:
     assert known["document"]["text"] == TEXT.replace("cutoff = 100.0", "cutoff = 123.0")
     assert known["document"]["saved"] is False
     made = sosmith.design(sosmith.Specification.from_toml(known["document"]["text"]))
-    assert known["proof"]["result"]["bound"] == float(made.bound)
+    assert known["design"]["bound"] == float(made.bound)
 
 
 def test_ten_quick_changes_leave_no_work_behind(session: Session) -> None:
@@ -74,7 +74,7 @@ def test_ten_quick_changes_leave_no_work_behind(session: Session) -> None:
     known = proven(session)
     assert len(seen) >= 9
     assert [pid for pid in seen if pid not in session.processes and lives(pid)] == []
-    assert (known["proof"]["result"]["realization"], known["preview"]["stages"][0]["filter"]["order"]) == ("df1", 1)
+    assert (known["design"]["realization"], known["preview"]["stages"][0]["filter"]["order"]) == ("df1", 1)
     kept = session.processes
     session.close()
     assert session.processes == []
@@ -91,7 +91,7 @@ def test_while_a_handle_is_dragged_nothing_is_proven(session: Session) -> None:
     assert not session.busy
     assert len([pid for pid in working if lives(pid)]) == 1  # the one for previews
     change(session, QUICK | {"filter.cutoff": 5.0})
-    assert proven(session)["proof"]["result"]["realization"] == "df1"
+    assert proven(session)["design"]["realization"] == "df1"
 
 
 def test_a_wrong_specification_is_told_as_the_command_line_tells_it(session: Session) -> None:

@@ -17,7 +17,7 @@ _LOSSES = {"passband_loss": 0.1, "stopband_loss": 60.0}
 _MOST = {"cic": 64, "iir": 1024, "fir": 64, "halfband": 64, "auto": 4096}
 """Largest factors by which the kinds change the rate; those of the first two are powers of two."""
 
-_OF_ALL = ("name", "kind", "architecture", "multipliers", "protect")
+_OF_ALL = ("name", "kind", "protect")
 """What a stage keeps when it gets another kind."""
 
 Table = Mapping[str, Any]

@@ -33,8 +33,9 @@ _NO_ERROR: dict[str, Any] = {"error": None, "wrong": [], "elsewhere": ""}
 class Session:
     """The state behind the page, which changes by what pages say and by what jobs say.
 
-    The state is one tree for JSON for each topic: ``document``, ``preview``, ``proof``, ``realizations``, ``trace``,
-    ``report``, ``calibration``. `wait` returns what is new.
+    The state is one tree for JSON for each topic: ``document``, ``preview``, ``proof``, ``design``, ``realizations``,
+    ``trace``, ``report``, ``calibration``. `wait` returns what is new. ``design`` is that of the last proof that
+    succeeded, and there is none before that.
 
     Parameters
     ----------
@@ -171,8 +172,7 @@ class Session:
     def _rearrange(self, message: dict[str, Any]) -> None:
         """Add, remove or move a stage, make stages of a single core, or write those that were chosen."""
         what, at, to = _typed(message, "what", str), _typed(message, "at", int, 0), _typed(message, "to", int, 0)
-        result = self._state["proof"].get("result") or {}
-        choice = result.get("chosen") if self._state["proof"]["state"] == "proven" else None
+        choice = self._state["design"].get("chosen") if self._state["proof"]["state"] == "proven" else None
         edits: dict[str, Callable[[str], str]] = {
             "add": lambda text: added(text, _kind(message), at),
             "remove": lambda text: removed(text, at),
@@ -249,7 +249,7 @@ class Session:
             if kept is None:
                 return
             source = kept
-        elif source not in (self._state["proof"].get("result") or {}).get("scenarios", {}):
+        elif source not in self._state.get("design", {}).get("scenarios", {}):
             raise MessageError  # a name of ours, never a path
         arguments: dict[str, Any] = {"source": source, "seconds": None if message.get("csv") is not None else seconds}
         job = "trace"
@@ -313,12 +313,11 @@ class Session:
                 self._tell(topic, {"state": "none"})
             elif self._state[topic]["state"] == "done":
                 self._tell(topic, self._state[topic] | {"old": True})
-        result = self._state.get("proof", {}).get("result")
         if moving:
             self._proofs.cancel()
-            self._tell("proof", {"state": "waiting", "result": result})
+            self._tell("proof", {"state": "waiting"})
             return
-        self._tell("proof", {"state": "working", "step": "beginning", "result": result})
+        self._tell("proof", {"state": "working", "step": "beginning"})
         self._proofs.run(self._proof_news, "prove", text=self._text, path=str(self.file))
 
     def _document(self, **more: str) -> None:
@@ -359,16 +358,16 @@ class Session:
 
     def _proof_news(self, kind: str, value: Any) -> None:
         with self._changed:
-            former = self._state["proof"].get("result")
             if kind == "step":
-                self._tell("proof", {"state": "working", "step": value, "result": former})
+                self._tell("proof", {"state": "working", "step": value})
             elif kind == "result":
-                self._tell("proof", {"state": "proven", "result": value})
+                self._tell("design", value)
+                self._tell("proof", {"state": "proven"})
                 if self._side_by_side:
                     self._begin_side_by_side()
             else:
                 error = value if kind == "refused" else "the proof must live until it is done, and has ended before"
-                self._tell("proof", {"state": "refused", "result": former, **told(error, self._text)})
+                self._tell("proof", {"state": "refused", **told(error, self._text)})
             if kind != "step" and self._queued is not None:
                 begin, self._queued = self._queued, None
                 begin()

@@ -112,33 +112,37 @@ def proven(design: Design | Chain) -> dict[str, Any]:
         "tables": [],
     }
     if isinstance(design, Design):
-        stages = [_of_stage([design])]
+        stages = [_of_stage([design], design.specification.filter)]
         return shown | {"cycles": stages[0]["cycles"], "chain": None, "stages": stages} | summary(stages)
-    cores = design.cores
     stages = [
-        _of_stage(cores[name]) | {"name": name, "share": float(design.budget[name]), "gain": design.gains[name]}
-        for name in cores
+        _of_stage(cores, alone.filter) | {"name": name, "share": float(design.budget[name])}
+        for (name, cores), alone in zip(design.cores.items(), design.specification.alone, strict=True)
     ]
     return shown | {
         "cycles": design.clocks_per_sample,
         "tables": [table.as_dict() for table in design.tables()],
-        "chain": {"limits": design.bands, **of_chain(design.specification.filter)},
+        "chain": {"limits": design.bands, "passing": _passing(design), **of_chain(design.specification.filter)},
         "chosen": design.specification.as_dict() if design.choice is not None else None,
         "stages": stages,
         **summary(stages),
     }
 
 
-def _of_stage(cores: Sequence[Design]) -> dict[str, Any]:
+def _passing(design: Chain) -> list[tuple[float, str]]:
+    """Return the largest gain of aliases into the pass band, and of images of it, in dB, as far as there are any."""
+    known = (design.folding.get("passband"), "aliasing"), (design.images.get("passband"), "image")
+    return [(float(decibels(np.array(peak[0]))), name) for peak, name in known if peak is not None]
+
+
+def _of_stage(cores: Sequence[Design], ideal: Filter) -> dict[str, Any]:
     """Return what the cores of a stage are; of one that interpolates, there is one for each of its results in turn."""
     first = cores[0]
     output = first.manifest["streams"]["m_axis"]["fields"][0]
     curve: dict[str, Any] = {"f": [], "db": []}
-    if len(cores) == 1 and first.sections:
-        ideal = first.specification.filter
+    if first.sections:
         f = ideal.frequencies(POINTS)
         level = max(float(abs(ideal.frequency_response(f)).max()), 1e-12)
-        curve = {"f": numbers(f), "db": numbers(decibels(abs(first.frequency_response(f)) / level))}
+        curve = {"f": numbers(f), "db": numbers(decibels(abs(_integer(cores, ideal, f)) / level))}
     label = [""] if len(cores) == 1 else [f"result {k}, " for k in range(len(cores))]
     named = list(zip(label, cores, strict=True))
     return curve | {
@@ -159,6 +163,16 @@ def _of_stage(cores: Sequence[Design]) -> dict[str, Any]:
             for section in core.sections
         ],
     }
+
+
+def _integer(cores: Sequence[Design], ideal: Filter, f: Floats) -> npt.NDArray[np.complex128]:
+    """Return the gain with integer coefficients: of one core, or of the results of several in turn."""
+    turns = enumerate(cores)
+    gain = sum(core.frequency_response(f) * np.exp(-2j * np.pi * f * k / ideal.sample_rate) for k, core in turns)
+    whole: npt.NDArray[np.complex128] = np.asarray(gain)
+    # Taps by edges are times the number of results in the hardware, taps that are given are not.
+    larger = abs(whole).max() > math.sqrt(len(cores)) * abs(ideal.frequency_response(f)).max()
+    return whole / len(cores) if larger else whole
 
 
 def summary(stages: Sequence[dict[str, Any]]) -> dict[str, Any]:

@@ -13,14 +13,14 @@ function lowestLevel(limits) {
 }
 
 function chainPlots() {
-  const result = known.proof && known.proof.result, isProven = Boolean(known.proof) && known.proof.state === "proven";
+  const result = isProven() && known.design.chain;
   const asIs = known.preview.spec && Boolean(known.preview.spec.stage);
-  const chain = (asIs && known.preview.chain) || (isProven && result.chain) || null;
+  const chain = (asIs && known.preview.chain) || result || null;
   byId("chain").hidden = !isChain();
   byId("chainfigure").hidden = !chain;
   byId("aliasfigure").hidden = !chain || !chain.aliases;
   if (!isChain() || !chain) return;
-  const limits = isProven && result.chain ? result.chain.limits : [], lowest = lowestLevel(limits.map(([, , db]) => db));
+  const limits = result ? result.limits : [], lowest = lowestLevel(limits.map(([, , db]) => db));
   const where = byId("chaingain"), top = Math.max(6, ...chain.db) + 2;
   const to = axes(where, { x: [chain.f[0], chain.f.at(-1)], y: [lowest, top], logarithmic: true, xUnit: "Hz", yUnit: "dB", height: Math.max(280, Math.min(360, where.clientWidth * 0.42)) });
   for (const [from, until] of chain.bands) shade(to, from, until);
@@ -29,8 +29,10 @@ function chainPlots() {
   for (const [from, until, db] of limits) curve(to, "limit", [from, until], [db, db]);
   shown(where, to, "Gain of the chain and of its stages over frequency");
   const images = chain.bands.some(([, , name]) => name === "image"), rises = tables().some((each) => each.interpolate > 1);
-  const said = limits.map(([, , db, name]) => `no ${name === "image" ? "image" : "alias"} above ${minus(short(db, 4))} dB, proven`);
-  say("chainfacts", said.join("; "));
+  const said = limits.map(([, , db, name]) => `${name === "image" ? "images" : "aliases"} at most ${short(db, 4)} dB`);
+  const into = result ? result.passing : [];
+  said.push(...into.map(([db, name]) => `${name === "image" ? "of" : "into"} the pass band ${short(db, 4)} dB`));
+  say("chainfacts", said.length ? `${said.join(", ")}: proven` : "");
   byId("chaincaption").textContent = !chain.bands.length ? "From a sine at the input to the sine at the output."
     : rises ? `At the highest rate. In the shaded band lie ${images ? "images" : "aliases"}.` : "From a sine at the input to the sine at the output; in the shaded band it comes out as an alias, at a lower frequency.";
   byId("chainchosen").hidden = !(table().name in chain.stages);
@@ -51,8 +53,8 @@ function aliases({ f, stays, folds }, lowest, top) {
 
 // The tables of `sosmith design`.
 function chainTables() {
-  const result = known.proof && known.proof.result, place = byId("tables");
-  place.classList.toggle("old", !known.proof || known.proof.state !== "proven");
+  const result = known.design, place = byId("tables");
+  place.classList.toggle("old", !isProven());
   byId("tablesheading").hidden = !(isChain() && result && result.tables.length);
   place.replaceChildren(...(isChain() && result ? result.tables : []).map(({ title, head, rows: body, notes }) => {
     const frame = element("div", "", { class: "scroll", tabindex: "0" }), table = element("table");

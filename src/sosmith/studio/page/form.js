@@ -15,7 +15,15 @@ function options(field, names) {
 function namesOf(field) {
   const key = field.dataset.key;
   if (key === "filter.family" && isChain()) return choices.families[kind()] || [];
-  return [...("empty" in field.dataset ? [""] : []), ...choices[key === "stage.kind" ? key : key.replace("stage.", "hardware.")]];
+  if (key === "stage.kind") return kindsAt(chosen, tables().length);
+  return [...("empty" in field.dataset ? [""] : []), ...choices[key.replace("stage.", "hardware.")]];
+}
+
+// The kinds that a stage can have at a place: a polynomial takes the inputs, and `auto` is for all stages.
+function kindsAt(k, count) {
+  const inputs = Object.keys(given("input") || {}).join();
+  const fits = { polynomial: k === 0 && inputs === "voltage,temperature", auto: count < 2 };
+  return choices["stage.kind"].filter((name) => fits[name] !== false || name === (tables()[k] || {}).kind);
 }
 
 // The value of a field, null for one that is left empty, undefined for what it cannot take.
@@ -50,11 +58,12 @@ function commit(field) {
   } else change({ [path]: value });
 }
 
-let typing = 0;
+let typing = 0, typed = null; // the field in which something was typed that is not sent yet
 byId("controls").addEventListener("input", (event) => {
   const field = event.target;
   if (!field.dataset.key || field.tagName === "SELECT") return;
   clearTimeout(typing);
+  typed = field;
   typing = setTimeout(commit, "text" in field.dataset || "list" in field.dataset ? 700 : 350, field);
 });
 byId("controls").addEventListener("change", (event) => {
@@ -62,6 +71,7 @@ byId("controls").addEventListener("change", (event) => {
   if (field.name === "form") { reform(field.value); return; }
   if (!field.dataset.key) return;
   clearTimeout(typing);
+  if (field.tagName !== "SELECT" && typed !== field) return;
   // After a refusal, what the page knows is older than what was sent: the number before is a change again.
   const refused = known.preview.error !== null || field.hasAttribute("aria-invalid");
   const now = asked(pathOf(field.dataset.key)), before = "list" in field.dataset ? now : numbers(now)[Number(field.dataset.at || 0)];

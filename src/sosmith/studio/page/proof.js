@@ -16,12 +16,13 @@ function verdict() {
   const show = (kind, state, detail) => { box.className = `verdict ${kind}`; say("state", state); say("detail", detail); };
   if (ended) show("fail", "The studio has ended", "What was not saved is in the text below.");
   else if (!socket || socket.readyState !== WebSocket.OPEN) show("wait", "No connection to the studio", "Trying again.");
+  else if (isChain() && !tables().length) show("fail", "Not a chain yet", "There must be a stage: add one to the list.");
   else if (wrong) show("fail", isChain() ? "Not a chain yet" : "Not a filter yet", wrong);
   else if (!proof || proof.state === "waiting") show("wait", "Changing", "The proof begins when the handle is let go.");
   else if (proof.state === "working") show("wait", "Proving", `${proof.step}. ${kind() === "auto" ? "The stages are being chosen." : `The response is already that of the new ${isChain() ? "chain" : "filter"}.`}`);
   else if (proof.state === "refused") show("fail", "No proven design", proof.error);
   else {
-    const { bound, allowed, unit, realization, architecture } = proof.result;
+    const { bound, allowed, unit, realization, architecture } = known.design;
     const kept = bound <= allowed;
     show(kept ? "pass" : "fail", `Proven: error at most ${withUnit(short(bound), unit)}`, `For all inputs in range; ${withUnit(short(allowed), unit)} allowed. ${[realization, architecture].filter(Boolean).join(", ")}.`);
   }
@@ -42,8 +43,8 @@ function tile(name, value, aside, part = null) {
 }
 
 function proven() {
-  const { proof } = known, result = proof && proof.result;
-  for (const id of ["tiles", "budget", "sections", "cycles", "reasons"]) byId(id).classList.toggle("old", !proof || proof.state !== "proven");
+  const result = known.design;
+  for (const id of ["tiles", "budget", "sections", "cycles", "reasons"]) byId(id).classList.toggle("old", !isProven());
   chainTables();
   const { sections, limit_cycles: limitCycles, reasons } = provenStage() || { sections: [], limit_cycles: [], reasons: {} };
   byId("reasons").replaceChildren(...Object.entries(reasons).map(([name, reason]) => element("p", `${name}: ${reason}.`)));
@@ -78,7 +79,7 @@ function proven() {
 }
 
 function realizations() {
-  const { state, step: at, rows: designs } = known.realizations, taken = known.proof && known.proof.state === "proven" && (provenStage() || {}).realization;
+  const { state, step: at, rows: designs } = known.realizations, taken = isProven() && (provenStage() || {}).realization;
   byId("sidebyside").hidden = isChain() && !seen();
   byId("sidehint").textContent = isChain() ? `The chain with every realization of stage ${table().name}, each proven with its own word lengths.` : "Every realization designed and proven for this specification, each with its own word lengths.";
   byId("compare").setAttribute("aria-pressed", `${state !== "off"}`);

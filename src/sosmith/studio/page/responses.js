@@ -28,7 +28,7 @@ function gain() {
     for (const [from, until] of filter.stopbands) box(from, until, y[1], -stop);
   }
   curve(to, "ideal", response.f, response.db);
-  const integer = known.proof && known.proof.state === "proven" && provenStage();
+  const integer = isProven() && provenStage();
   if (integer) curve(to, "integer", integer.f, integer.db);
   scales = to;
   redrawn(where, to, "Gain over frequency").setAttribute("role", "group");

@@ -4,6 +4,12 @@ const items = []; // [{ name, item }], in the order of the stages
 const inHz = (value) => (typeof value === "number" ? `${value >= 1e6 ? `${short(value / 1e6, 6)} M` : value >= 1e3 ? `${short(value / 1e3, 6)} k` : `${short(value, 6)} `}Hz` : "–");
 const rearrange = (what, more) => send({ do: "stages", what, ...more });
 
+// What was typed is for the stage that was shown then, not for the one that is shown next.
+function leaveField() {
+  clearTimeout(typing);
+  typed = null;
+}
+
 function choose(k) {
   if (!isChain()) { chosen = 0; return; }
   chosen = Math.max(0, Math.min(k, tables().length - 1));
@@ -11,9 +17,11 @@ function choose(k) {
 }
 
 // After a change, the same stage is shown as before: by its name, or by its place if it was renamed.
-let chosenName, expected = null;
+let chosenName, expected = null, countBefore = 0;
 function settleChoice() {
   const names = tables().map((each) => each.name), before = chosen;
+  if (!names.includes(chosenName) && names.length !== countBefore) leaveField();
+  countBefore = names.length;
   if (expected !== null && names.length > expected.count) { chosen = expected.at; expected = null; }
   else if (names.includes(chosenName)) chosen = names.indexOf(chosenName);
   chosen = Math.max(0, Math.min(chosen, names.length - 1));
@@ -22,6 +30,7 @@ function settleChoice() {
 }
 
 function show(k) {
+  leaveField();
   choose(k);
   chosenName = table().name;
   picture();
@@ -144,8 +153,7 @@ function stages() {
   items.forEach(({ item }, k) => { if (list.children[k] !== item) list.insertBefore(item, list.children[k] || null); });
   if (focused && focused !== document.activeElement && focused.isConnected) focused.focus({ preventScroll: true });
   const wrong = preview && preview.error ? preview.wrong : proof && proof.state === "refused" ? proof.wrong : [];
-  const isOld = !proof || proof.state !== "proven";
-  const at = proof && proof.state === "working" ? (/^stage ([^:]+)/.exec(proof.step) || [])[1] : null;
+  const isOld = !isProven();
   items.forEach(({ item }, k) => {
     const stage = all[k], [before, after] = doc.stages[k], name = `${stage.name ?? "without a name"}`;
     const pick = item.querySelector(".pick");
@@ -154,10 +162,9 @@ function stages() {
     pick.querySelector(".rate").textContent = `${inHz(before)} → ${inHz(after)}`;
     pick.setAttribute("aria-pressed", `${k === chosen}`);
     item.classList.toggle("chosen", k === chosen);
-    item.classList.toggle("working", at === stage.name);
     item.classList.toggle("wrong", Boolean(wrong[k]));
     item.querySelector(".problem").textContent = wrong[k] || "";
-    item.querySelector(".measures").replaceChildren(...measures(stage, proof && proof.result, isOld));
+    item.querySelector(".measures").replaceChildren(...measures(stage, known.design, isOld));
     for (const [action, off] of [["earlier", k === 0], ["later", k === all.length - 1], ["remove", false]]) {
       const button = item.querySelector(`.${action}`);
       button.disabled = off || !doc.readable;
@@ -165,14 +172,19 @@ function stages() {
     }
   });
   adding(all);
-  const result = proof && proof.state === "proven" && proof.result;
-  byId("takechosen").hidden = !(result && result.chosen && all.some((each) => each.kind === "auto"));
+  byId("takechosen").hidden = !(isProven() && known.design.chosen && all.some((each) => each.kind === "auto"));
+}
+
+// The stage that the proof is at.
+function working() {
+  const { proof } = known, at = proof && proof.state === "working" ? (/^stage ([^:]+)/.exec(proof.step) || [])[1] : null;
+  for (const { name, item } of items) item.classList.toggle("working", at === name);
 }
 
 // Kinds of stages that there can be one more of.
 function adding(all) {
-  const inputs = Object.keys(given("input") || {}).join(), field = byId("newkind"), chosenKind = field.value;
-  const kinds = choices["stage.kind"].filter((name) => (name === "auto" ? !all.length : name !== "polynomial" || (inputs === "voltage,temperature" && all.every((each) => each.kind !== "polynomial"))));
+  const field = byId("newkind"), chosenKind = field.value;
+  const kinds = kindsAt(0, all.length + 1).filter((name) => name !== "auto" || !all.length).filter((name) => name !== "polynomial" || all.every((each) => each.kind !== name));
   if ([...field.options].map((each) => each.value).join() !== kinds.join()) {
     field.replaceChildren(...kinds.map((name) => element("option", name, { value: name })));
     field.value = kinds.includes(chosenKind) ? chosenKind : kinds.includes("fir") ? "fir" : kinds[0];

@@ -67,10 +67,12 @@ function seen() {
   return stages[isChain() ? numberIn(spec.stage) : 0] || null;
 }
 
+const isProven = () => Boolean(known.proof) && known.proof.state === "proven";
+
 // What is proven of it: undefined as long as nothing is.
 function provenStage() {
-  const result = known.proof && known.proof.result;
-  return result && isChain() === Boolean(result.chain) ? result.stages[numberIn(result.stages)] : undefined;
+  const { design } = known;
+  return design && isChain() === Boolean(design.chain) ? design.stages[numberIn(design.stages)] : undefined;
 }
 
 // What the specification has, and what it will have once the changes are answered that are on their way.

@@ -42,7 +42,9 @@ function picture() {
 }
 
 function take(news) {
+  const before = isProven();
   Object.assign(known, news);
+  const turned = Boolean(news.design) || before !== isProven(); // the steps of a proof change nothing that is drawn
   const answer = news.preview || news.document;
   for (const path of Object.keys(pending)) {
     if (news.preview && (answer.client !== me || answer.n >= pending[path].n)) delete pending[path];
@@ -57,11 +59,12 @@ function take(news) {
     }
     picture();
     landed();
-  } else if (news.proof && !news.document) picture();
+  } else if (turned && !news.document) picture();
   if (news.document) text();
-  if (news.document || news.preview || news.proof) stages();
-  if (news.proof || news.document) proven();
-  if (news.realizations || news.proof || news.document) realizations();
+  if (news.document || news.preview || turned || (news.proof && news.proof.state === "refused")) stages();
+  if (news.proof) working();
+  if (news.document || turned) proven();
+  if (news.realizations || news.document || turned) realizations();
   if (news.trace || news.report) traced();
   if (news.calibration || news.document) calibrated();
   if (news.ended) ended = true;
