@@ -135,7 +135,12 @@ def test_a_number_that_is_none_of_ours_outlasts_the_form(session: Session, typed
 
 
 @pytest.mark.parametrize(
-    ("table", "named"), [("calibration]\ndata", "calibration.data"), ("filter]\nsos_file", "filter.sos_file")]
+    ("table", "named"),
+    [
+        ("calibration]\ndata", "calibration.data"),
+        ("filter]\nsos_file", "filter.sos_file"),
+        ("[stage]]\ntaps_file", "stage[0].taps_file"),
+    ],
 )
 @pytest.mark.parametrize("place", ["/etc/passwd", "../secret.csv"])
 def test_a_text_names_no_file_outside_its_folder(session: Session, table: str, named: str, place: str) -> None:
@@ -288,6 +293,11 @@ def test_measurements_become_the_calibration(tmp_path: Path) -> None:
         {"do": "calibration", "csv": 3},
         {"do": "calibration", "csv": "," * (MAX_FILE + 1)},
         {"do": "realizations", "on": "yes"},
+        {"do": "realizations", "on": True, "stage": -1},
+        {"do": "stages"},
+        {"do": "stages", "what": "add", "kind": "biquad", "at": 0},
+        {"do": "stages", "what": "move", "at": 0, "to": -1},
+        {"do": "stages", "what": "remove", "at": "0"},
     ],
 )
 def test_what_no_page_says_is_refused(session: Session, message: Any) -> None:
@@ -304,6 +314,7 @@ def test_what_no_page_says_is_refused(session: Session, message: Any) -> None:
         {"filter": 1, "filter.order": 2},
         {"filter.passband_edge": [None]},
         {"sample_rate": 10**400, "filter.order": 1},
+        {"stage.0.order": 1},
     ],
     ids=str,
 )
