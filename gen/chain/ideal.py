@@ -184,10 +184,8 @@ def alias_map(chain: ExactChain, points: int) -> tuple[Values, Values, Values] |
     factor = prod(stage.spec.factor for stage in chain.stages)
     if factor == 1 or any(stage.spec.rise > 1 for stage in chain.stages):
         return None
-    rate = float(chain.spec.base.sample_rate)
-    shown = max(2, min(points, _EVALUATIONS // factor))
-    low = rate / factor * np.linspace(0.0, 0.5, shown)
-    centres = rate / factor * np.arange(1, factor // 2 + 1)
+    rate = float(chain.spec.last_rate)
+    low = rate * np.linspace(0.0, 0.5, max(2, min(points, _EVALUATIONS // factor)))
+    centres = rate * np.arange(1, factor // 2 + 1)
     folded = np.abs(centres[:, None, None] + np.array([-1.0, 1.0])[:, None] * low)
-    gain = np.abs(chain_gain(chain, folded)) * (folded <= rate / 2)
-    return low, np.abs(chain_gain(chain, low)), gain.max(axis=(0, 1))
+    return low, np.abs(chain_gain(chain, low)), np.abs(chain_gain(chain, folded)).max(axis=(0, 1))

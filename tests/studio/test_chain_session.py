@@ -57,19 +57,22 @@ def test_a_chain_is_shown_and_proven(session: Session) -> None:
     assert [table["title"] for table in shown["tables"]] == [table.title for table in chain.tables()]
 
 
-def test_what_stays_and_what_folds_add_up_to_what_a_sine_becomes(session: Session) -> None:
-    """The largest alias at a frequency is that of a sine which the chain is run on."""
-    ideal = sosmith.ChainSpecification.load(PLAIN).filter
-    found = ideal.aliases(9)
-    assert found is not None
-    f, stays, folds = found
-    at = f[2]
-    assert stays[2] == pytest.approx(abs(ideal.frequency_response(at)))
-    rate, factor = 8000.0, 4
-    images = [abs(k * rate / factor + sign * at) for k in (1, 2) for sign in (-1, 1)]
-    gains = [abs(ideal.frequency_response(image)) for image in images if image <= rate / 2]
-    assert len(gains) == 3
-    assert folds[2] == pytest.approx(max(gains))
+def test_what_folds_to_a_frequency_is_the_largest_that_does() -> None:
+    falling = {"name": "low", "kind": "fir", "taps": [0.5, 0.5], "decimate": 3}
+    rising = {"name": "high", "kind": "fir", "taps": [0.5, -0.5], "decimate": 3}
+    again = {"name": "again", "kind": "gain", "factor": 0.5}
+    for stages, images in (
+        ([falling], [1750.0, 2250.0]),
+        ([rising], [1750.0, 2250.0]),
+        ([falling, {**rising, "decimate": 2}, again], [750.0, 1250.0, 1750.0, 2250.0, 2750.0]),
+    ):
+        ideal = sosmith.ChainSpecification.load({**PLAIN, "sample_rate": 6000, "stage": stages}).filter
+        found = ideal.aliases(5 if len(images) == 2 else 3)
+        assert found is not None
+        f, stays, folds = found
+        assert f[1] == 250.0
+        assert stays[1] == pytest.approx(abs(ideal.frequency_response(250.0)))
+        assert folds[1] == pytest.approx(max(abs(ideal.frequency_response(images))))
 
 
 def test_the_integers_of_results_in_turn_are_those_of_the_filter(session: Session) -> None:

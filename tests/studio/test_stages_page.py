@@ -142,13 +142,17 @@ def test_a_stage_is_dragged_with_a_finger_and_moved_by_keys(tab: Tab, page: Sess
     tab.call("Emulation.setTouchEmulationEnabled", enabled=False)
     assert stages(tab) == ["out", "slow", "double"]
     tab.value("document.querySelector('#stages li:first-child .pick').focus()")
-    for name, order in (("ArrowDown", ["slow", "out", "double"]), ("ArrowDown", ["slow", "double", "out"])):
+    for name, order in (
+        ("ArrowDown", ["slow", "out", "double"]),
+        ("ArrowDown", ["slow", "double", "out"]),
+        ("ArrowUp", ["slow", "out", "double"]),
+    ):
         tab.call("Input.dispatchKeyEvent", type="keyDown", key=name, code=name, modifiers=1)
         assert stages(tab) == order
         assert tab.value("document.activeElement.querySelector('strong').textContent") == "out"  # it keeps the focus
-    assert text_of(tab, "#stagessaid") == "out is stage 3 of 3."
+    assert text_of(tab, "#stagessaid") == "out is stage 2 of 3."
     click(tab, "#stages li:nth-child(2) .earlier")
-    assert stages(tab) == ["double", "slow", "out"]
+    assert stages(tab) == ["out", "slow", "double"]
 
 
 def test_a_stage_is_added_edited_and_removed(tab: Tab, page: Session) -> None:
@@ -184,6 +188,16 @@ def test_a_stage_is_added_edited_and_removed(tab: Tab, page: Session) -> None:
         click(tab, "#undo")
     tab.until(ANSWERED)
     assert state(page)["document"]["redo"] == steps - 1
+
+
+def test_what_is_typed_for_a_stage_is_not_sent_for_the_next_one(tab: Tab, page: Session) -> None:
+    click(tab, "#stages li:nth-child(2) .pick")
+    typed(tab, '[data-key="stage.name"]', "later")
+    page.handle({"do": "stages", "what": "remove", "at": 1}, "another page")
+    tab.until("document.querySelectorAll('#stages li').length === 2")
+    tab.value("document.activeElement.blur()")
+    assert tab.value("sent") == 0
+    assert stages(tab) == ["slow", "out"]
 
 
 def test_a_single_core_becomes_a_chain(tab: Tab, page: Session) -> None:
