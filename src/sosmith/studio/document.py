@@ -42,13 +42,12 @@ def described(text: str, former: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def told(error: str, text: str) -> dict[str, Any]:
-    """Return an error, what of it is `wrong` with each stage of a text, and what is wrong `elsewhere`."""
-    wrong, elsewhere = errors_by_stage(error, [stage.get("name") for stage in stages_of(text) or ()])
-    return {"error": error, "wrong": wrong, "elsewhere": elsewhere}
+    """Return an error, and what of it is `wrong` with each stage of a text."""
+    return {"error": error, "wrong": errors_by_stage(error, [stage.get("name") for stage in stages_of(text) or ()])}
 
 
-def errors_by_stage(error: str, names: Sequence[Any]) -> tuple[list[str], str]:
-    """Split what is wrong with a specification into the sentences about each stage, and those about none.
+def errors_by_stage(error: str, names: Sequence[Any]) -> list[str]:
+    """Return what is wrong with each stage: an empty text for one about which there is no sentence.
 
     Parameters
     ----------
@@ -60,23 +59,22 @@ def errors_by_stage(error: str, names: Sequence[Any]) -> tuple[list[str], str]:
     Examples
     --------
     >>> errors_by_stage("my.toml: stage[1].order must be given for a CIC filter, not missing", ["a", "b"])
-    (['', 'order must be given for a CIC filter, not missing'], '')
+    ['', 'order must be given for a CIC filter, not missing']
     >>> errors_by_stage("my.toml: stage a: filter.cutoff must be positive, not -1", ["a", "b"])
-    (['cutoff must be positive, not -1', ''], '')
+    ['cutoff must be positive, not -1', '']
     """
     found: list[list[str]] = [[] for _ in names]
-    rest = []
     for line in error.splitlines():
-        number = re.search(r"\bstage\[(\d+)\]\.?(.*)", line)
+        numbered = re.search(r"\bstage\[(\d+)\]\.?(.*)", line)
         named = re.search(r"\bstage ([^\s:]+): (?:filter\.|filter's )?(.*)", line)
-        k, said = (
-            (int(number[1]), number[2]) if number else (_number_of(named[1], names), named[2]) if named else (-1, "")
-        )
+        k, said = -1, ""
+        if numbered:
+            k, said = int(numbered[1]), numbered[2]
+        elif named:
+            k, said = _number_of(named[1], names), re.sub("^kind must", "band must", named[2])
         if 0 <= k < len(found):
-            found[k].append(re.sub("^kind must", "band must", said.strip()) if named else said.strip())
-        else:
-            rest.append(line.strip())
-    return ["; ".join(each) for each in found], "; ".join(rest)
+            found[k].append(said.strip())
+    return ["; ".join(each) for each in found]
 
 
 def _rate(tree: Mapping[str, Any]) -> float:

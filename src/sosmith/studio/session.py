@@ -27,7 +27,7 @@ MAX_FILE = 8 << 20
 LATE = 1.0
 """Seconds after which a preview is given up for a newer one; before that, the newer one waits."""
 
-_NO_ERROR: dict[str, Any] = {"error": None, "wrong": [], "elsewhere": ""}
+_NO_ERROR: dict[str, Any] = {"error": None, "wrong": []}
 
 
 class Session:

@@ -121,7 +121,7 @@ def proven(design: Design | Chain) -> dict[str, Any]:
     return shown | {
         "cycles": design.clocks_per_sample,
         "tables": [table.as_dict() for table in design.tables()],
-        "chain": {"limits": design.bands, "passing": _passing(design), **of_chain(design.specification.filter)},
+        "chain": {"limits": design.bands, "passing": _passing(design), **of_chain(design.filter)},
         "chosen": design.specification.as_dict() if design.choice is not None else None,
         "stages": stages,
         **summary(stages),

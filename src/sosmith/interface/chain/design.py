@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from sosmith.interface.build import Build
     from sosmith.interface.certificate import Progress
     from sosmith.interface.chain.certificate import ChainCertificate
+    from sosmith.interface.chain.filter import ChainFilter
     from sosmith.interface.chain.reload import ChainReload
     from sosmith.interface.chain.report import ChainReport
     from sosmith.interface.trace import Trace
@@ -144,6 +145,13 @@ class Chain(View):
         The gains are those of `folding` and `images`, for each part of the chain.
         """
         return limits(self.core)
+
+    @property
+    def filter(self) -> ChainFilter:
+        """The ideal filters of the stages, as designed: with the decimators that were chosen for stages with poles."""
+        from sosmith.interface.chain.filter import ChainFilter
+
+        return ChainFilter(self.core)
 
     @property
     def passband(self) -> tuple[float, float] | None:

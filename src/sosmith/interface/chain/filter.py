@@ -7,14 +7,14 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.gen.chain.ideal import IdealChain, alias_map, bands, chain_gain, frequencies, stage_gain
+from sosmith.gen.chain.ideal import ExactChain, alias_map, bands, chain_gain, frequencies, stage_gain
 
 Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class ChainFilter:
-    """The ideal filters of a chain in series, from `ChainSpecification.filter`.
+    """The ideal filters of a chain in series, from `ChainSpecification.filter` or `Chain.filter`.
 
     Frequencies are those of sines at the highest rate, in Hz: at the input, unless stages interpolate. One of up to
     half the input's rate is filtered as it is, and others are images of it.
@@ -35,7 +35,7 @@ class ChainFilter:
     [1.0, 0.653]
     """
 
-    chain: IdealChain = field(repr=False)
+    chain: ExactChain = field(repr=False)
     """The chain in the form of the inner packages."""
 
     @property

@@ -12,10 +12,12 @@ function lowestLevel(limits) {
   return -Math.min(200, Math.max(80, 20 * Math.ceil((30 - Math.min(...stated.filter(Number.isFinite), 0)) / 20)));
 }
 
+const upTo = (db) => minus(Math.ceil(100 * db) / 100); // what is at most that much is not rounded down
+
 function chainPlots() {
   const result = isProven() && known.design.chain;
   const asIs = known.preview.spec && Boolean(known.preview.spec.stage);
-  const chain = (asIs && known.preview.chain) || result || null;
+  const chain = result || (asIs && known.preview.chain) || null; // the design has chosen what the preview could not know
   byId("chain").hidden = !isChain();
   byId("chainfigure").hidden = !chain;
   byId("aliasfigure").hidden = !chain || !chain.aliases;
@@ -29,9 +31,9 @@ function chainPlots() {
   for (const [from, until, db] of limits) curve(to, "limit", [from, until], [db, db]);
   shown(where, to, "Gain of the chain and of its stages over frequency");
   const images = chain.bands.some(([, , name]) => name === "image"), rises = tables().some((each) => each.interpolate > 1);
-  const said = limits.map(([, , db, name]) => `${name === "image" ? "images" : "aliases"} at most ${short(db, 4)} dB`);
+  const said = limits.map(([, , db, name]) => `${name === "image" ? "images" : "aliases"} at most ${upTo(db)} dB`);
   const into = result ? result.passing : [];
-  said.push(...into.map(([db, name]) => `${name === "image" ? "of" : "into"} the pass band ${short(db, 4)} dB`));
+  said.push(...into.map(([db, name]) => `${name === "image" ? "of" : "into"} the pass band ${upTo(db)} dB`));
   say("chainfacts", said.length ? `${said.join(", ")}: proven` : "");
   byId("chaincaption").textContent = !chain.bands.length ? "From a sine at the input to the sine at the output."
     : rises ? `At the highest rate. In the shaded band lie ${images ? "images" : "aliases"}.` : "From a sine at the input to the sine at the output; in the shaded band it comes out as an alias, at a lower frequency.";

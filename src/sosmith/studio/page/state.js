@@ -42,7 +42,7 @@ function release(changes) {
 
 let chosen = 0;
 const isChain = () => Boolean(known.document && known.document.stages);
-const tables = () => (isChain() ? (known.document.keys.stage || []).filter((each) => each && typeof each === "object") : []);
+const tables = () => (isChain() ? numbers(known.document.keys.stage).filter((each) => each && typeof each === "object" && !Array.isArray(each)) : []);
 const table = () => tables()[chosen] || {};
 const kind = () => (isChain() ? table().kind : null);
 
