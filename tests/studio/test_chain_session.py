@@ -77,7 +77,7 @@ def test_what_folds_to_a_frequency_is_the_largest_that_does() -> None:
 
 def test_the_integers_of_results_in_turn_are_those_of_the_filter(session: Session) -> None:
     """By taps, which are used as they are, and by edges, which are times the factor."""
-    tree = {**PLAIN, "stage": BETWEEN, "output": {"bits": 11, "range": [-2.0, 2.0], "signed": True}}
+    tree = {**PLAIN, "stage": BETWEEN, "output": {"bits": 8, "range": [-2.0, 2.0], "signed": True}}
     say(session, do="text", text=sosmith.ChainSpecification.load(tree).toml())
     known = proven(session)
     for asked, made in zip(known["preview"]["stages"], known["design"]["stages"], strict=True):

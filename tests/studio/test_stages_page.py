@@ -156,22 +156,22 @@ def test_a_stage_is_dragged_with_a_finger_and_moved_by_keys(tab: Tab, page: Sess
 
 
 def test_a_stage_is_added_edited_and_removed(tab: Tab, page: Session) -> None:
-    tab.value("document.getElementById('newkind').value = 'iir'")
+    tab.value("document.getElementById('newkind').value = 'fir'")
     click(tab, "#addstage")
-    assert stages(tab) == ["slow", "iir", "double", "out"]
-    assert text_of(tab, "#gaintitle") == "Gain of stage iir"
-    typed(tab, '[data-key="filter.cutoff"]', "5000")
+    assert stages(tab) == ["slow", "fir", "double", "out"]
+    assert text_of(tab, "#gaintitle") == "Gain of stage fir"
+    typed(tab, '[data-key="filter.passband_edge"]', "5000")
     wrong = "document.querySelector('#stages li:nth-child(2) .problem').textContent"
     tab.until(f"{wrong} !== ''")
-    assert tab.value(wrong) == "cutoff must be above 0 and below half the sample_rate (2000 Hz), not 5000"
-    assert text_of(tab, "#state") == "Not a chain yet"
-    typed(tab, '[data-key="filter.cutoff"]', "600")
-    tab.until(f"{wrong} === '' && document.getElementById('handle-cutoff0') !== null")
-    tab.value("document.getElementById('handle-cutoff0').focus()")
+    assert tab.value(wrong) == "passband_edge must be above 0 and below half the sample_rate (2000 Hz), not 5000"
+    tab.until("document.getElementById('state').textContent === 'Not a chain yet'")
+    typed(tab, '[data-key="filter.passband_edge"]', "600")
+    tab.until(f"{wrong} === '' && document.getElementById('handle-passband_edge0') !== null")
+    tab.value("document.getElementById('handle-passband_edge0').focus()")
     tab.key("ArrowRight")
-    tab.until("document.querySelector('[data-key=\"filter.cutoff\"]').value === '606'")
+    tab.until("document.querySelector('[data-key=\"filter.passband_edge\"]').value === '606'")
     chosen(tab, "stage.kind", "cic")
-    assert stages(tab) == ["slow", "iir", "double", "out"]
+    assert stages(tab) == ["slow", "fir", "double", "out"]
     shown = "[...document.querySelectorAll('#stageset [data-key]')].filter((one) => one.checkVisibility())"
     fields = tab.value(f"{shown}.map((one) => one.dataset.key.split('.')[1]).join()")
     assert fields == "name,kind,decimate,interpolate,order,realization,architecture"

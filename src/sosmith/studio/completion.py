@@ -44,10 +44,8 @@ def completed(table: Mapping[str, Any], rate: float, named: Sequence[str]) -> di
     edges = _edges(table.get("passband_edge" if by_mask else "cutoff"), kind, half)
     if by_mask and _numbers(edges):
         stop = _edges(table.get("stopband_edge"), kind, half)
-        wanted |= {
-            "passband_edge": edges,
-            "stopband_edge": stop if _fit(kind, edges, stop) else _beyond(kind, edges, half),
-        }
+        fits = _fit(kind, edges, stop) and ("stopband_edge" in named or _below(stop, half))
+        wanted |= {"passband_edge": edges, "stopband_edge": stop if fits else _beyond(kind, edges, half)}
     elif not by_mask:
         wanted |= {"order": table.get("order", ORDER), "cutoff": edges}
     return dict.fromkeys(sorted(gone)) | {key: value for key, value in wanted.items() if table.get(key) != value}
@@ -73,6 +71,11 @@ def _fit(kind: str, edges: Any, stop: Any) -> bool:
     if not _numbers(theirs) or not len(ours) == len(theirs) == len(rising):
         return False
     return all((a < b) == up for a, b, up in zip(ours, theirs, rising, strict=True))
+
+
+def _below(edges: Any, half: float) -> bool:
+    """Whether edges are below half the sample rate, as those are not that followed one of the passband beyond it."""
+    return all(edge < half for edge in (edges if isinstance(edges, list) else [edges]))
 
 
 def _beyond(kind: str, edges: Any, half: float) -> Any:
