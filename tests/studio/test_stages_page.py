@@ -200,6 +200,16 @@ def test_what_is_typed_for_a_stage_is_not_sent_for_the_next_one(tab: Tab, page: 
     assert stages(tab) == ["slow", "out"]
 
 
+def test_what_is_no_list_of_stages_is_shown_as_such(tab: Tab, page: Session) -> None:
+    for text in ("stage = 1", "stage = [[1], {}]", "[stage]\nx = 1", "[filter]\n[stage]", "name="):
+        page.handle({"do": "text", "text": text}, "another page")
+        tab.until(f"known.document.text === {text!r} && known.preview.error !== null")
+        assert text_of(tab, "#state").startswith("Not a ")
+        for button in (".pick", "#addstage", "#undo"):
+            tab.value(f"document.querySelector('{button}')?.click()")
+        tab.until(ANSWERED)
+
+
 def test_a_single_core_becomes_a_chain(tab: Tab, page: Session) -> None:
     single = sosmith.Specification.load(FILTER).toml()
     page.handle({"do": "text", "text": single}, "test")

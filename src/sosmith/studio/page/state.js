@@ -42,7 +42,8 @@ function release(changes) {
 
 let chosen = 0;
 const isChain = () => Boolean(known.document && known.document.stages);
-const tables = () => (isChain() ? numbers(known.document.keys.stage).filter((each) => each && typeof each === "object" && !Array.isArray(each)) : []);
+const isTable = (value) => value !== null && typeof value === "object" && !Array.isArray(value);
+const tables = () => (isChain() && Array.isArray(known.document.keys.stage) ? known.document.keys.stage.filter(isTable) : []);
 const table = () => tables()[chosen] || {};
 const kind = () => (isChain() ? table().kind : null);
 
