@@ -9,13 +9,14 @@ from io import StringIO
 from pathlib import Path
 from typing import Any
 
-from sosmith import ChainSpecification, SosmithError, Specification, SpecificationError
+from sosmith import SosmithError, Specification, SpecificationError
 from sosmith.host.loopback import MessageError
 from sosmith.interface.files import read_text, write_file, write_files
 from sosmith.studio.document import described, told
 from sosmith.studio.edits import changed
 from sosmith.studio.history import History
 from sosmith.studio.lane import Lane, warm_up
+from sosmith.studio.messages import kind_in, short, typed
 from sosmith.studio.stage_list import added, chosen, moved, removed, split, stages_of
 
 MAX_TEXT = 1 << 16
@@ -145,17 +146,17 @@ class Session:
             "stop": self._stop,
             "calibration": self._calibrate,
         }
-        if not isinstance(message, dict) or _typed(message, "do", str) not in actions:
+        if not isinstance(message, dict) or typed(message, "do", str) not in actions:
             raise MessageError
         with self._changed:
-            self._last = client, int(_typed(message, "n", int, 0))
+            self._last = client, int(typed(message, "n", int, 0))
             actions[message["do"]](message)
 
     # What pages ask for
 
     def _change(self, message: dict[str, Any]) -> None:
-        changes = _typed(message, "changes", dict)
-        self._take(self._edited(lambda text: changed(text, changes)), moving=_typed(message, "moving", bool, False))
+        changes = typed(message, "changes", dict)
+        self._take(self._edited(lambda text: changed(text, changes)), moving=typed(message, "moving", bool, False))
 
     def _edited(self, edit: Callable[[str], str]) -> str:
         """Return the text after an edit; as it is where that cannot be made."""
@@ -167,14 +168,14 @@ class Session:
             return self._text  # it is no TOML, a table is none, or a number is none of ours: the preview says so
 
     def _replace(self, message: dict[str, Any]) -> None:
-        self._take(_typed(message, "text", str), moving=False)
+        self._take(typed(message, "text", str), moving=False)
 
     def _rearrange(self, message: dict[str, Any]) -> None:
         """Add, remove or move a stage, make stages of a single core, or write those that were chosen."""
-        what, at, to = _typed(message, "what", str), _typed(message, "at", int, 0), _typed(message, "to", int, 0)
+        what, at, to = typed(message, "what", str), typed(message, "at", int, 0), typed(message, "to", int, 0)
         choice = self._state["design"].get("chosen") if self._state["proof"]["state"] == "proven" else None
         edits: dict[str, Callable[[str], str]] = {
-            "add": lambda text: added(text, _kind(message), at),
+            "add": lambda text: added(text, kind_in(message), at),
             "remove": lambda text: removed(text, at),
             "move": lambda text: moved(text, at, to),
             "split": split,
@@ -191,7 +192,7 @@ class Session:
             self._renew(moving=False)
 
     def _take(self, text: str, *, moving: bool) -> None:
-        _short(text, MAX_TEXT)
+        short(text, MAX_TEXT)
         same = text == self._text
         self._history.take(text, moving=moving)
         if same and self._state["proof"]["state"] in {"working", "proven"}:
@@ -204,7 +205,7 @@ class Session:
             on_disk = _read(self.file) if self.file.exists() else None
         except (OSError, ValueError, SpecificationError):
             on_disk = ""  # it is no specification of ours: ask
-        if on_disk not in {None, self._on_disk} and not _typed(message, "overwrite", bool, False):
+        if on_disk not in {None, self._on_disk} and not typed(message, "overwrite", bool, False):
             self._document(
                 question=f"{self.file.name} has changed on the disk since it was read. Overwrite it?"
                 if self._on_disk is not None
@@ -229,7 +230,7 @@ class Session:
         self._take(text, moving=False)
 
     def _compare(self, message: dict[str, Any]) -> None:
-        self._side_by_side, self._compared = _typed(message, "on", bool), _typed(message, "stage", int, 0)
+        self._side_by_side, self._compared = typed(message, "on", bool), typed(message, "stage", int, 0)
         if self._compared < 0:
             raise MessageError
         if not self._side_by_side:
@@ -239,11 +240,11 @@ class Session:
             self._begin_side_by_side()
 
     def _trace(self, message: dict[str, Any]) -> None:
-        topic = "report" if _typed(message, "report", bool, False) else "trace"
+        topic = "report" if typed(message, "report", bool, False) else "trace"
         seconds = message.get("seconds")
         if seconds is not None and not isinstance(seconds, int | float):
             raise MessageError
-        source = _typed(message, "source", str)
+        source = typed(message, "source", str)
         if message.get("csv") is not None:
             kept = self._dropped(topic, "trace.csv", message)
             if kept is None:
@@ -291,7 +292,7 @@ class Session:
 
     def _dropped(self, topic: str, name: str, message: dict[str, Any]) -> str | None:
         """Keep a file that was dropped on the page, under a name of ours; if the disk does not take it, say so."""
-        text = _short(_typed(message, "csv", str), MAX_FILE)
+        text = short(typed(message, "csv", str), MAX_FILE)
         try:
             return str(write_file(self._folder / name, text))
         except SosmithError as error:
@@ -429,32 +430,6 @@ def opened(spec: Path | None, output: Path | None, folder: Path) -> Session:
         raise SpecificationError(f"{spec}: the specification must be at most {MAX_TEXT} characters, not longer")
     same = output is None or output.resolve() == spec.resolve()
     return Session(output or spec, text, text if same else None, folder)
-
-
-def _typed(message: dict[str, Any], key: str, kind: type, default: Any = None) -> Any:
-    value = message.get(key, default)
-    if not isinstance(value, kind):
-        raise MessageError
-    return value
-
-
-def _kind(message: dict[str, Any]) -> str:
-    """Return the kind of a new stage."""
-    kind: str = _typed(message, "kind", str)
-    if kind not in ChainSpecification.kinds():
-        raise MessageError
-    return kind
-
-
-def _short(text: str, longest: int) -> str:
-    """Check a text from a page: that it is not longer, and can be written as UTF-8."""
-    if len(text) > longest:
-        raise MessageError
-    try:
-        text.encode()
-    except UnicodeEncodeError:  # half a character, which JSON can say
-        raise MessageError from None
-    return text
 
 
 def _read(file: Path) -> str:
