@@ -8,16 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 import sosmith
-from sosmith import Chain, ChainSpecification, Design, Specification
+from sosmith import ChainSpecification, Design, Specification
 from sosmith.studio.edits import changed, parsed
 from sosmith.studio.stage_list import stages_of
 from sosmith.studio.views import POINTS, Floats, asked, costs, numbers, proven
+
+if TYPE_CHECKING:  # what a chain alone needs is loaded when there is one
+    from sosmith import Chain
 
 Tell = Callable[[str, Any], None]
 
@@ -75,7 +78,7 @@ def trace(tell: Tell, *, text: str, path: str, source: str, seconds: float | Non
     tell("step", "exact result")
     exact = design.run_exact(**inputs.inputs)
     error = hardware - exact
-    every, rise = (design.factor, design.rise) if isinstance(design, Chain) else (_every(design), 1)
+    every, rise = (_every(design), 1) if isinstance(design, Design) else (design.factor, design.rise)
     edges = np.unique(np.linspace(0, len(error), min(POINTS, len(error)) + 1).astype(int))
     known = inputs.truth is not None and rise == 1  # between samples, nobody knows the true value
     truth = _columns(inputs.truth[::every]) if inputs.truth is not None and known else [None] * error[0].size

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from sosmith import Chain, ChainFilter, ChainSpecification, Design, Filter, Specification
+from sosmith import ChainSpecification, Design, Filter, Specification
+
+if TYPE_CHECKING:  # what a chain alone needs is loaded when there is one
+    from sosmith import Chain, ChainFilter
 
 Floats = npt.NDArray[np.float64]
 
