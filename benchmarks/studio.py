@@ -95,7 +95,7 @@ def run(example: str) -> Times:
             assert process.stdout is not None
             with connect(process.stdout.readline().strip().replace("http", "ws") + "live") as page:
                 seen: dict[str, Any] = {}
-                while "response" not in seen.get("preview", {}):
+                while "stages" not in seen.get("preview", {}):
                     seen |= json.loads(page.recv(PATIENCE))
                 response = time.monotonic() - start
                 change(page, round(cutoff * FACTORS[0], 6))

@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from sosmith.gen.chain.automatic.limits import Limits
 from sosmith.gen.chain.automatic.losses import why_not
+from sosmith.gen.chain.ideal import ideal_chain
 from sosmith.gen.chain.rates import Pattern, Rate, gathered, pattern_of
 from sosmith.gen.chain.response import (
     Part,
@@ -31,7 +32,7 @@ from sosmith.gen.chain.response import (
     segments_of,
 )
 from sosmith.gen.chain.specification import ANY_INPUT, ANY_OUTPUT, ChainSpec, StageSpec
-from sosmith.gen.core import CoreDesign, design_core, polynomial_of, response_of
+from sosmith.gen.core import CoreDesign, design_core, polynomial_of
 from sosmith.gen.filter.design import Filter
 from sosmith.gen.filter.exact_form import Exact
 from sosmith.gen.filter.largest_gain import Peak
@@ -41,7 +42,7 @@ from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.gen.word_lengths.selection import Progress
 from sosmith.model.arrays import Codes
 from sosmith.model.dataflow.status import Flag
-from sosmith.model.errors import ShortfallError, SpecificationError
+from sosmith.model.errors import ShortfallError
 from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
 from sosmith.verify.certificate_file import below_on_grid, on_grid
@@ -369,46 +370,13 @@ class _Budget:
 
     def designed(self) -> ChainDesign:
         """Choose shares by the gains, then give up bits between stages where the whole leaves room."""
-        parts = [self._parts(stage) for stage in self.spec.stages]
+        parts = [stage.parts for stage in ideal_chain(self.spec, self.progress).stages]
         chain = self._chain(self._first_shares(parts), parts)
         for k in range(len(self.spec.stages) - 1):
             coarser = self._coarser(chain, k)
             if coarser is not None:
                 chain = coarser
         return chain
-
-    def _parts(self, stage: StageSpec) -> tuple[Part, ...]:
-        """Return the exact response of a stage, which hardly depends on its ports."""
-        if stage.kind == "polynomial":
-            return ()
-        spec = stage.ordinary(self.spec, (ANY_INPUT,), ANY_OUTPUT)
-        response, _ = response_of(spec, "filter", self.progress)
-        assert response.ideal is not None
-        sections, pre_stage = response.ideal.exact, response.pre_stage
-        if stage.rise > 1:
-            return (Part((self._between(stage, sections),), 1, stage.rise),)
-        if pre_stage is None:
-            return (Part(sections, response.factor),)
-        return cic(pre_stage.decimator.factor, pre_stage.decimator.stages), Part(sections)
-
-    def _between(self, stage: StageSpec, sections: tuple[Exact, ...]) -> Exact:
-        """Return the filter that fills in between samples: as given, or with the gain of the stage restored.
-
-        Raises
-        ------
-        SpecificationError
-            If a phase of it has no tap.
-        """
-        ((taps, under),) = sections
-        if not stage.keeps_taps:
-            taps = tuple(tap * stage.rise for tap in taps)
-        for phase in range(stage.rise):
-            if not any(taps[phase :: stage.rise]):
-                raise SpecificationError(
-                    f"{self.spec.base.path}: stage {stage.name}: taps {phase}, {phase + stage.rise}, .. must not all "
-                    f"be 0, as one result in {stage.rise} would be"
-                )
-        return taps, under
 
     def _first_shares(self, parts: Sequence[tuple[Part, ...]]) -> _Shares:
         gains = gains_to_the_end(parts)

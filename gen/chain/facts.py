@@ -5,8 +5,11 @@ from __future__ import annotations
 import math
 from fractions import Fraction
 
+import numpy as np
+
 from sosmith.gen.chain.automatic.losses import loss_of
 from sosmith.gen.chain.design import ChainDesign, Folding, Kept
+from sosmith.gen.chain.ideal import bands, level
 from sosmith.gen.chain.response import Segment
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.facts.design_tables import ErrorUnit
@@ -23,6 +26,12 @@ def chain_tables(design: ChainDesign) -> list[Table]:
     tables += [_folding(design, each) for each in design.foldings]
     tables += [_kept(design, each.kept) for each in design.foldings if each.kept is not None]
     return tables
+
+
+def limits(design: ChainDesign) -> list[tuple[float, float, float, str]]:
+    """Return the bands in which aliases and images lie, in Hz, what none of them exceeds, in dB, and its name."""
+    most = [float(level(np.array([float(each.anywhere.gain)]))[0]) for each in design.foldings]
+    return [(edge, end, top, name) for (edge, end, name), top in zip(bands(design), most, strict=True)]
 
 
 def _kept(design: ChainDesign, kept: Kept) -> Table:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from sosmith.gen.chain.design import ChainDesign, StageDesign
 from sosmith.gen.core import CoreDesign
@@ -62,36 +61,3 @@ def _of_core(core: CoreDesign, values: Values) -> Values:
     results = sosfilt(sos, values - initial, np.zeros((len(sos), sos.shape[1] // 2 - 1)))
     results = results + dc_gain(sos) * initial
     return results if decimator is not None else np.asarray(results[:: datapath.samples_per_result])
-
-
-def stage_gain(stage: StageDesign, frequency: Values) -> Values:
-    """Magnitude of a stage's gain for sines in Hz: those at its input reach it folded by the stages before, if any.
-
-    Of a stage that interpolates, they are those at its output, images of what comes in included.
-    """
-    return np.asarray(np.abs(_complex(stage, frequency / float(stage.spec.filter_rate))), dtype=np.float64)
-
-
-def chain_gain(design: ChainDesign, frequency: Values) -> npt.NDArray[np.complex128]:
-    """Complex gain at sines of the highest rate, in Hz, without any rounding.
-
-    Without stages that interpolate, that is the rate of the input. With some, a sine of up to half that rate is
-    filtered as it is, and others are its images.
-    """
-    total = np.ones(frequency.shape, dtype=np.complex128)
-    for stage in design.stages:
-        total = total * _complex(stage, frequency / float(stage.spec.filter_rate))
-    return total
-
-
-def _complex(stage: StageDesign, turns: Values) -> npt.NDArray[np.complex128]:
-    total, step = np.ones(turns.shape, dtype=np.complex128) / stage.rate.rise, 1
-    for part in stage.parts:
-        u = np.exp(-2j * np.pi * turns * step)
-        for numerator, denominator in part.sections:
-            over, under = (
-                np.polynomial.polynomial.polyval(u, [float(c) for c in taps]) for taps in (numerator, denominator)
-            )
-            total = total * over / under
-        step *= part.factor
-    return total

@@ -6,20 +6,14 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from sosmith.gen.chain.design import ChainDesign
-from sosmith.gen.chain.golden import chain_gain, stage_gain
+from sosmith.gen.chain.facts import limits
+from sosmith.gen.chain.ideal import chain_gain, frequencies, level, stage_gain
 from sosmith.gen.picture import legend_below, picture
-from sosmith.gen.report.plots import MOST_DB, frequency_axis
-from sosmith.model.arrays import Values
+from sosmith.gen.report.plots import frequency_axis
 
 _BLUE, _RED, _GREY = "#2563a8", "#b4432f", "#8a8f98"
-_POINTS = 2000
-
-
-def frequencies(design: ChainDesign) -> Values:
-    """Return frequencies in Hz, from far below the lowest rate to half the highest."""
-    ends = [stage.spec.filter_rate for stage in design.stages]
-    lowest, highest = min(*ends, design.spec.base.sample_rate, design.spec.last_rate), max(ends)
-    return np.geomspace(float(highest) / 2 / float(100 * highest / lowest), float(highest) / 2, _POINTS)
+POINTS = 2000
+"""Frequencies of a curve."""
 
 
 def axis_label(design: ChainDesign) -> str:
@@ -27,25 +21,9 @@ def axis_label(design: ChainDesign) -> str:
     return "frequency at the input" if design.rise == 1 else "frequency at the highest rate"
 
 
-def limits(design: ChainDesign) -> list[tuple[float, float, float, str]]:
-    """Return the bands in which aliases and images lie, in Hz, what none of them exceeds, in dB, and its name."""
-    bands = []
-    for each in design.foldings:
-        highest = float(design.spec.base.sample_rate * each.segment.highest)
-        edge = highest / (2 * max(each.segment.rise, each.segment.factor))
-        name = "aliasing" if each.segment.rise == 1 else "image"
-        bands.append((edge, highest / 2, float(level(np.array([float(each.anywhere.gain)]))[0]), name))
-    return bands
-
-
-def level(gain: Values) -> Values:
-    """Return magnitudes in dB, none below what is drawn."""
-    return np.asarray(20 * np.log10(np.maximum(np.abs(gain), 10 ** (-MOST_DB / 20))), dtype=np.float64)
-
-
 def chain_plot(design: ChainDesign, file_format: str) -> bytes:
     """Draw a chain; `file_format` is one of `sosmith.gen.picture.FORMATS`."""
-    frequency = frequencies(design)
+    frequency = frequencies(design, POINTS)
 
     def paint(figure: Figure) -> None:
         axes = figure.subplots()

@@ -253,6 +253,11 @@ class ChainSpec:
         return min((stage.edge for stage in self.stages if stage.edge is not None), default=None)
 
 
+def keys_of(kind: str) -> tuple[str, ...]:
+    """Return the keys that a stage of this kind can have."""
+    return (*(_COMMON if kind != AUTO else _COMMON[:2]), *_KEYS[kind])
+
+
 def is_chain(tree: Mapping[str, Any]) -> bool:
     """Say whether a specification is that of a chain."""
     return STAGE in tree
@@ -376,7 +381,7 @@ def _kind(stage: Mapping[str, Any], k: int) -> str:
 
 def _stage(table: Mapping[str, Any], kind: str, k: int, rate: Fraction) -> StageSpec:
     where = f"stage[{k}]"
-    known = (*(_COMMON if kind != AUTO else _COMMON[:2]), *_KEYS[kind])
+    known = keys_of(kind)
     for key, value in table.items():
         if key == "interpolate" and kind not in _RISING:
             raise UnfitError(

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from sosmith.interface.certificate import Certificate, Proof
     from sosmith.interface.chain.certificate import ChainCertificate, ChainProof
     from sosmith.interface.chain.design import Chain, design_chain
+    from sosmith.interface.chain.filter import ChainFilter
     from sosmith.interface.chain.reload import ChainReload
     from sosmith.interface.chain.report import ChainReport
     from sosmith.interface.chain.specification import ChainSpecification
@@ -53,6 +54,7 @@ __all__ = [
     "Certificate",
     "Chain",
     "ChainCertificate",
+    "ChainFilter",
     "ChainProof",
     "ChainReload",
     "ChainReport",
@@ -98,6 +100,7 @@ _MODULES = {
     "interface.certificate": ("Certificate", "Proof"),
     "interface.chain.certificate": ("ChainCertificate", "ChainProof"),
     "interface.chain.design": ("Chain", "design_chain"),
+    "interface.chain.filter": ("ChainFilter",),
     "interface.chain.reload": ("ChainReload",),
     "interface.chain.report": ("ChainReport",),
     "interface.chain.specification": ("ChainSpecification",),

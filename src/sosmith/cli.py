@@ -74,7 +74,7 @@ _COMMANDS = {
     "studio": _Command(
         "studio",
         "studio_command",
-        "Design a filter by looking: a page with the design of SPEC, or of the example, live and proven.",
+        "Design by looking: a page with the design of SPEC, or of the example, live and proven.",
     ),
     "build": _Command(
         "build",

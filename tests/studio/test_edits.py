@@ -86,6 +86,12 @@ def test_one_form_takes_the_place_of_the_other() -> None:
     free = filter_after(masked, freedom="mask")
     assert free == masked | {"freedom": "mask"}
     assert filter_after(free, order=3, cutoff=90.0) == FILTER["filter"] | {"order": 3, "cutoff": 90.0}
+    # one that came with an edge beyond half the sample rate goes with it
+    text = sosmith.Specification.load(FILTER | {"filter": masked}).toml()
+    beyond = changed(text, {"filter.passband_edge": 600.0})
+    assert tomllib.loads(beyond)["filter"]["stopband_edge"] == 550.0
+    assert tomllib.loads(changed(beyond, {"filter.passband_edge": 80.0}))["filter"]["stopband_edge"] == 160.0
+    assert tomllib.loads(changed(text, {"filter.stopband_edge": 600.0}))["filter"]["stopband_edge"] == 600.0
     # an edge of the passband that passes that of the stopband takes it along
     assert filter_after(masked, passband_edge=220.0)["stopband_edge"] == 360.0
 

@@ -12,6 +12,7 @@ import pytest
 from tests.host.browser import BROWSER, Tab, browser
 from tests.house import ROOT
 from tests.interface.small import INSTRUMENT
+from tests.studio.pages import PROVEN, mouse, text_of, typed
 from tests.studio.sessions import TEXT, session_in, state, until
 from tests.suite.extras import needs
 
@@ -20,8 +21,6 @@ from sosmith.studio.server import Studio
 from sosmith.studio.session import Session
 
 pytestmark = pytest.mark.skipif(BROWSER is None, reason="there is no Chromium on this machine")
-
-PROVEN = "document.getElementById('state').textContent.startsWith('Proven')"
 
 
 @pytest.fixture(scope="module", name="tab")
@@ -51,11 +50,6 @@ def _page(tab: Tab, studio: tuple[Session, Studio]) -> Iterator[Session]:
     assert tab.asked == [server.address, server.address.replace("http", "ws") + "live"]
 
 
-def text_of(tab: Tab, place: str) -> str:
-    """Return the text of an element."""
-    return str(tab.value(f"document.querySelector({place!r}).innerText"))
-
-
 def spot(tab: Tab, handle: str) -> tuple[float, float]:
     """Where a handle is in the window."""
     tab.value("document.getElementById('gain').scrollIntoView({block: 'center'})")
@@ -64,19 +58,6 @@ def spot(tab: Tab, handle: str) -> tuple[float, float]:
         f"(document.querySelector('#handle-{handle} .knob').getBoundingClientRect())"
     )
     return box["x"], box["y"]
-
-
-def mouse(tab: Tab, kind: str, x: float, y: float) -> None:
-    """Do something with the left button."""
-    tab.call(
-        "Input.dispatchMouseEvent",
-        type=kind,
-        x=x,
-        y=y,
-        button="left",
-        buttons=0 if kind == "mouseReleased" else 1,
-        clickCount=1,
-    )
 
 
 def asked(session: Session, key: str) -> Any:
@@ -101,14 +82,8 @@ def test_zeros_outside_of_the_unit_circle_are_shown(tab: Tab, page: Session) -> 
         assert tab.value(shown) == all_shown
 
 
-def typed(tab: Tab, field: str, text: str) -> None:
-    """Type into a field."""
-    tab.value(f"(() => {{ const field = document.querySelector({field!r}); field.focus(); field.select(); }})()")
-    tab.call("Input.insertText", text=text)
-
-
 def test_it_shows_the_design(tab: Tab, page: Session) -> None:
-    proof = state(page)["proof"]["result"]
+    proof = state(page)["design"]
     assert text_of(tab, "#describe") == "Butterworth lowpass, order 2, 100 Hz at 1000 Hz"
     assert text_of(tab, "#detail").endswith(" allowed. df1_ef1, parallel.")
     assert tab.value("document.querySelectorAll('#gain path.line').length") == 2
@@ -173,7 +148,7 @@ def test_the_mask_is_dragged_and_moved_by_keys(tab: Tab, page: Session) -> None:
     until(page, lambda known: known["preview"]["spec"]["filter"]["passband_loss"] == 0.95)
     tab.value("document.querySelector('input[value=order]').click()")
     tab.until("document.getElementById('handle-cutoff0') !== null && " + PROVEN)
-    assert asked(page, "order") == state(page)["preview"]["filter"]["order"]
+    assert asked(page, "order") == state(page)["preview"]["stages"][0]["filter"]["order"]
 
 
 def test_numbers_are_typed_and_a_wrong_one_is_told(tab: Tab, page: Session) -> None:

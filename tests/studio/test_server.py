@@ -115,7 +115,7 @@ def test_every_page_is_told_of_a_change(studio: tuple[Session, Studio]) -> None:
         first.send(json.dumps({"do": "change", "changes": {"filter.cutoff": 77.0}, "n": 1}))
         for page in (first, second):
             known: dict[str, Any] = {}
-            while known.get("preview", {}).get("filter", {}).get("cutoff") != [77.0]:
+            while known.get("preview", {}).get("spec", {}).get("filter", {}).get("cutoff") != 77.0:
                 known |= json.loads(page.recv(PATIENCE))
             assert known["preview"]["client"] in ids
 

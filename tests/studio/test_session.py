@@ -36,17 +36,18 @@ def change(session: Session, changes: dict[str, Any], **more: Any) -> None:
 def test_what_is_shown_is_what_the_interface_computes(session: Session) -> None:
     known = proven(session)
     design = sosmith.design(FILTER)
-    preview, proof = known["preview"], known["proof"]["result"]
+    preview, proof = known["preview"], known["design"]
     assert (preview["error"], preview["name"], preview["spec"]["filter"]) == (None, "plain", FILTER["filter"])
-    assert preview["filter"]["describe"] == "Butterworth lowpass, order 2, 100 Hz at 1000 Hz"
-    assert np.interp(100.0, preview["response"]["f"], preview["response"]["db"]) == pytest.approx(-3.0103, abs=1e-4)
-    assert preview["step"]["y"][-1] == pytest.approx(1.0, abs=0.02)
-    assert [complex(*each) for each in preview["plane"]["zeros"]] == [-1, -1]
+    (stage,), (shown,) = preview["stages"], proof["stages"]
+    assert preview["describe"] == stage["filter"]["describe"] == "Butterworth lowpass, order 2, 100 Hz at 1000 Hz"
+    assert np.interp(100.0, stage["response"]["f"], stage["response"]["db"]) == pytest.approx(-3.0103, abs=1e-4)
+    assert stage["step"]["y"][-1] == pytest.approx(1.0, abs=0.02)
+    assert [complex(*each) for each in stage["plane"]["zeros"]] == [-1, -1]
     assert (proof["bound"], proof["allowed"]) == (float(design.bound), float(design.specification.max_error))
     assert dict(proof["budget"]) == {part: float(value) for part, value in design.budget.items()}
     assert (proof["realization"], proof["architecture"]) == ("df1_ef1", "parallel")
-    gain = 20 * np.log10(abs(design.frequency_response(proof["f"])))
-    assert proof["db"][:-1] == pytest.approx(gain[:-1].tolist(), abs=1e-3)
+    gain = 20 * np.log10(abs(design.frequency_response(shown["f"])))
+    assert shown["db"][:-1] == pytest.approx(gain[:-1].tolist(), abs=1e-3)
     assert list(proof["scenarios"]) == list(design.scenarios)
 
 
@@ -55,11 +56,11 @@ def test_a_change_is_answered_and_proven(session: Session) -> None:
     change(session, {"filter.cutoff": 123.0}, n=7)
     known = proven(session)
     assert (known["preview"]["client"], known["preview"]["n"]) == ("page", 7)
-    assert known["preview"]["filter"]["cutoff"] == (123.0,)
+    assert known["preview"]["stages"][0]["filter"]["cutoff"] == (123.0,)
     assert known["document"]["text"] == TEXT.replace("cutoff = 100.0", "cutoff = 123.0")
     assert known["document"]["saved"] is False
     made = sosmith.design(sosmith.Specification.from_toml(known["document"]["text"]))
-    assert known["proof"]["result"]["bound"] == float(made.bound)
+    assert known["design"]["bound"] == float(made.bound)
 
 
 def test_ten_quick_changes_leave_no_work_behind(session: Session) -> None:
@@ -73,7 +74,7 @@ def test_ten_quick_changes_leave_no_work_behind(session: Session) -> None:
     known = proven(session)
     assert len(seen) >= 9
     assert [pid for pid in seen if pid not in session.processes and lives(pid)] == []
-    assert (known["proof"]["result"]["realization"], known["preview"]["filter"]["order"]) == ("df1", 1)
+    assert (known["design"]["realization"], known["preview"]["stages"][0]["filter"]["order"]) == ("df1", 1)
     kept = session.processes
     session.close()
     assert session.processes == []
@@ -90,7 +91,7 @@ def test_while_a_handle_is_dragged_nothing_is_proven(session: Session) -> None:
     assert not session.busy
     assert len([pid for pid in working if lives(pid)]) == 1  # the one for previews
     change(session, QUICK | {"filter.cutoff": 5.0})
-    assert proven(session)["proof"]["result"]["realization"] == "df1"
+    assert proven(session)["design"]["realization"] == "df1"
 
 
 def test_a_wrong_specification_is_told_as_the_command_line_tells_it(session: Session) -> None:
@@ -134,7 +135,12 @@ def test_a_number_that_is_none_of_ours_outlasts_the_form(session: Session, typed
 
 
 @pytest.mark.parametrize(
-    ("table", "named"), [("calibration]\ndata", "calibration.data"), ("filter]\nsos_file", "filter.sos_file")]
+    ("table", "named"),
+    [
+        ("calibration]\ndata", "calibration.data"),
+        ("filter]\nsos_file", "filter.sos_file"),
+        ("[stage]]\ntaps_file", "stage[0].taps_file"),
+    ],
 )
 @pytest.mark.parametrize("place", ["/etc/passwd", "../secret.csv"])
 def test_a_text_names_no_file_outside_its_folder(session: Session, table: str, named: str, place: str) -> None:
@@ -287,6 +293,11 @@ def test_measurements_become_the_calibration(tmp_path: Path) -> None:
         {"do": "calibration", "csv": 3},
         {"do": "calibration", "csv": "," * (MAX_FILE + 1)},
         {"do": "realizations", "on": "yes"},
+        {"do": "realizations", "on": True, "stage": -1},
+        {"do": "stages"},
+        {"do": "stages", "what": "add", "kind": "biquad", "at": 0},
+        {"do": "stages", "what": "move", "at": 0, "to": -1},
+        {"do": "stages", "what": "remove", "at": "0"},
     ],
 )
 def test_what_no_page_says_is_refused(session: Session, message: Any) -> None:
@@ -303,6 +314,7 @@ def test_what_no_page_says_is_refused(session: Session, message: Any) -> None:
         {"filter": 1, "filter.order": 2},
         {"filter.passband_edge": [None]},
         {"sample_rate": 10**400, "filter.order": 1},
+        {"stage.0.order": 1},
     ],
     ids=str,
 )

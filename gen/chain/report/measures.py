@@ -8,8 +8,7 @@ from fractions import Fraction
 import numpy as np
 
 from sosmith.gen.chain.design import ChainDesign
-from sosmith.gen.chain.golden import chain_gain
-from sosmith.gen.chain.picture import level
+from sosmith.gen.chain.ideal import chain_gain, level
 from sosmith.gen.chain.specification import ChainSpec
 from sosmith.gen.filter.decimation import group_delay
 from sosmith.gen.specification.values import number

@@ -11,9 +11,9 @@ import numpy as np
 from matplotlib.figure import Figure as Canvas
 
 from sosmith.gen.chain.design import ChainDesign
-from sosmith.gen.chain.facts import chain_tables
-from sosmith.gen.chain.golden import chain_gain, stage_gain
-from sosmith.gen.chain.picture import axis_label, frequencies, level, limits
+from sosmith.gen.chain.facts import chain_tables, limits
+from sosmith.gen.chain.ideal import chain_gain, frequencies, level, stage_gain
+from sosmith.gen.chain.picture import POINTS, axis_label
 from sosmith.gen.chain.report.measures import aliases_entry, delay_entry, in_db, response_entry
 from sosmith.gen.chain.report.provenance import chain_provenance, names_of
 from sosmith.gen.chain.report.run import ChainRun
@@ -163,7 +163,7 @@ def report_table(summary: dict[str, Any]) -> Table:
 
 def _response_figure(design: ChainDesign) -> Figure:
     """Draw the gain of the whole from the input on, and where aliasing begins."""
-    frequency = frequencies(design)
+    frequency = frequencies(design, POINTS)
     whole = level(np.abs(chain_gain(design, frequency)))
 
     def paint(canvas: Canvas) -> None:
@@ -194,7 +194,7 @@ def _response_figure(design: ChainDesign) -> Figure:
 
 def _stages_figure(design: ChainDesign) -> Figure:
     """Draw the gains of the stages, each over the frequencies at the chain's input."""
-    frequency = frequencies(design)
+    frequency = frequencies(design, POINTS)
     filters = [stage for stage in design.stages if stage.parts]
 
     def paint(canvas: Canvas) -> None:

@@ -1,4 +1,4 @@
-"""The command `studio`: a page on this machine where a filter is designed by looking."""
+"""The command `studio`: a page on this machine where a filter, or a chain of stages, is designed by looking."""
 
 from __future__ import annotations
 
@@ -21,10 +21,11 @@ from sosmith.terminal import note
 )
 @click.option("--no-browser", is_flag=True, help="Do not open a browser.")
 def studio_command(spec: Path | None, output: Path | None, port: int, no_browser: bool) -> None:
-    """Design a filter by looking: a page with the design of SPEC, or of the example, live and proven.
+    """Design by looking: a page with the design of SPEC, or of the example, live and proven.
 
-    Edges and the mask are dragged or typed; the response follows at once, and the proof runs behind. The address of the
-    page is the first line on stdout. It is served to this machine only, and only at its full address. Nothing is
+    Edges and the mask are dragged or typed; the response follows at once, and the proof runs behind. The stages of a
+    chain stand in a list, in which they are added, dragged, edited and removed; every step can be undone. The address
+    of the page is the first line on stdout. It is served to this machine only, and only at its full address. Nothing is
     written unless it is saved on the page. Ctrl-C ends it.
 
     \b

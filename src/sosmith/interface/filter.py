@@ -72,7 +72,7 @@ class Filter:
 
     @property
     def passbands(self) -> list[tuple[float, float]]:
-        """Passbands in Hz, by the edges of the mask or else the cutoff; empty if the sections were given."""
+        """Passbands in Hz, by the edges of the mask or else the cutoff; empty if sections or taps were given."""
         return [] if self._facts is None else response.passbands(self._facts)
 
     @property
@@ -122,7 +122,11 @@ class Filter:
     @property
     def _facts(self) -> response.FilterFacts | None:
         """Facts for the bands; None where the kind is not known."""
-        return None if self.cutoff is None else self._plain
+        return self._plain if self._has_edges else None
+
+    @property
+    def _has_edges(self) -> bool:
+        return self.designed.cutoff is not None or self.designed.passband_edge is not None
 
     @cached_property
     def _plain(self) -> response.FilterFacts:
@@ -131,7 +135,7 @@ class Filter:
             sample_rate=designed.sample_rate,
             ideal_sos=designed.sos,
             quantized_sos=designed.sos,
-            kind="lowpass" if designed.cutoff is None else designed.kind,
+            kind=designed.kind if self._has_edges else "lowpass",
             passband_edge=designed.passband_edge,
             stopband_edge=designed.stopband_edge,
             passband_loss=designed.passband_loss,

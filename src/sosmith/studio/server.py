@@ -8,9 +8,9 @@ import threading
 import time
 from contextlib import suppress
 from types import TracebackType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from sosmith import Specification, __version__
+from sosmith import ChainSpecification, Specification, __version__
 from sosmith.host.loopback import REPORT_POLICY, Loopback, page_policy, take_messages
 from sosmith.model.templates import render
 from sosmith.studio.session import MAX_FILE, Session
@@ -20,6 +20,17 @@ if TYPE_CHECKING:
 
 FAREWELL = 2.0
 """Seconds that pages have at most, all together, to hear that it is the end."""
+
+
+def _choices() -> dict[str, Any]:
+    """Return the names among which the form chooses, and what a stage of each kind knows."""
+    kinds = ChainSpecification.kinds()
+    return {
+        **Specification.choices(),
+        "stage.kind": tuple(kinds),
+        "kinds": kinds,
+        "families": {kind: ChainSpecification.families(kind) for kind in kinds},
+    }
 
 
 class Studio:
@@ -47,12 +58,12 @@ class Studio:
         self._session = session
         nonce = secrets.token_urlsafe(16)
         html = render(
-            ("sosmith.studio", "sosmith.gen.report"),
+            ("sosmith.studio.page", "sosmith.gen.report"),
             "studio.html.jinja",
             nonce=nonce,
             name=session.file.name,
             version=__version__,
-            choices=Specification.choices(),
+            choices=_choices(),
         )
         pages = {"": lambda: (html, page_policy(nonce)), "report": self._report}
         self._server = Loopback(pages, self._serve, port, max_message=4 * MAX_FILE)

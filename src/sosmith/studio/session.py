@@ -11,10 +11,13 @@ from typing import Any
 
 from sosmith import SosmithError, Specification, SpecificationError
 from sosmith.host.loopback import MessageError
-from sosmith.interface.chain.specification import describes_chain
 from sosmith.interface.files import read_text, write_file, write_files
+from sosmith.studio.document import described, told
 from sosmith.studio.edits import changed
+from sosmith.studio.history import History
 from sosmith.studio.lane import Lane, warm_up
+from sosmith.studio.messages import kind_in, short, typed
+from sosmith.studio.stage_list import added, chosen, moved, removed, split, stages_of
 
 MAX_TEXT = 1 << 16
 """Longest text of a specification, in characters."""
@@ -25,12 +28,15 @@ MAX_FILE = 8 << 20
 LATE = 1.0
 """Seconds after which a preview is given up for a newer one; before that, the newer one waits."""
 
+_NO_ERROR: dict[str, Any] = {"error": None, "wrong": []}
+
 
 class Session:
     """The state behind the page, which changes by what pages say and by what jobs say.
 
-    The state is one tree for JSON for each topic: ``document``, ``preview``, ``proof``, ``realizations``, ``trace``,
-    ``report``, ``calibration``. `wait` returns what is new.
+    The state is one tree for JSON for each topic: ``document``, ``preview``, ``proof``, ``design``, ``realizations``,
+    ``trace``, ``report``, ``calibration``. `wait` returns what is new. ``design`` is that of the last proof that
+    succeeded, and there is none before that.
 
     Parameters
     ----------
@@ -46,7 +52,7 @@ class Session:
 
     def __init__(self, file: Path, text: str, on_disk: str | None, folder: Path) -> None:
         self.file = file
-        self._text, self._on_disk = text, on_disk
+        self._history, self._on_disk = History(text), on_disk
         self._folder = folder
         warm_up()
         lock = threading.RLock()
@@ -58,13 +64,17 @@ class Session:
         self._previews, self._proofs, self._others = Lane(lock), Lane(lock), Lane(lock)
         self._previewed, self._begun = "", 0.0
         self._queued: Callable[[], None] | None = None
-        self._side_by_side = False
+        self._side_by_side, self._compared = False, 0
         self._closed = False
-        self._tell("preview", {"error": None})
+        self._tell("preview", _NO_ERROR)
         self._tell("realizations", {"state": "off", "rows": []})
         for topic in ("trace", "report", "calibration"):
             self._tell(topic, {"state": "none"})
         self._renew(moving=False)
+
+    @property
+    def _text(self) -> str:
+        return self._history.text
 
     @property
     def report(self) -> Path:
@@ -126,6 +136,9 @@ class Session:
         actions: dict[str, Callable[[dict[str, Any]], None]] = {
             "change": self._change,
             "text": self._replace,
+            "stages": self._rearrange,
+            "undo": lambda message: self._step(self._history.undone),
+            "redo": lambda message: self._step(self._history.redone),
             "save": self._save,
             "reread": self._reread,
             "realizations": self._compare,
@@ -133,33 +146,58 @@ class Session:
             "stop": self._stop,
             "calibration": self._calibrate,
         }
-        if not isinstance(message, dict) or _typed(message, "do", str) not in actions:
+        if not isinstance(message, dict) or typed(message, "do", str) not in actions:
             raise MessageError
         with self._changed:
-            self._last = client, int(_typed(message, "n", int, 0))
+            self._last = client, int(typed(message, "n", int, 0))
             actions[message["do"]](message)
 
     # What pages ask for
 
     def _change(self, message: dict[str, Any]) -> None:
+        changes = typed(message, "changes", dict)
+        self._take(self._edited(lambda text: changed(text, changes)), moving=typed(message, "moving", bool, False))
+
+    def _edited(self, edit: Callable[[str], str]) -> str:
+        """Return the text after an edit; as it is where that cannot be made."""
         from tomlkit.exceptions import TOMLKitError
 
-        changes = _typed(message, "changes", dict)
         try:
-            text = changed(self._text, changes)
-        except (TOMLKitError, TypeError, ValueError, AttributeError, LookupError, ArithmeticError):
-            text = self._text  # it is no TOML, a table is none, or a number is none of ours: the preview says so
-        self._take(text, moving=_typed(message, "moving", bool, False))
+            return edit(self._text)
+        except (TOMLKitError, TypeError, ValueError, AttributeError, LookupError, ArithmeticError, RecursionError):
+            return self._text  # it is no TOML, a table is none, or a number is none of ours: the preview says so
 
     def _replace(self, message: dict[str, Any]) -> None:
-        self._take(_typed(message, "text", str), moving=False)
+        self._take(typed(message, "text", str), moving=False)
+
+    def _rearrange(self, message: dict[str, Any]) -> None:
+        """Add, remove or move a stage, make stages of a single core, or write those that were chosen."""
+        what, at, to = typed(message, "what", str), typed(message, "at", int, 0), typed(message, "to", int, 0)
+        choice = self._state["design"].get("chosen") if self._state["proof"]["state"] == "proven" else None
+        edits: dict[str, Callable[[str], str]] = {
+            "add": lambda text: added(text, kind_in(message), at),
+            "remove": lambda text: removed(text, at),
+            "move": lambda text: moved(text, at, to),
+            "split": split,
+            "chosen": lambda text: text if choice is None else chosen(text, choice["stage"], choice["limits"]),
+        }
+        if what not in edits or min(at, to) < 0:
+            raise MessageError
+        self._take(self._edited(edits[what]), moving=False)
+
+    def _step(self, step: Callable[[], str | None]) -> None:
+        if step() is None:
+            self._document()
+        else:
+            self._renew(moving=False)
 
     def _take(self, text: str, *, moving: bool) -> None:
-        _short(text, MAX_TEXT)
-        if text == self._text and self._state["proof"]["state"] in {"working", "proven"}:
+        short(text, MAX_TEXT)
+        same = text == self._text
+        self._history.take(text, moving=moving)
+        if same and self._state["proof"]["state"] in {"working", "proven"}:
             self._document()
             return
-        self._text = text
         self._renew(moving=moving)
 
     def _save(self, message: dict[str, Any]) -> None:
@@ -167,7 +205,7 @@ class Session:
             on_disk = _read(self.file) if self.file.exists() else None
         except (OSError, ValueError, SpecificationError):
             on_disk = ""  # it is no specification of ours: ask
-        if on_disk not in {None, self._on_disk} and not _typed(message, "overwrite", bool, False):
+        if on_disk not in {None, self._on_disk} and not typed(message, "overwrite", bool, False):
             self._document(
                 question=f"{self.file.name} has changed on the disk since it was read. Overwrite it?"
                 if self._on_disk is not None
@@ -192,7 +230,9 @@ class Session:
         self._take(text, moving=False)
 
     def _compare(self, message: dict[str, Any]) -> None:
-        self._side_by_side = _typed(message, "on", bool)
+        self._side_by_side, self._compared = typed(message, "on", bool), typed(message, "stage", int, 0)
+        if self._compared < 0:
+            raise MessageError
         if not self._side_by_side:
             self._others.cancel()
             self._tell("realizations", {"state": "off", "rows": []})
@@ -200,17 +240,17 @@ class Session:
             self._begin_side_by_side()
 
     def _trace(self, message: dict[str, Any]) -> None:
-        topic = "report" if _typed(message, "report", bool, False) else "trace"
+        topic = "report" if typed(message, "report", bool, False) else "trace"
         seconds = message.get("seconds")
         if seconds is not None and not isinstance(seconds, int | float):
             raise MessageError
-        source = _typed(message, "source", str)
+        source = typed(message, "source", str)
         if message.get("csv") is not None:
             kept = self._dropped(topic, "trace.csv", message)
             if kept is None:
                 return
             source = kept
-        elif source not in (self._state["proof"].get("result") or {}).get("scenarios", {}):
+        elif source not in self._state.get("design", {}).get("scenarios", {}):
             raise MessageError  # a name of ours, never a path
         arguments: dict[str, Any] = {"source": source, "seconds": None if message.get("csv") is not None else seconds}
         job = "trace"
@@ -244,16 +284,15 @@ class Session:
             with self._changed:
                 self._noted("calibration")(kind, value)
                 if kind == "result":
-                    self._change(
-                        {"changes": {"calibration.data": None, "calibration.coefficients": value["coefficients"]}}
-                    )
+                    table = "calibration" if stages_of(self._text) is None else "stage.0"
+                    self._change({"changes": {f"{table}.data": None, f"{table}.coefficients": value["coefficients"]}})
 
         self._tell("calibration", {"state": "working", "step": "fitting"})
         self._others.run(news, "calibrate", measurements=place)
 
     def _dropped(self, topic: str, name: str, message: dict[str, Any]) -> str | None:
         """Keep a file that was dropped on the page, under a name of ours; if the disk does not take it, say so."""
-        text = _short(_typed(message, "csv", str), MAX_FILE)
+        text = short(typed(message, "csv", str), MAX_FILE)
         try:
             return str(write_file(self._folder / name, text))
         except SosmithError as error:
@@ -275,20 +314,23 @@ class Session:
                 self._tell(topic, {"state": "none"})
             elif self._state[topic]["state"] == "done":
                 self._tell(topic, self._state[topic] | {"old": True})
-        result = self._state.get("proof", {}).get("result")
         if moving:
             self._proofs.cancel()
-            self._tell("proof", {"state": "waiting", "result": result})
+            self._tell("proof", {"state": "waiting"})
             return
-        self._tell("proof", {"state": "working", "step": "beginning", "result": result})
+        self._tell("proof", {"state": "working", "step": "beginning"})
         self._proofs.run(self._proof_news, "prove", text=self._text, path=str(self.file))
 
     def _document(self, **more: str) -> None:
         client, n = self._last
+        former, (before, after) = self._state.get("document", {}), self._history.steps
         self._tell(
             "document",
             {
                 "text": self._text,
+                **described(self._text, former),
+                "undo": before,
+                "redo": after,
                 "file": self.file.name,
                 "saved": self._text == self._on_disk,
                 "client": client,
@@ -308,25 +350,25 @@ class Session:
         with self._changed:
             request = {"client": last[0], "n": last[1]}
             if kind == "result":
-                self._tell("preview", request | {"error": None, **value})
+                self._tell("preview", request | _NO_ERROR | value)
             else:
                 error = value if kind == "refused" else "the preview must live until it is done, and has ended before"
-                self._tell("preview", self._state["preview"] | request | {"error": error})
+                self._tell("preview", self._state["preview"] | request | told(error, self._previewed))
             if self._text != self._previewed:
                 self._preview()
 
     def _proof_news(self, kind: str, value: Any) -> None:
         with self._changed:
-            former = self._state["proof"].get("result")
             if kind == "step":
-                self._tell("proof", {"state": "working", "step": value, "result": former})
+                self._tell("proof", {"state": "working", "step": value})
             elif kind == "result":
-                self._tell("proof", {"state": "proven", "result": value})
+                self._tell("design", value)
+                self._tell("proof", {"state": "proven"})
                 if self._side_by_side:
                     self._begin_side_by_side()
             else:
                 error = value if kind == "refused" else "the proof must live until it is done, and has ended before"
-                self._tell("proof", {"state": "refused", "error": error, "result": former})
+                self._tell("proof", {"state": "refused", **told(error, self._text)})
             if kind != "step" and self._queued is not None:
                 begin, self._queued = self._queued, None
                 begin()
@@ -343,7 +385,7 @@ class Session:
                 self._tell("realizations", {"state": state, "step": step, "rows": list(rows)})
 
         self._tell("realizations", {"state": "working", "step": "", "rows": []})
-        self._others.run(news, "side_by_side", text=self._text, path=str(self.file))
+        self._others.run(news, "side_by_side", text=self._text, path=str(self.file), stage=self._compared)
 
     def _noted(self, topic: str) -> Callable[[str, Any], None]:
         """Return what tells a topic about a job."""
@@ -386,31 +428,8 @@ def opened(spec: Path | None, output: Path | None, folder: Path) -> Session:
         raise SpecificationError(f"{spec}: the specification must be a readable file") from None
     if len(text) > MAX_TEXT:
         raise SpecificationError(f"{spec}: the specification must be at most {MAX_TEXT} characters, not longer")
-    if describes_chain(text):
-        raise SpecificationError(
-            f"{spec}: the specification must be that of a single core, not of a chain: `sosmith design {spec}` shows a "
-            f"chain, and `sosmith generate {spec}` writes a specification of each stage, which the studio opens"
-        )
     same = output is None or output.resolve() == spec.resolve()
     return Session(output or spec, text, text if same else None, folder)
-
-
-def _typed(message: dict[str, Any], key: str, kind: type, default: Any = None) -> Any:
-    value = message.get(key, default)
-    if not isinstance(value, kind):
-        raise MessageError
-    return value
-
-
-def _short(text: str, longest: int) -> str:
-    """Check a text from a page: that it is not longer, and can be written as UTF-8."""
-    if len(text) > longest:
-        raise MessageError
-    try:
-        text.encode()
-    except UnicodeEncodeError:  # half a character, which JSON can say
-        raise MessageError from None
-    return text
 
 
 def _read(file: Path) -> str:

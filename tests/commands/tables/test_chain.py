@@ -127,14 +127,3 @@ def test_a_stage_alone_goes_where_a_chain_does_not(sosmith: Command) -> None:
         "the certificate of each stage, such as rx/rx_slow.certificate.json"
     )
     assert sosmith("verify", "rx/rx_slow.certificate.json", "--spec", "rx/rx_slow.toml").status == 0
-
-
-def test_the_studio_opens_no_chain(sosmith: Command) -> None:
-    Path("rx.toml").write_text(CHAIN, encoding="utf-8")
-    refused = sosmith("studio", "rx.toml", "--no-browser")
-    assert refused.status == 2
-    assert refused.messages[-1] == (
-        "sosmith: error: rx.toml: the specification must be that of a single core, not of a chain: `sosmith design "
-        "rx.toml` shows a chain, and `sosmith generate rx.toml` writes a specification of each stage, which the studio "
-        "opens"
-    )

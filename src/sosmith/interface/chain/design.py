@@ -16,9 +16,11 @@ from sosmith.gen.chain.automatic.choice import Choice, choose_stages
 from sosmith.gen.chain.automatic.facts import looked_table
 from sosmith.gen.chain.design import ChainDesign, Folding
 from sosmith.gen.chain.design import design_chain as design_stages
-from sosmith.gen.chain.facts import chain_tables
+from sosmith.gen.chain.facts import chain_tables, limits
 from sosmith.gen.chain.generate import chain_certificate, chain_manifest, generate_chain
-from sosmith.gen.chain.golden import chain_gain, golden_chain
+from sosmith.gen.chain.golden import golden_chain
+from sosmith.gen.chain.ideal import chain_gain
+from sosmith.gen.chain.top import chain_interface
 from sosmith.gen.facts.table import Table, View
 from sosmith.gen.fpga.boards import BUILDABLE, PROJECTS, RATE, find_board
 from sosmith.interface.arrays import real_numbers
@@ -33,8 +35,10 @@ if TYPE_CHECKING:
     from sosmith.interface.build import Build
     from sosmith.interface.certificate import Progress
     from sosmith.interface.chain.certificate import ChainCertificate
+    from sosmith.interface.chain.filter import ChainFilter
     from sosmith.interface.chain.reload import ChainReload
     from sosmith.interface.chain.report import ChainReport
+    from sosmith.interface.trace import Trace
 
 
 @dataclass(frozen=True)
@@ -87,6 +91,11 @@ class Chain(View):
         return tuple(Design(core) for stage in self.core.stages for core in stage.cores)
 
     @property
+    def cores(self) -> dict[str, tuple[Design, ...]]:
+        """The designs of each stage by its name: one, or those of the results of one that interpolates in turn."""
+        return {stage.spec.name: tuple(map(Design, stage.cores)) for stage in self.core.stages}
+
+    @property
     def factor(self) -> int:
         """By how much the stages decimate: input samples of a channel for each result, if none interpolates."""
         return self.core.factor
@@ -130,6 +139,21 @@ class Chain(View):
         return self._peaks([each for each in self.core.foldings if each.segment.rise > 1])
 
     @property
+    def bands(self) -> list[tuple[float, float, float, str]]:
+        """Where a sine comes out at another frequency: from and to, in Hz, largest gain in dB, "aliasing" or "image".
+
+        The gains are those of `folding` and `images`, for each part of the chain.
+        """
+        return limits(self.core)
+
+    @property
+    def filter(self) -> ChainFilter:
+        """The ideal filters of the stages, as designed: with the decimators that were chosen for stages with poles."""
+        from sosmith.interface.chain.filter import ChainFilter
+
+        return ChainFilter(self.core)
+
+    @property
     def passband(self) -> tuple[float, float] | None:
         """Smallest and largest gain in the pass band, proven; None for a chain without limits."""
         kept = [each.kept for each in self.core.foldings if each.kept is not None]
@@ -153,6 +177,25 @@ class Chain(View):
                 if peak is not None and float(peak.gain) > found.get(name, (-1.0, 0.0))[0]:
                     found[name] = float(peak.gain), float(peak.at * highest)
         return found
+
+    @property
+    def latency_cycles(self) -> int:
+        """Clocks from a sample to its result, of all stages together, at most."""
+        return chain_interface(self.core).latency_cycles
+
+    @property
+    def clocks_per_sample(self) -> float:
+        """Clocks that each sample of a channel takes, on average, at the highest rate: those of the slowest stage."""
+        return self.core.clocks_per_sample
+
+    @property
+    def scenarios(self) -> dict[str, str]:
+        """Descriptions of the built-in traces for this chain, by their names; `trace` and `simulate` take them."""
+        return self.stages[0].scenarios
+
+    def trace(self, source: str | PathLike[str] | None = None, *, seconds: float | None = None, seed: int = 1) -> Trace:
+        """Make the inputs of a built-in trace, or read those of a file; parameters and errors are those of `Design`."""
+        return self.stages[0].trace(source, seconds=seconds, seed=seed)
 
     @cached_property
     def manifest(self) -> dict[str, Any]:

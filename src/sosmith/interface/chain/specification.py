@@ -2,19 +2,32 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from os import PathLike
+from os import PathLike, fspath
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from sosmith.gen.chain.specification import ChainSpec, chain_from_tree, is_chain, load_chain
+from sosmith.gen.chain.specification import (
+    ANY_INPUT,
+    ANY_OUTPUT,
+    KINDS,
+    ChainSpec,
+    chain_from_tree,
+    is_chain,
+    keys_of,
+    load_chain,
+)
 from sosmith.gen.facts.table import Table, View
+from sosmith.gen.specification.choices import FAMILIES, FIR_FAMILIES
 from sosmith.gen.specification.exact_values import exact
 from sosmith.gen.specification.specification import parsed, text_of
 from sosmith.interface.quantity import Quantity
 from sosmith.interface.specification import Specification, path_of
+from sosmith.model.errors import SpecificationError, falling_short
+
+if TYPE_CHECKING:
+    from sosmith.interface.chain.filter import ChainFilter
 
 
 @dataclass(frozen=True)
@@ -53,6 +66,83 @@ class ChainSpecification(View):
         if isinstance(source, Mapping):
             return cls(chain_from_tree(exact(source), Path("specification")))
         return cls(load_chain(Path(path_of(source, "the specification must be a path or a dict"))))
+
+    @classmethod
+    def from_toml(cls, text: str, path: str | PathLike[str] = Path("specification")) -> ChainSpecification:
+        """Check the text of a TOML file, as `Specification.from_toml` does.
+
+        Raises
+        ------
+        SpecificationError
+            As `load`.
+        """
+        place = Path(fspath(path))
+        return cls(chain_from_tree(parsed(text, place), place, text))
+
+    @staticmethod
+    def kinds() -> dict[str, tuple[str, ...]]:
+        """Return the keys that a stage can have, by its kind.
+
+        Examples
+        --------
+        >>> import sosmith
+        >>> sosmith.ChainSpecification.kinds()["gain"][:3]
+        ('name', 'kind', 'factor')
+        """
+        return {kind: keys_of(kind) for kind in KINDS}
+
+    @staticmethod
+    def families(kind: str) -> tuple[str, ...]:
+        """Return the families of filters that a stage of a kind takes.
+
+        Examples
+        --------
+        >>> import sosmith
+        >>> sosmith.ChainSpecification.families("fir")[0], sosmith.ChainSpecification.families("cic")
+        ('equiripple', ())
+        """
+        return {"iir": FAMILIES, "fir": FIR_FAMILIES}.get(kind, ())
+
+    @property
+    def is_automatic(self) -> bool:
+        """Whether the stages have yet to be chosen, by `design_chain`, for one of the kind auto."""
+        return self.checked.is_automatic
+
+    @property
+    def alone(self) -> tuple[Specification, ...]:
+        """Each stage by itself, as the specification of a core between ports of 16 bits: its filter, and its choices.
+
+        The sample rate is that at which its filter is described: of its results, if it interpolates.
+        """
+        chain = self.checked
+        return tuple(
+            Specification(
+                stage.ordinary(chain, chain.base.inputs if stage.kind == "polynomial" else (ANY_INPUT,), ANY_OUTPUT)
+            )
+            for stage in chain.stages
+        )
+
+    @property
+    def filter(self) -> ChainFilter:
+        """The ideal filters in series, without any rounding; takes milliseconds, with `freedom` seconds.
+
+        Raises
+        ------
+        SpecificationError
+            If the stages have yet to be chosen, or a filter needs an order that is too high.
+        ShortfallError
+            If there is no such filter.
+        """
+        from sosmith.gen.chain.ideal import ideal_chain
+        from sosmith.interface.chain.filter import ChainFilter
+
+        if self.is_automatic:
+            raise SpecificationError(
+                f"{self.checked.base.path}: the stages must be given for a response, or chosen first: the "
+                "specification of a chain that is designed has them"
+            )
+        with falling_short(self.checked.base.path):
+            return ChainFilter(ideal_chain(self.checked))
 
     @property
     def name(self) -> str:
@@ -120,14 +210,6 @@ class ChainSpecification(View):
             f"<sosmith.ChainSpecification {self.name}: {' -> '.join(self.stages)}, "
             f"{rate:g} Hz to {float(self.checked.last_rate):g} Hz>"
         )
-
-
-def describes_chain(text: str) -> bool:
-    """Say whether a text is the specification of a chain, as far as it is TOML."""
-    try:
-        return is_chain(tomllib.loads(text))
-    except tomllib.TOMLDecodeError:
-        return False
 
 
 def specification_in(source: str | PathLike[str]) -> Specification | ChainSpecification:

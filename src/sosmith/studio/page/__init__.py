@@ -1,0 +1,1 @@
+"""The page of the studio: its template, style and scripts."""
