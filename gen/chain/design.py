@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from sosmith.gen.chain.automatic.limits import Limits
 from sosmith.gen.chain.automatic.losses import why_not
+from sosmith.gen.chain.phases import exact_parts, specs_of
 from sosmith.gen.chain.rates import Pattern, Rate, gathered, pattern_of
 from sosmith.gen.chain.response import (
     Part,
@@ -31,7 +32,7 @@ from sosmith.gen.chain.response import (
     segments_of,
 )
 from sosmith.gen.chain.specification import ANY_INPUT, ANY_OUTPUT, ChainSpec, StageSpec
-from sosmith.gen.core import CoreDesign, design_core, polynomial_of, response_of
+from sosmith.gen.core import CoreDesign, design_core, polynomial_of
 from sosmith.gen.filter.design import Filter
 from sosmith.gen.filter.exact_form import Exact
 from sosmith.gen.filter.largest_gain import Peak
@@ -41,7 +42,7 @@ from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.gen.word_lengths.selection import Progress
 from sosmith.model.arrays import Codes
 from sosmith.model.dataflow.status import Flag
-from sosmith.model.errors import ShortfallError, SpecificationError
+from sosmith.model.errors import ShortfallError
 from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
 from sosmith.verify.certificate_file import below_on_grid, on_grid
@@ -369,46 +370,13 @@ class _Budget:
 
     def designed(self) -> ChainDesign:
         """Choose shares by the gains, then give up bits between stages where the whole leaves room."""
-        parts = [self._parts(stage) for stage in self.spec.stages]
+        parts = [exact_parts(self.spec, stage, self.progress) for stage in self.spec.stages]
         chain = self._chain(self._first_shares(parts), parts)
         for k in range(len(self.spec.stages) - 1):
             coarser = self._coarser(chain, k)
             if coarser is not None:
                 chain = coarser
         return chain
-
-    def _parts(self, stage: StageSpec) -> tuple[Part, ...]:
-        """Return the exact response of a stage, which hardly depends on its ports."""
-        if stage.kind == "polynomial":
-            return ()
-        spec = stage.ordinary(self.spec, (ANY_INPUT,), ANY_OUTPUT)
-        response, _ = response_of(spec, "filter", self.progress)
-        assert response.ideal is not None
-        sections, pre_stage = response.ideal.exact, response.pre_stage
-        if stage.rise > 1:
-            return (Part((self._between(stage, sections),), 1, stage.rise),)
-        if pre_stage is None:
-            return (Part(sections, response.factor),)
-        return cic(pre_stage.decimator.factor, pre_stage.decimator.stages), Part(sections)
-
-    def _between(self, stage: StageSpec, sections: tuple[Exact, ...]) -> Exact:
-        """Return the filter that fills in between samples: as given, or with the gain of the stage restored.
-
-        Raises
-        ------
-        SpecificationError
-            If a phase of it has no tap.
-        """
-        ((taps, under),) = sections
-        if not stage.keeps_taps:
-            taps = tuple(tap * stage.rise for tap in taps)
-        for phase in range(stage.rise):
-            if not any(taps[phase :: stage.rise]):
-                raise SpecificationError(
-                    f"{self.spec.base.path}: stage {stage.name}: taps {phase}, {phase + stage.rise}, .. must not all "
-                    f"be 0, as one result in {stage.rise} would be"
-                )
-        return taps, under
 
     def _first_shares(self, parts: Sequence[tuple[Part, ...]]) -> _Shares:
         gains = gains_to_the_end(parts)
@@ -438,19 +406,13 @@ class _Budget:
             own = parts[k]
             carried = error * peak_gain(own) if own else Fraction(0)
             output = self.last if is_last else self._port(stage, shares.steps[k], reach + carried + allowed)
-            specs = [stage.ordinary(self.spec, inputs, output, allowed)]
-            if stage.rise > 1:
-                taps = (specs[0].filter.taps if stage.keeps_taps else None) or own[0].sections[0][0]
-                specs = [
-                    stage.phase(self.spec, phase, taps[phase :: stage.rise], inputs, output, allowed)
-                    for phase in range(stage.rise)
-                ]
+            specs = specs_of(self.spec, stage, inputs, output, allowed, own)
             cores = tuple(self._core(spec, stage) for spec in specs)
             stages.append(StageDesign(spec=stage, cores=cores, parts=own, gain=gains[k], reach=reach))
             inputs, error = (replace(output, name=ANY_INPUT.name),), carried + stages[-1].bound
             left -= stages[-1].share
         chain = ChainDesign(spec=self.spec, stages=tuple(stages))
-        now = [_parts_of(stage) for stage in stages]
+        now = [parts_of([core.quantized for core in stage.cores]) for stage in stages]
         return chain if now == list(parts) else self._chain(shares, now)
 
     def _port(self, stage: StageSpec, step: Fraction, reach: Fraction) -> Port:
@@ -510,16 +472,14 @@ def reach_behind(spec: ChainSpec, parts: Sequence[tuple[Part, ...]]) -> Fraction
     return largest * on_grid(peak_gain(whole)) if whole else largest
 
 
-def _parts_of(stage: StageDesign) -> tuple[Part, ...]:
-    """Return the exact response of what was designed."""
-    quantized = stage.design.quantized
-    if len(stage.cores) > 1:
-        return (Part((_turns([core.quantized.filter for core in stage.cores]),), 1, len(stage.cores)),)
-    return parts_of(quantized)
+def parts_of(cores: Sequence[Quantized]) -> tuple[Part, ...]:
+    """Return the exact response of what was designed for the cores of a stage.
 
-
-def parts_of(quantized: Quantized) -> tuple[Part, ...]:
-    """Return the exact response of one core, that of a decimator before its filter first; nothing without a filter."""
+    That of a decimator comes before its filter; without a filter it is nothing.
+    """
+    if len(cores) > 1:
+        return (Part((_turns([core.filter for core in cores]),), 1, len(cores)),)
+    (quantized,) = cores
     if quantized.filter is None:
         return ()
     decimator = quantized.datapath.decimator
