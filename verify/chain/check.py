@@ -156,6 +156,23 @@ def judge_chain(
     return ChainJudgement(stages, chain.bound, budget, files, scope)
 
 
+def read_cores(chain: ChainCertificate, folder: Path) -> list[tuple[Certificate, ...]]:
+    """Read the certificates of all stages' cores, which lie in a folder.
+
+    Raises
+    ------
+    RejectedError
+        If one is not the one that the chain names.
+    SpecificationError
+        If a file cannot be read.
+    """
+    _check_names(chain)
+    return [
+        tuple(_read(chain, label, file, folder) for label, file in zip(_labels(entry), entry.certificates, strict=True))
+        for entry in chain.stages
+    ]
+
+
 def _labels(entry: ChainStageEntry) -> list[str]:
     """Return what the cores of a stage are called: its name, with the number of a result where there are several."""
     count = len(entry.certificates)
