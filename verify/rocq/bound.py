@@ -34,12 +34,21 @@ def why_no_bound(certificate: Certificate) -> str | None:
     """Why the theorem cannot be written for this certificate, whose ranges are proven; None if it can."""
     if not certificate.ideal.sections:
         return "there are no sections"
-    if all(node.op is not Operation.FLOOR for node in certificate.stages[-1].nodes):
+    if not certificate.claims.budget.get("output rounding") and not _rounds(certificate):
         return "the last stage rounds nothing"
     entry = certificate.decimation
     if entry is not None and entry.calibration is not None and entry.calibration.output.zero:
         return "the decimator takes values of which 0 has another code than 0"
     return None
+
+
+def _rounds(certificate: Certificate) -> bool:
+    """Whether the output is rounded, and then perhaps limited."""
+    last = certificate.stages[-1]
+    node = last.nodes[last.outputs[0]]
+    if node.op is Operation.CLAMP:
+        node = last.nodes[node.operands[0]]
+    return node.op is Operation.FLOOR
 
 
 @dataclass(frozen=True)

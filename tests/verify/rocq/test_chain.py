@@ -19,7 +19,7 @@ from sosmith.verify.chain.check import read_cores
 from sosmith.verify.graph import RejectedError
 from sosmith.verify.rocq import chain as door
 
-GAIN: dict[str, Any] = {"name": "half", "kind": "gain", "factor": 0.5}
+GAIN: dict[str, Any] = {"name": "half", "kind": "gain", "factor": 0.7}
 MEAN: dict[str, Any] = {"name": "mean", "kind": "fir", "taps": [0.25, 0.5, 0.25]}
 LOW: dict[str, Any] = {"name": "low", "kind": "iir", "family": "butterworth", "order": 1, "cutoff": 2000.0}
 DOWN: dict[str, Any] = {"name": "down", "kind": "cic", "order": 2, "decimate": 2}
