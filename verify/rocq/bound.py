@@ -35,7 +35,7 @@ def why_no_bound(certificate: Certificate) -> str | None:
     if not certificate.ideal.sections:
         return "there are no sections"
     if not certificate.claims.budget.get("output rounding") and not _rounds(certificate):
-        return "the last stage rounds nothing"
+        return "its output is not rounded"
     entry = certificate.decimation
     if entry is not None and entry.calibration is not None and entry.calibration.output.zero:
         return "the decimator takes values of which 0 has another code than 0"
