@@ -194,6 +194,7 @@ def _budget(spec: Specification, response: Response, board: Board | None) -> Bud
         samples_per_clock=hardware.samples_per_clock,
         hold=spec.filter.hold and (pre_stage is not None or response.factor > 1),
         reload_lock=hardware.reload_lock,
+        reload_registers=hardware.reload_registers,
     )
 
 

@@ -67,6 +67,8 @@ class Architecture(ABC):
         Hardware of the calibration before a decimator; None without one.
     reload_lock : bool
         Whether loading can be locked until a reset.
+    reload_registers : bool
+        Whether there are registers for that; otherwise pins, for registers elsewhere.
     """
 
     terms: ClassVar[Terms]
@@ -83,6 +85,7 @@ class Architecture(ABC):
     hold: bool = False
     calibration: Architecture | None = None
     reload_lock: bool = False
+    reload_registers: bool = True
 
     @classmethod
     @abstractmethod
@@ -170,6 +173,16 @@ class Architecture(ABC):
     def bank_size(self) -> tuple[int, int]:
         """Number of words in a bank of constants, and the number of bits used in each."""
         return sum(constant.words for constant in constants(self.datapath)), BITS
+
+    @property
+    def has_registers(self) -> bool:
+        """Whether constants are loaded through registers of its own."""
+        return self.reload and self.reload_registers
+
+    @property
+    def bank_pins(self) -> tuple[int, int] | None:
+        """Number of words in a bank and of bits in each, where constants are loaded at pins; None otherwise."""
+        return self.bank_size if self.reload and not self.reload_registers else None
 
     def check_registers(self) -> None:
         """Check that a word of a bank fits a register.

@@ -35,6 +35,8 @@ class Budget:
         Whether each result behind a decimator is handed out once for each of its samples.
     reload_lock : bool
         Whether loading can be locked until a reset.
+    reload_registers : bool
+        Whether there are registers for that; otherwise pins, for registers elsewhere.
     """
 
     clock: Fraction
@@ -47,6 +49,7 @@ class Budget:
     samples_per_clock: int = 1
     hold: bool = False
     reload_lock: bool = False
+    reload_registers: bool = True
 
     @property
     def adders(self) -> bool:

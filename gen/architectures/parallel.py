@@ -106,6 +106,7 @@ class Parallel(Architecture):
             protect=self.protect,
             lock=self.reload_lock,
             adders=self.adders,
+            pins=self.bank_pins,
             flags_given=self._flags_given,
             before_decimator=before,
         )

@@ -65,6 +65,7 @@ def fitting(
         budget.hold,
         calibration,
         budget.reload_lock,
+        budget.reload_registers,
     )
     budget.check(architecture)
     if budget.reload:

@@ -195,6 +195,7 @@ class Search:
                 realization=realization,
                 # A filter that decimates is filled with its first sample.
                 steady=spec.hardware.start == "steady" and response.factor == 1,
+                loads=spec.hardware.reload,
             )
         return self._plans[realization]
 

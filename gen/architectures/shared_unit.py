@@ -145,6 +145,7 @@ class SharedUnit(Architecture):
             fingerprint=self.fingerprint,
             protect=self.protect,
             lock=self.reload_lock,
+            pins=self.bank_pins,
             flags_given=self._flags_given,
             before_decimator=before,
         )

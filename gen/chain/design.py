@@ -19,6 +19,7 @@ import numpy.typing as npt
 from sosmith.gen.chain.automatic.limits import Limits
 from sosmith.gen.chain.automatic.losses import why_not
 from sosmith.gen.chain.ideal import ideal_chain
+from sosmith.gen.chain.phases import specs_of
 from sosmith.gen.chain.rates import Pattern, Rate, gathered, pattern_of
 from sosmith.gen.chain.response import (
     Part,
@@ -406,19 +407,13 @@ class _Budget:
             own = parts[k]
             carried = error * peak_gain(own) if own else Fraction(0)
             output = self.last if is_last else self._port(stage, shares.steps[k], reach + carried + allowed)
-            specs = [stage.ordinary(self.spec, inputs, output, allowed)]
-            if stage.rise > 1:
-                taps = (specs[0].filter.taps if stage.keeps_taps else None) or own[0].sections[0][0]
-                specs = [
-                    stage.phase(self.spec, phase, taps[phase :: stage.rise], inputs, output, allowed)
-                    for phase in range(stage.rise)
-                ]
+            specs = specs_of(self.spec, stage, inputs, output, allowed, own)
             cores = tuple(self._core(spec, stage) for spec in specs)
             stages.append(StageDesign(spec=stage, cores=cores, parts=own, gain=gains[k], reach=reach))
             inputs, error = (replace(output, name=ANY_INPUT.name),), carried + stages[-1].bound
             left -= stages[-1].share
         chain = ChainDesign(spec=self.spec, stages=tuple(stages))
-        now = [_parts_of(stage) for stage in stages]
+        now = [parts_of([core.quantized for core in stage.cores]) for stage in stages]
         return chain if now == list(parts) else self._chain(shares, now)
 
     def _port(self, stage: StageSpec, step: Fraction, reach: Fraction) -> Port:
@@ -478,16 +473,14 @@ def reach_behind(spec: ChainSpec, parts: Sequence[tuple[Part, ...]]) -> Fraction
     return largest * on_grid(peak_gain(whole)) if whole else largest
 
 
-def _parts_of(stage: StageDesign) -> tuple[Part, ...]:
-    """Return the exact response of what was designed."""
-    quantized = stage.design.quantized
-    if len(stage.cores) > 1:
-        return (Part((_turns([core.quantized.filter for core in stage.cores]),), 1, len(stage.cores)),)
-    return parts_of(quantized)
+def parts_of(cores: Sequence[Quantized]) -> tuple[Part, ...]:
+    """Return the exact response of what was designed for the cores of a stage.
 
-
-def parts_of(quantized: Quantized) -> tuple[Part, ...]:
-    """Return the exact response of one core, that of a decimator before its filter first; nothing without a filter."""
+    That of a decimator comes before its filter; without a filter it is nothing.
+    """
+    if len(cores) > 1:
+        return (Part((_turns([core.filter for core in cores]),), 1, len(cores)),)
+    (quantized,) = cores
     if quantized.filter is None:
         return ()
     decimator = quantized.datapath.decimator

@@ -11,12 +11,10 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from sosmith.gen.chain.response import Part, Segment, cic, segments_of
-from sosmith.gen.chain.specification import ANY_INPUT, ANY_OUTPUT, ChainSpec, StageSpec
-from sosmith.gen.core import response_of
-from sosmith.gen.filter.exact_form import Exact
+from sosmith.gen.chain.phases import exact_parts
+from sosmith.gen.chain.response import Part, Segment, segments_of
+from sosmith.gen.chain.specification import ChainSpec, StageSpec
 from sosmith.model.arrays import Values
-from sosmith.model.errors import SpecificationError
 
 _FLOOR_DB = -200.0
 """Lower limit of gains in dB."""
@@ -75,43 +73,8 @@ def ideal_chain(spec: ChainSpec, progress: Callable[[str], None] = lambda step: 
     ShortfallError
         If there is no such filter.
     """
-    stages = (IdealStage(spec=stage, parts=parts_asked(spec, stage, progress)) for stage in spec.stages)
+    stages = (IdealStage(spec=stage, parts=exact_parts(spec, stage, progress)) for stage in spec.stages)
     return IdealChain(spec=spec, stages=tuple(stages))
-
-
-def parts_asked(chain: ChainSpec, stage: StageSpec, progress: Callable[[str], None]) -> tuple[Part, ...]:
-    """Return the exact response of a stage, which hardly depends on its ports; errors are those of `ideal_chain`."""
-    if stage.kind == "polynomial":
-        return ()
-    spec = stage.ordinary(chain, (ANY_INPUT,), ANY_OUTPUT)
-    response, _ = response_of(spec, "filter", progress)
-    assert response.ideal is not None
-    sections, pre_stage = response.ideal.exact, response.pre_stage
-    if stage.rise > 1:
-        return (Part((_between(chain, stage, sections),), 1, stage.rise),)
-    if pre_stage is None:
-        return (Part(sections, response.factor),)
-    return cic(pre_stage.decimator.factor, pre_stage.decimator.stages), Part(sections)
-
-
-def _between(chain: ChainSpec, stage: StageSpec, sections: tuple[Exact, ...]) -> Exact:
-    """Return the filter that fills in between samples: as given, or with the gain of the stage restored.
-
-    Raises
-    ------
-    SpecificationError
-        If a phase of it has no tap.
-    """
-    ((taps, under),) = sections
-    if not stage.keeps_taps:
-        taps = tuple(tap * stage.rise for tap in taps)
-    for phase in range(stage.rise):
-        if not any(taps[phase :: stage.rise]):
-            raise SpecificationError(
-                f"{chain.base.path}: stage {stage.name}: taps {phase}, {phase + stage.rise}, .. must not all "
-                f"be 0, as one result in {stage.rise} would be"
-            )
-    return taps, under
 
 
 def level(gain: npt.NDArray[np.inexact]) -> Values:

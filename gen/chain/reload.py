@@ -1,13 +1,15 @@
 """Other coefficients for one stage of a running chain: proven to fit the stage, and the bound of the chain anew.
 
-The stage is proven as a core of its own. With its new response, errors of the stages before it reach the end with other
-gains, and other magnitudes reach the ports behind it: none of them may limit what passes.
+The stage is proven as a core of its own, or each of its cores if it interpolates. With its new response, errors of the
+stages before it reach the end with other gains, and other magnitudes reach the ports behind it: none of them may limit
+what passes.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 from sosmith.gen.chain.design import (
     ChainDesign,
@@ -18,11 +20,17 @@ from sosmith.gen.chain.design import (
     parts_of,
     reach_behind,
 )
+from sosmith.gen.chain.joints.registers import registers_unit
+from sosmith.gen.chain.phases import exact_parts, specs_of
 from sosmith.gen.chain.response import Part, peak_gain
 from sosmith.gen.chain.specification import ChainSpec
 from sosmith.gen.quantity import quantity
+from sosmith.gen.reload.register_writes import pairs_of, reload_json, words_of, writes_of
 from sosmith.gen.reload.reload import Swap, check_swap, own_set, set_for
 from sosmith.model.errors import ShortfallError, SpecificationError
+
+_LARGEST = ("transient_samples", "error_after_transient", "state_use")
+"""Facts of which the largest of all cores counts."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,14 +41,14 @@ class ChainSwap:
     ----------
     stage : StageDesign
         The stage as it was generated.
-    swap : Swap
-        The set, as proven for the stage.
+    swaps : tuple of Swap
+        The set, as proven for each core of the stage.
     bound : Fraction
         Bound of the chain with the set, in the unit of its output: from a reset on, or once the swap has faded.
     """
 
     stage: StageDesign
-    swap: Swap
+    swaps: tuple[Swap, ...]
     bound: Fraction
 
 
@@ -65,15 +73,17 @@ def reload_chain(design: ChainDesign, wanted: ChainSpec, *, reset: bool) -> Chai
     """
     k = _changed(design, wanted)
     stage, spec, base = design.stages[k], wanted.stages[k], wanted.base
-    ordinary = spec.ordinary(wanted, stage.design.spec.inputs, stage.output, base.max_error)
-    new = set_for(stage.design, ordinary)
-    swap = check_swap(stage.design, None if reset else own_set(stage.design), new)
-    quantized = swap.new_set.quantized
-    assert quantized.filter is not None
+    asked = exact_parts(wanted, spec) if spec.rise > 1 else ()
+    specs = specs_of(wanted, spec, stage.design.spec.inputs, stage.output, base.max_error, asked)
+    sets = [set_for(core, each) for core, each in zip(stage.cores, specs, strict=True)]
+    swaps = tuple(
+        check_swap(core, None if reset else own_set(core), each) for core, each in zip(stage.cores, sets, strict=True)
+    )
+    quantized = [swap.new_set.quantized for swap in swaps]
     parts = [each.parts for each in design.stages]
     parts[k] = parts_of(quantized)
     errors = [each.bound for each in design.stages]
-    errors[k] = quantized.bound * stage.output.lsb
+    errors[k] = max(each.bound for each in quantized) * stage.output.lsb
     _check_ports(design, parts, errors)
     bound = sum((error * gain for error, gain in zip(errors, gains_to_the_end(parts), strict=True)), Fraction(0))
     if bound > base.max_error:
@@ -89,7 +99,30 @@ def reload_chain(design: ChainDesign, wanted: ChainSpec, *, reset: bool) -> Chai
                 f"the limits of the chain must be kept with the set, and are not: {'; '.join(excess)}: nothing is to "
                 "be loaded"
             )
-    return ChainSwap(stage=stage, swap=swap, bound=bound)
+    return ChainSwap(stage=stage, swaps=swaps, bound=bound)
+
+
+def writes_json(design: ChainDesign, swap: ChainSwap, version: int) -> dict[str, Any]:
+    """Return what a host needs to load a set, as `sosmith.gen.reload.register_writes.reload_json` does for a core.
+
+    Cores that share registers are loaded together: the words of one after those of the other. What is proven of all of
+    them is that of the worst.
+    """
+    stage = swap.stage
+    each = [reload_json(core, own, version) for core, own in zip(stage.cores, swap.swaps, strict=True)]
+    registers = registers_unit(design, stage)
+    if registers is None:
+        return each[0]
+    worst = max(each, key=lambda facts: facts["error_bound"])
+    words = [word for core, own in zip(stage.cores, swap.swaps, strict=True) for word in words_of(core, own.new_set)]
+    return worst | {
+        "name": registers.stage,
+        "design": registers.design,
+        "words": registers.words,
+        **{key: max(facts[key] for facts in each) for key in _LARGEST},
+        "zero_frequency_gain": sum(facts["zero_frequency_gain"] for facts in each) / len(each),
+        "writes": pairs_of(writes_of(words, version)),
+    }
 
 
 def _changed(design: ChainDesign, wanted: ChainSpec) -> int:

@@ -65,6 +65,10 @@ _TAKEN = "flags"
 """What a module of the chain itself is called behind its name."""
 
 _TOP = ("name", "sample_rate", "channels", "input", STAGE, LIMITS, "output", "hardware")
+REMEMBERS_INPUTS = "fir_direct"
+"""Realization of the cores of a stage whose taps can be loaded, if none is asked for: states are past inputs, so that
+no result mixes old taps and new ones."""
+
 _WIRE = {"sos": [[1, 0, 0, 1, 0, 0]]}
 _ANY_DECIMATOR = {"filter": {"taps": [Decimal(1)], "decimate": 2}}
 """Stands for the stages that will be chosen where rules about the hardware are checked."""
@@ -161,7 +165,11 @@ class StageSpec:
                 f"written out, not {literal(endless[0])}"
             )
         tables = {"filter": {"taps": [decimal(tap) for tap in taps]}}
-        return self._alone(chain, tables, self.rate, f"{self.name}_p{k}", inputs, output, max_error)
+        return self._alone(chain, tables, self.rate, f"{self.name}_p{k}", inputs, output, max_error, of_several=True)
+
+    def locks(self, chain: ChainSpec) -> bool:
+        """Whether loading its coefficients can be locked."""
+        return bool(self.hardware.get("reload_lock", chain.base.hardware.reload_lock))
 
     def _alone(
         self,
@@ -172,8 +180,14 @@ class StageSpec:
         inputs: tuple[Port, ...],
         output: Port,
         max_error: Fraction | None,
+        *,
+        of_several: bool = False,
     ) -> Specification:
-        hardware = chain.base.source.get("hardware", {})
+        common = chain.base.source.get("hardware", {})
+        hardware = {key: common[key] for key in _OF_ALL if key in common} | dict(self.hardware)
+        if of_several and hardware.get("reload"):  # the registers are those of all cores of the stage
+            hardware = {key: value for key, value in hardware.items() if key != "reload_lock"}
+            hardware |= {"reload_registers": False, "realization": hardware.get("realization", REMEMBERS_INPUTS)}
         tree: dict[str, Any] = {
             "name": f"{chain.name}_{name}",
             "sample_rate": decimal(rate),
@@ -183,9 +197,7 @@ class StageSpec:
             "output": _format(output)
             | {"unit": output.unit}
             | ({} if max_error is None else {"max_error": decimal(max_error)}),
-            "hardware": {"clock": decimal(chain.base.hardware.clock)}
-            | {key: hardware[key] for key in _OF_ALL if key in hardware}
-            | dict(self.hardware),
+            "hardware": {"clock": decimal(chain.base.hardware.clock)} | hardware,
         }
         return from_tree(tree, chain.base.path.parent / f"{chain.base.path.name}: stage {name}")
 
@@ -321,12 +333,7 @@ def _checked(tree: dict[str, Any], path: Path, text: str | None) -> ChainSpec:
         common["calibration"] = {key: stages[0][key] for key in _KEYS["polynomial"] if key in stages[0]}
     base = from_tree(common | {"filter": _WIRE}, path)
     check_chain(base)
-    if base.hardware.realization != AUTO:
-        raise UnfitError(
-            "left out with [[stage]], as every stage has its own",
-            literal(base.hardware.realization),
-            where="hardware.realization",
-        )
+    _check_common(base)
     read, rate, findings = [], base.sample_rate, []
     for k, stage in enumerate(stages):
         try:
@@ -353,21 +360,23 @@ def _checked(tree: dict[str, Any], path: Path, text: str | None) -> ChainSpec:
         tree=tree,
     )
     _check_steps(chain)
-    for k, one in enumerate(chain.stages):
+    for one in chain.stages:
         if one.kind != "polynomial":
-            _check_rising(one, k, one.ordinary(chain, (ANY_INPUT,), ANY_OUTPUT))
+            one.ordinary(chain, (ANY_INPUT,), ANY_OUTPUT)
     return chain
 
 
-def _check_rising(stage: StageSpec, k: int, alone: Specification) -> None:
-    """Check that a stage that interpolates has no registers: it is several cores."""
-    if stage.rise > 1 and alone.hardware.reload:
-        raise UnfitError(
-            f"{literal(False)} in a stage that interpolates, which has a core for each result of a sample",
-            literal(True),
-            where=f"stage[{k}].reload",
-            later=True,
-        )
+def _check_common(base: Specification) -> None:
+    """Check that what is common to all stages is nothing that each of them has of its own."""
+    hardware = base.hardware
+    for key, value, default in (
+        ("realization", hardware.realization, AUTO),
+        ("reload_registers", hardware.reload_registers, True),
+    ):
+        if value != default:
+            raise UnfitError(
+                "left out with [[stage]], as every stage has its own", literal(value), where=f"hardware.{key}"
+            )
 
 
 def _kind(stage: Mapping[str, Any], k: int) -> str:

@@ -9,8 +9,10 @@
 
     Every core registers its output and takes samples by tvalid and tready alone, so that back-pressure of a core
     reaches the one before it, and the whole keeps the rules of the streams that each core keeps.
-    The gate belongs to the flags: `sosmith.gen.chain.flags`. A stage whose constants can be loaded has its own
-    AXI4-Lite port, s_axil_NAME. A stage that interpolates is several cores, which `sosmith.gen.chain.turns` joins.
+    The gate belongs to the flags: `sosmith.gen.chain.joints.flags`. A stage whose constants can be loaded has its own
+    AXI4-Lite port, s_axil_NAME. A stage that interpolates is several cores, which `sosmith.gen.chain.joints.turns`
+    joins; if its constants can be loaded, these cores have pins for that, and `sosmith.gen.chain.joints.registers` the
+    port.
 """
 
 from __future__ import annotations
@@ -22,9 +24,11 @@ from amaranth.hdl import Shape
 from amaranth.lib.wiring import Out
 
 from sosmith.gen.chain.design import ChainDesign, StageDesign
-from sosmith.gen.chain.flags import FlagsUnit, flags_unit
-from sosmith.gen.chain.turns import TurnsUnit, modules_of, turns_unit
-from sosmith.gen.chain.verilog_text import range_of
+from sosmith.gen.chain.joints.flags import FlagsUnit, flags_unit
+from sosmith.gen.chain.joints.registers import RegistersUnit, registers_unit
+from sosmith.gen.chain.joints.registers_text import SHARED, nets_of, pins_of, registers_text
+from sosmith.gen.chain.joints.turns import TurnsUnit, modules_of, turns_unit
+from sosmith.gen.chain.joints.verilog_text import range_of
 from sosmith.gen.output.core_facts import InterfaceFacts, StreamFacts, interface_facts
 from sosmith.gen.version import __version__
 from sosmith.hdl.bus.axi_lite import slave_members
@@ -92,10 +96,16 @@ def top_text(design: ChainDesign) -> str:
         if unit is not None and behind == "m_axis":
             given["m_axis_tuser"] = "last_tuser"
         turns = turns_unit(design, stage)
-        lines += _cores(stage, name, given, face) if turns is None else _in_turn(turns, stage, name, given)
+        loads = registers_unit(design, stage)
+        lines += _cores(stage, name, given, face) if turns is None else _in_turn(turns, loads, stage, name, given)
     if unit is not None:
         lines += _instance(unit.name, "flags", _joined(unit, names[0]))
-    own = [*(each.text() for each in modules_of(design)), *([] if unit is None else [unit.text()])]
+    loads_of = (registers_unit(design, stage) for stage in design.stages)
+    own = [
+        *(each.text() for each in modules_of(design)),
+        *(registers_text(each) for each in loads_of if each is not None),
+    ]
+    own += [] if unit is None else [unit.text()]
     before = "".join(f"{text}\n" for text in own)
     return _header(design, chain_interface(design)) + before + "\n".join([*lines, "endmodule", ""])
 
@@ -106,9 +116,14 @@ def _cores(stage: StageDesign, name: str, given: Mapping[str, str], face: Interf
     return _instance(face.name, name, pins)
 
 
-def _in_turn(unit: TurnsUnit, stage: StageDesign, name: str, given: Mapping[str, str]) -> list[str]:
+def _in_turn(
+    unit: TurnsUnit, loads: RegistersUnit | None, stage: StageDesign, name: str, given: Mapping[str, str]
+) -> list[str]:
     """Instances of the cores of a stage that interpolates, and of what joins them; all get the sample as it is."""
     lines, pins = list[str](), {"aclk": "aclk", "aresetn": "aresetn"}
+    if loads is not None:
+        shared = [pin for _, pin, _ in pins_of(loads, 0) if pin in SHARED]
+        lines += [f"  wire {name}_{net};" for net in ("between", *shared)]
     pins |= {f"s_{signal}": given[f"s_axis_{signal}"] for signal in ("tvalid", "tready")}
     for k, core in enumerate(stage.cores):
         own = f"{name}_p{k}"
@@ -118,13 +133,26 @@ def _in_turn(unit: TurnsUnit, stage: StageDesign, name: str, given: Mapping[str,
         ports = {"aclk": "aclk", "aresetn": "aresetn"} | {p: n for p, n in given.items() if p.startswith("s_axis_")}
         ports |= {"s_axis_tvalid": f"{own}_given", "s_axis_tready": f"{own}_taken"}
         ports |= {port: f"{own}_{port.removeprefix('m_axis_')}" for port in given if port.startswith("m_axis_")}
+        if loads is not None:
+            joined = nets_of(loads, name, k)
+            widths = {pin: width for _, pin, width in pins_of(loads, k)}
+            lines += [f"  wire {range_of(widths[pin])}{net};" for pin, net in joined.items() if pin not in SHARED]
+            ports |= joined
+            pins |= {f"i{k}_begun": joined["reload_begun"]}
         lines += _instance(core.datapath.name, own, ports)
         pins |= {f"o{k}_tvalid": f"{own}_given", f"o{k}_tready": f"{own}_taken"}
     for k in range(unit.phases):
         pins |= {f"i{k}_{signal}": f"{name}_p{k}_{signal}" for signal, _ in unit.payload}
         pins |= {f"i{k}_{signal}": f"{name}_p{k}_{signal}" for signal in ("tvalid", "tready")}
     pins |= {f"m_{port.removeprefix('m_axis_')}": net for port, net in given.items() if port.startswith("m_axis_")}
-    return lines + _instance(unit.name, name, pins)
+    if loads is None:
+        return lines + _instance(unit.name, name, pins)
+    slave = {f"s_axil_{signal}": f"{registers_port(stage)}_{signal}" for _, signal, _ in _registers(stage)}
+    return [
+        *lines,
+        *_instance(unit.name, name, pins | {"between": f"{name}_between"}),
+        *_instance(loads.name, f"{name}_registers", loads.nets(name) | slave),
+    ]
 
 
 def _joined(unit: FlagsUnit, first: str) -> dict[str, str]:

@@ -64,7 +64,7 @@ def _of_stages(architecture: Architecture, device: Device) -> Quantities:
     for stage in stages:
         made += of_pipelined(stage, device, protect=architecture.protect, loads=architecture.reload)
     made["guards"] += architecture.protect != "none"
-    made["guarded_ports"] += architecture.reload and architecture.protect != "none"
+    made["guarded_ports"] += architecture.has_registers and architecture.protect != "none"
     made["registers"] += (2 + channels) * sum(stage.depth for stage in stages)
     made += _of_shell(datapath, architecture)
     if architecture.reload:
@@ -120,9 +120,8 @@ def _of_constants(architecture: Architecture) -> Quantities:
     loadable = constants(architecture.datapath)
     bits, words = sum(each.bits for each in loadable), sum(each.words for each in loadable)
     guarded = architecture.protect != "none"
-    return Counter(
-        {"ports": 1, "chosen": bits, "loaded": words, "registers": 2 * bits, "parities": 2 * tree(bits) * guarded}
-    )
+    ports = {"ports": architecture.has_registers, "chosen": bits, "loaded": words}
+    return Counter(ports | {"registers": 2 * bits, "parities": 2 * tree(bits) * guarded})
 
 
 def _of_decimator(architecture: Architecture, decimator: Decimator, device: Device) -> Quantities:

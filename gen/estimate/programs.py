@@ -68,8 +68,8 @@ def _memories(architecture: Architecture, program: Program, device: Device) -> Q
     made["guards"] += protect != "none"
     if architecture.reload:
         count = 2 << (count - 1).bit_length()
-        made["ports"] += 1
-        made["guarded_ports"] += protect != "none"
+        made["ports"] += architecture.has_registers
+        made["guarded_ports"] += architecture.has_registers and protect != "none"
         made["loaded"] += bits
     words, program_bits = word + check_bits(word, protect), bits + check_bits(bits, protect)
     for low, high in word_slices(depth, words):

@@ -187,6 +187,7 @@ def _item(design: CoreDesign) -> ItemEntry:
         reload=architecture.reload,
         keep=design.spec.hardware.keep,
         reload_lock=architecture.reload_lock,
+        reload_registers=architecture.reload_registers,
         flags=dict(interface.outputs.flags),
         calibrated=() if datapath.calibrated == everything else datapath.calibrated,
         wear=datapath.wear,

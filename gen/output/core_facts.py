@@ -32,7 +32,7 @@ from sosmith.model.dataflow.status import STATUS_BITS, Flag
 from sosmith.model.dataflow.structure import Stage
 from sosmith.model.full_scale import is_sound
 from sosmith.model.port import Port
-from sosmith.model.reload.registers import INTERFACE
+from sosmith.model.reload.registers import BANK_INPUTS, INTERFACE
 from sosmith.model.sections.horner import HornerStep
 
 
@@ -93,6 +93,8 @@ class InterfaceFacts:
         Times that each result is handed out, one after the other.
     rates : tuple of tuple of int
         By how much each stage of a chain that interpolates does so, and decimates, in order; empty for any other.
+    idle : tuple of str
+        Inputs beside the streams that are 0 where nothing is loaded: pins in place of registers.
     """
 
     name: str
@@ -103,6 +105,7 @@ class InterfaceFacts:
     samples_per_result: int = 1
     copies_per_result: int = 1
     rates: tuple[tuple[int, int], ...] = ()
+    idle: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,7 +132,7 @@ class ReloadFacts:
     restarts : bool
         Whether the core restarts with a set that is loaded, as after a reset.
     registers : tuple of str
-        Names of the files that describe the registers.
+        Names of the files that describe the registers; none if they are elsewhere.
     """
 
     interface: int
@@ -432,7 +435,14 @@ def interface_facts(design: CoreDesign) -> InterfaceFacts:
         latency_cycles=design.architecture.latency_cycles,
         samples_per_result=datapath.samples_per_result,
         copies_per_result=design.architecture.copies_per_result,
+        idle=_idle(design),
     )
+
+
+def _idle(design: CoreDesign) -> tuple[str, ...]:
+    if design.architecture.bank_pins is None:
+        return ()
+    return BANK_INPUTS if design.architecture.protect != "none" else BANK_INPUTS[:-1]
 
 
 def _start(quantized: Quantized) -> str | None:
@@ -516,7 +526,9 @@ def _reload(design: CoreDesign) -> ReloadFacts | None:
         words=words,
         word_bits=bits,
         restarts=design.architecture.restarts,
-        registers=(f"{design.spec.name}_registers.h", f"{design.spec.name}.rdl"),
+        registers=(f"{design.spec.name}_registers.h", f"{design.spec.name}.rdl")
+        if design.architecture.reload_registers
+        else (),
     )
 
 

@@ -81,7 +81,7 @@ def generated(
 
 def _register_files(design: CoreDesign) -> dict[str, str]:
     fingerprint = design.architecture.fingerprint
-    if fingerprint is None:
+    if fingerprint is None or not design.architecture.reload_registers:
         return {}
     name, (words, _) = design.spec.name, bank_size(design.architecture)
     protected, lock = design.architecture.protect != "none", design.architecture.reload_lock

@@ -231,6 +231,11 @@ def _check(design: CoreDesign) -> None:
             f"{design.spec.path}: hardware.samples_per_clock must be 1 on a board, whose serial line never brings "
             f"several samples a clock, not {lanes}"
         )
+    if design.architecture.bank_pins is not None:
+        raise SpecificationError(
+            f"{design.spec.path}: hardware.reload_registers must be true on a board, not false: nothing there drives "
+            "the pins at which such a core is loaded"
+        )
     several = design.spec.channels > 1
     if factor > 1 and design.architecture.hold is several:
         beside = " and several channels" if several else ""

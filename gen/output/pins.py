@@ -11,8 +11,22 @@ from sosmith.gen.core import CoreDesign
 from sosmith.gen.output.core_facts import InterfaceFacts, StreamFacts
 from sosmith.hdl.axi_stream import core_members
 from sosmith.hdl.bus.axi_lite import slave_members
+from sosmith.hdl.shell.bank_pins import bank_members
 from sosmith.model.reload.registers import ADDRESS_BITS
 from sosmith.model.templates import in_comment
+
+_LOADED = {
+    "reload_write": "a word for the idle bank is there",
+    "reload_address": "its number",
+    "reload_data": "the word",
+    "reload_bank": "the active bank",
+    "reload_free": "no sample uses the idle bank",
+    "reload_begun": "a sample that is not taken yet has chosen its bank",
+    "reload_corrected": "a wrong bit was corrected",
+    "reload_failed": "a wrong bit could not be corrected",
+    "reload_acknowledge": "ends the flag fault",
+}
+"""Pins of a core whose registers are elsewhere."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,7 +74,9 @@ def pins(design: CoreDesign, interface: InterfaceFacts) -> tuple[Pin, ...]:
     members = core_members(
         design.datapath.inputs, design.datapath.output, design.spec.channels, lanes=interface.inputs.lanes
     )
-    if design.architecture.fingerprint is not None:
+    if (bank := design.architecture.bank_pins) is not None:
+        members |= bank_members(*bank, protected=design.spec.hardware.protect != "none")
+    elif design.architecture.fingerprint is not None:
         members |= slave_members(ADDRESS_BITS)
     core_pins = [
         Pin(
@@ -71,7 +87,7 @@ def pins(design: CoreDesign, interface: InterfaceFacts) -> tuple[Pin, ...]:
         )
         for name, member in members.items()
     ]
-    buses = ["", "s_axis", "m_axis", "s_axil"]
+    buses = ["", "s_axis", "m_axis", "s_axil", "reload"]
     return tuple(sorted(core_pins, key=lambda pin: buses.index(pin.bus)))
 
 
@@ -85,6 +101,8 @@ def _in_lanes(stream: StreamFacts) -> list[str]:
 def _meaning(name: str, interface: InterfaceFacts) -> str:
     if name.startswith("s_axil"):
         return "AXI4-Lite registers"
+    if name in _LOADED:
+        return _LOADED[name]
     if name.endswith("tdata"):
         stream = interface.inputs if name.startswith("s_") else interface.outputs
         parts = _in_lanes(stream)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zlib
+from collections.abc import Sequence
 from typing import Any
 
 from sosmith.gen.architectures.architecture import Architecture
@@ -29,9 +30,18 @@ def register_writes(hardware: CoreDesign, new_set: OtherSet, version: int) -> li
     version : int
         Value of ``VERSION`` once the set is active, 32 bits.
     """
+    return writes_of(words_of(hardware, new_set), version)
+
+
+def words_of(hardware: CoreDesign, new_set: OtherSet) -> list[int]:
+    """Return the words of a bank of a core for a set."""
+    return hardware.architecture.bank(new_set.quantized.datapath, new_set.program)
+
+
+def writes_of(words: Sequence[int], version: int) -> list[tuple[Register, int]]:
+    """List the register writes that load words: of a bank, or of the banks of several cores that share registers."""
     if not 0 <= version < 1 << 32:
         raise ValueError(f"version must be in 0..4294967295, not {version}")
-    words = hardware.architecture.bank(new_set.quantized.datapath, new_set.program)
     crc = zlib.crc32(b"".join(word.to_bytes(4, "little") for word in (version, *words)))
     return [(VERSION, version), *((DATA, word) for word in words), (CRC, crc)]
 
@@ -59,5 +69,10 @@ def reload_json(hardware: CoreDesign, swap: Swap, version: int) -> dict[str, Any
         "state_use": float(swap.use),
         "calibration": None if polynomial is None else [[str(a) for a in row] for row in polynomial.coefficients],
         "zero_frequency_gain": 1.0 if quantized.filter is None else quantized.filter.dc_gain,
-        "writes": [[register.address, word] for register, word in register_writes(hardware, swap.new_set, version)],
+        "writes": pairs_of(register_writes(hardware, swap.new_set, version)),
     }
+
+
+def pairs_of(writes: Sequence[tuple[Register, int]]) -> list[list[int]]:
+    """Return register writes as pairs of a byte address and a word."""
+    return [[register.address, word] for register, word in writes]

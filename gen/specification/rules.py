@@ -84,6 +84,22 @@ def _check_lock(document: Document) -> None:
         )
 
 
+def _check_pins(document: Document) -> None:
+    """Check that a core whose registers are elsewhere has something to load, and no reason to restart."""
+    hardware = document.hardware
+    if hardware.reload_registers:
+        return
+    beside = (
+        ("hardware.reload = false", not hardware.reload),
+        ("hardware.reload_lock = true", hardware.reload_lock),
+        ("filter.decimate", document.filter.decimate is not None),
+        ("[wear]", document.wear is not None),
+    )
+    for what, there in beside:
+        if there:
+            raise UnfitError(f"true with {what}", "false", where="hardware.reload_registers")
+
+
 def _check_pipeline(document: Document) -> None:
     """Check what look-ahead and several samples a clock exclude beside other options of the hardware."""
     hardware, most = document.hardware, max(LOOK_AHEAD) // 2
@@ -518,6 +534,6 @@ _SUBJECTS: tuple[tuple[Callable[[Document], None], ...], ...] = (
     (_check_filter, _check_decimation),
     (_check_output, _check_wear),
     (_check_clock,),
-    (check_combinations, _check_pipeline, _check_lock),
+    (check_combinations, _check_pipeline, _check_lock, _check_pins),
 )
 """The rules by subject; those after the first one take it to be kept."""

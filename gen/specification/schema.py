@@ -242,6 +242,7 @@ class HardwareTable(Table):
     clock: Annotated[Fraction, PlainValidator(positive("Hz"))] = Fraction(12_000_000)
     reload: Annotated[bool, PlainValidator(flag)] = False
     reload_lock: Annotated[bool, PlainValidator(flag)] = False
+    reload_registers: Annotated[bool, PlainValidator(flag)] = True
     protect: Annotated[str, PlainValidator(choice(PROTECTIONS))] = "none"
     start: Annotated[str, PlainValidator(choice(STARTS))] = "steady"
     multipliers: Annotated[int | None, PlainValidator(read_multipliers)] = None

@@ -143,6 +143,8 @@ class HardwareSpec:
         Whether nets with names stay through synthesis, for a logic analyser.
     reload_lock : bool
         Whether loading can be locked until a reset.
+    reload_registers : bool
+        Whether a core whose coefficients can be loaded has registers for that; otherwise pins, for registers elsewhere.
     """
 
     realization: str
@@ -156,6 +158,7 @@ class HardwareSpec:
     samples_per_clock: int = 1
     keep: bool = False
     reload_lock: bool = False
+    reload_registers: bool = True
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -337,6 +340,7 @@ def _specification(path: Path, tree: dict[str, Any], document: Document) -> Spec
             samples_per_clock=hardware.samples_per_clock,
             keep=hardware.keep,
             reload_lock=hardware.reload_lock,
+            reload_registers=hardware.reload_registers,
         ),
         converters=converters(inputs, document.converter),
         dac=dac(inputs, output_port, document.converter),

@@ -5,6 +5,9 @@ attains. So there is nothing to search for but the grid, the same for all coeffi
 decides how wide the sums are. Large coefficients are cut to the bits that a multiplier takes, if a grid that is a
 little finer for the others makes up for it. Where products are made of adders, what is left of the error allowed is
 spent on coefficients with fewer signed digits, first where a digit costs least.
+
+Where other coefficients can be loaded, the grid is so fine that any of this size keep to the error, and all are kept on
+it: those of the design might need fewer bits.
 """
 
 from __future__ import annotations
@@ -40,6 +43,7 @@ def fir_stages(
     steady: bool = False,
     few_digits: bool = False,
     factor_bits: int | None = None,
+    loads: bool = False,
 ) -> tuple[Sequence[Section], CascadeProof]:
     """Choose the coefficients of an FIR filter, and prove the stage.
 
@@ -59,6 +63,8 @@ def fir_stages(
         Whether coefficients of fewer signed digits take less.
     factor_bits : int or None
         Bits, with a sign, to which coefficients are cut where the error allows it; None for no such limit.
+    loads : bool
+        Whether other coefficients can be loaded.
 
     Raises
     ------
@@ -73,11 +79,16 @@ def fir_stages(
         nearest = on_grid(wanted, frac)
         if _error(_deviations(ideal, wanted, nearest), windows) > allowed:
             continue
+        if loads and _rounding(wanted, nearest, windows) > allowed:
+            continue
         fitting = [] if factor_bits is None else _fitting(ideal, wanted, frac, factor_bits, windows, allowed)
-        if few_digits:
+        if loads:
+            fitting = [codes for codes in fitting if _rounding(wanted, codes, windows) <= allowed]
+        elif few_digits:
             fitting = [_of_few_digits(ideal, wanted, nearest, windows, allowed)]
         for chosen in (*fitting, nearest):
-            sections, proof = _proven(ideal, realization, chosen, x, steady=steady)
+            shortest = chosen if loads else {name: lowest_terms(*code) for name, code in chosen.items()}
+            sections, proof = _proven(ideal, realization, shortest, x, steady=steady)
             if proof.coefficients.magnitude <= allowed:
                 return sections, proof
     raise ShortfallError(
@@ -106,7 +117,7 @@ def _fitting(
 def _proven(
     ideal: Filter, realization: str, codes: Codes, x: Range, *, steady: bool
 ) -> tuple[Sequence[Section], CascadeProof]:
-    formats = [SectionFormat(coefficients={name: lowest_terms(*code) for name, code in codes.items()})]
+    formats = [SectionFormat(coefficients=dict(codes))]
     return cascade(ideal, realization, formats, x, steady=steady)
 
 
@@ -125,6 +136,12 @@ def _error(deviations: Sequence[Fraction], windows: Sequence[tuple[Fraction, Fra
     """Largest output of a filter for inputs within a window that contains 0, or after all of them have come."""
     ends = [[(d * low, d * high) for d in deviations] for low, high in windows]
     return max(abs(sum(map(pick, each), Fraction(0))) for each in ends for pick in (min, max))
+
+
+def _rounding(wanted: Sequence[Coefficient], codes: Codes, windows: Sequence[tuple[Fraction, Fraction]]) -> Fraction:
+    """Bound the error of any coefficients on the grids of these: half a step of each, at the largest input."""
+    largest = max(abs(end) for window in windows for end in window)
+    return sum((len(c.taps) * largest * Fraction(2) ** -(codes[c.name][1] + 1) for c in wanted), Fraction(0))
 
 
 def _of_few_digits(

@@ -73,7 +73,7 @@ class InputStage:
     start: Start | None = None
 
 
-def starting(stage: InputStage, gain: Fraction, allowed: Fraction) -> InputStage:
+def starting(stage: InputStage, gain: Fraction, allowed: Fraction, *, loads: bool = False) -> InputStage:
     """Return an input stage with which a filter starts from its first sample.
 
     Parameters
@@ -84,11 +84,17 @@ def starting(stage: InputStage, gain: Fraction, allowed: Fraction) -> InputStage
         Gain of the ideal filter at zero frequency.
     allowed : Fraction
         Error allowed for each other part, in output LSBs; the start takes a small share of it.
+    loads : bool
+        Whether other gains can be loaded: the steps are then so small that any gain keeps to the error.
     """
     frac = 0
-    while abs(round(gain * 2**frac) - gain * 2**frac) * _size(stage.output) * _START_SHARE > allowed * 2**frac:
+    while (
+        max(abs(round(gain * 2**frac) - gain * 2**frac), Fraction(loads, 2)) * _size(stage.output) * _START_SHARE
+        > allowed * 2**frac
+    ):
         frac += 1
-    return _with_start(stage, gain, *lowest_terms(round(gain * 2**frac), frac))
+    integer = round(gain * 2**frac)
+    return _with_start(stage, gain, *((integer, frac) if loads else lowest_terms(integer, frac)))
 
 
 def starting_like(stage: InputStage, gain: Fraction, first_sample: FirstSample | None) -> InputStage:

@@ -71,6 +71,8 @@ class Plan:
         The proven design, for a realization without estimates.
     instead : tuple of Choice
         Once formats are trimmed, others to fall back on if the whole does not suit.
+    loads : bool
+        Whether other coefficients can be loaded.
     """
 
     name: str
@@ -89,6 +91,7 @@ class Plan:
     objective: Objective = SMALL_AREA
     quantized: Quantized | None = None
     instead: tuple[Choice, ...] = ()
+    loads: bool = False
 
     @property
     def allowed(self) -> Fraction:
@@ -141,6 +144,7 @@ def plan(
     polynomial: Polynomial | None,
     realization: str,
     steady: bool = False,
+    loads: bool = False,
 ) -> Plan:
     """Choose formats and integer coefficients that keep to equal shares of the error allowed.
 
@@ -160,6 +164,8 @@ def plan(
         Its name, known to `sosmith.gen.realizations.registry.realization_of`.
     steady : bool
         Whether a filter starts from the steady state of its first sample, and not from zero.
+    loads : bool
+        Whether other coefficients can be loaded.
 
     Raises
     ------
@@ -174,7 +180,9 @@ def plan(
     before = input_stages(polynomial, inputs, output, share / gain)
     steady = steady and ideal is not None
     if steady:
-        before = tuple(starting(stage, gain_at_zero(cast("Filter", ideal)), share) for stage in before)
+        by_taps = loads and cast("Filter", ideal).is_fir
+        zero_gain = gain_at_zero(cast("Filter", ideal))
+        before = tuple(starting(stage, zero_gain, share, loads=by_taps) for stage in before)
     search, start = None, None
     if ideal is not None and realization_of(realization).searched:
         ideal = _ordered(ideal, realization) if realization_of(realization).cascade else ideal
@@ -195,6 +203,7 @@ def plan(
         input_stages=before,
         search=search,
         start=start,
+        loads=loads,
     )
     if ideal is None or search is not None:
         return planned
@@ -290,6 +299,7 @@ def _by_taps(planned: Plan) -> Quantized:
         steady=planned.steady,
         few_digits=planned.objective.few_digits,
         factor_bits=planned.objective.factor_bits,
+        loads=planned.loads,
     )
     return _assembled(planned, before, *stages)
 

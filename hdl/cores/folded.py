@@ -93,6 +93,7 @@ from sosmith.hdl.plan.folded_clocks import memory_depth, overlaps, word_slices
 from sosmith.hdl.plan.instructions import address_bits, instruction_bits
 from sosmith.hdl.plan.streams import channel_bits
 from sosmith.hdl.reload import ReloadPort
+from sosmith.hdl.shell.bank_pins import BankPins
 from sosmith.hdl.shell.fault_guard import FaultGuard
 from sosmith.hdl.shell.shell import Shell
 from sosmith.hdl.status import OF_INPUT, at_rail, status_of_result, with_fault
@@ -151,10 +152,12 @@ class FoldedCore(Shell):
         How many flags of the inputs come with a sample, from a decimator, and are not read off its codes.
     before_decimator : bool
         Whether its results go to a decimator.
+    pins : (int, int) or None
+        Words of a bank and bits of each, if constants are loaded at pins; None if the core has its own registers.
 
     Members
     -------
-    aclk, aresetn, s_axis_*, m_axis_*, s_axil_*
+    aclk, aresetn, s_axis_*, m_axis_*, s_axil_*, reload_*
         As those of `sosmith.hdl.shell.shell.Shell`.
     """
 
@@ -170,6 +173,7 @@ class FoldedCore(Shell):
         lock: bool = False,
         flags_given: int = 0,
         before_decimator: bool = False,
+        pins: tuple[int, int] | None = None,
     ) -> None:
         self.program = program
         self.serial = serial
@@ -181,6 +185,7 @@ class FoldedCore(Shell):
             lock=lock,
             flags_given=flags_given,
             before_decimator=before_decimator,
+            pins=pins,
         )
 
     def fill(self, m: Module) -> None:
@@ -217,7 +222,7 @@ class FoldedCore(Shell):
             waits = busy | clearing
         else:
             waits = (busy & ~control.leaves) | clearing if guard is None else busy | clearing | guard.broken
-        swaps = None if reload is None or not self.restarts else reload.port
+        swaps = reload.port if reload is not None and self.restarts and isinstance(reload.port, ReloadPort) else None
         if swaps is not None:
             waits = waits | swaps.pending
         self._accept(m, control, waits)
@@ -336,8 +341,18 @@ class FoldedCore(Shell):
         if self.fingerprint is None:
             return None
         depth, bits = len(self.program.instructions), instruction_bits(self.program)
-        port = ReloadPort(depth, bits=bits, design=self.fingerprint, protected=self.is_guarded, lock=self.lock)
-        self.join_port(m, port)
+        begun = Signal(name="sample_begun")
+        port = (
+            BankPins(*self.pins)
+            if self.pins
+            else ReloadPort(depth, bits=bits, design=self.fingerprint, protected=self.is_guarded, lock=self.lock)
+        )
+        self.join_port(m, port, control.start | begun)
+        if self.pins:
+            with sequencer.If(self.s_axis_tready):
+                sequencer.d.sync += begun.eq(0)
+            with sequencer.If(control.start):
+                sequencer.d.sync += begun.eq(1)
         kept = Signal(reset_less=True)
         bank = Signal()
         with sequencer.If(control.start):

@@ -7,6 +7,7 @@ from typing import NamedTuple
 from amaranth.hdl import Module, Signal, Value
 
 from sosmith.hdl.reload import ReloadPort
+from sosmith.hdl.shell.bank_pins import BankPins
 
 NO_COLLISIONS = {"no_rw_check": 1}
 """Attribute of memories: no word is used that is read at the clock at which it is written.
@@ -58,7 +59,7 @@ class Position(NamedTuple):
 class Reload(NamedTuple):
     """The reload port, and the bank that the sample in work uses."""
 
-    port: ReloadPort
+    port: ReloadPort | BankPins
     bank: Signal
 
 

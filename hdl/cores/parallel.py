@@ -54,6 +54,7 @@ from sosmith.hdl.pipelined_logic import banks_in_use
 from sosmith.hdl.plan.parallel_clocks import depths
 from sosmith.hdl.plan.streams import channel_bits
 from sosmith.hdl.reload import ReloadPort
+from sosmith.hdl.shell.bank_pins import BankPins
 from sosmith.hdl.shell.fault_guard import FaultGuard
 from sosmith.hdl.shell.pipeline import Sample, delayed, through
 from sosmith.hdl.shell.shell import Shell
@@ -189,10 +190,12 @@ class Core(Shell):
         `sosmith.model.dataflow.status.Flag`.
     before_decimator : bool
         Whether its results go to a decimator.
+    pins : (int, int) or None
+        Words of a bank and bits of each, if constants are loaded at pins; None if the core has its own registers.
 
     Members
     -------
-    aclk, aresetn, s_axis_*, m_axis_*, s_axil_*
+    aclk, aresetn, s_axis_*, m_axis_*, s_axil_*, reload_*
         As those of `sosmith.hdl.shell.shell.Shell`.
     """
 
@@ -207,6 +210,7 @@ class Core(Shell):
         adders: Sequence[Collection[int]] = (),
         flags_given: int = 0,
         before_decimator: bool = False,
+        pins: tuple[int, int] | None = None,
     ) -> None:
         self.adders = adders or [()] * len(datapath.stages)
         super().__init__(
@@ -217,6 +221,7 @@ class Core(Shell):
             lock=lock,
             flags_given=flags_given,
             before_decimator=before_decimator,
+            pins=pins,
         )
 
     def fill(self, m: Module) -> None:
@@ -337,14 +342,18 @@ class Core(Shell):
                 m.d.comb += stage.clear.eq(clears)
         m.d.comb += parts.empty.eq(~remaining.any())
 
-    def _reload_port(self, m: Module, parts: _Parts) -> ReloadPort | None:
+    def _reload_port(self, m: Module, parts: _Parts) -> ReloadPort | BankPins | None:
         """Make the reload port of the banks, and connect them."""
         banks, swap = parts.banks, parts.swap
         if banks is None or self.fingerprint is None:
             return None
         uses = Cat(parts.waiting, *(stage.uses for stage in parts.stages))  # pairs: of bank 0, of bank 1
         m.submodules.constant_banks = banks
-        port = ReloadPort(banks.words, design=self.fingerprint, protected=self.is_guarded, lock=self.lock)
+        port = (
+            BankPins(*self.pins)
+            if self.pins
+            else ReloadPort(banks.words, design=self.fingerprint, protected=self.is_guarded, lock=self.lock)
+        )
         self.join_port(m, port)
         m.d.comb += [
             parts.bank.eq(port.bank),
@@ -355,7 +364,7 @@ class Core(Shell):
             banks.write_address.eq(port.write_address),
             banks.write_data.eq(port.write_data),
         ]
-        if swap is not None:
+        if swap is not None and isinstance(port, ReloadPort):
             m.d.comb += swap.pending.eq(port.pending)
         return port
 

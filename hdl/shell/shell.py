@@ -25,6 +25,7 @@ from sosmith.hdl.axi_stream import StreamBuffer, codes_of, core_members, extende
 from sosmith.hdl.bus.axi_lite import forward_slave, slave_members
 from sosmith.hdl.plan.streams import channel_bits, width
 from sosmith.hdl.reload import ReloadPort
+from sosmith.hdl.shell.bank_pins import BankPins, bank_members
 from sosmith.hdl.shell.fault_guard import FaultGuard
 from sosmith.hdl.status import (
     NEVER,
@@ -61,6 +62,8 @@ class Shell(wiring.Component):
         `sosmith.model.dataflow.status.Flag`.
     before_decimator : bool
         Whether its results go to a decimator.
+    pins : (int, int) or None
+        Words of a bank and bits of each, if constants are loaded at pins; None if the core has its own registers.
 
     Members
     -------
@@ -84,6 +87,8 @@ class Shell(wiring.Component):
         Channel of the sample, in whole bytes; only with several channels.
     s_axil_*
         AXI4-Lite slave of a `sosmith.hdl.reload.ReloadPort`; only with a fingerprint.
+    reload_*
+        Those of `sosmith.hdl.shell.bank_pins` in their place, with `pins`.
     """
 
     def __init__(
@@ -97,7 +102,9 @@ class Shell(wiring.Component):
         lock: bool = False,
         flags_given: int = 0,
         before_decimator: bool = False,
+        pins: tuple[int, int] | None = None,
     ) -> None:
+        self.pins = pins
         self.datapath = datapath
         self.channels = channels
         self.fingerprint = fingerprint
@@ -108,7 +115,11 @@ class Shell(wiring.Component):
         self.before_decimator = before_decimator
         members = core_members(datapath.inputs, datapath.output, channels, lanes=lanes)
         members |= members_beside_decimator(datapath, flags_given, before=before_decimator, guarded=self.is_guarded)
-        super().__init__(members if fingerprint is None else members | slave_members(ADDRESS_BITS))
+        if pins is not None:
+            members |= bank_members(*pins, protected=self.is_guarded)
+        elif fingerprint is not None:
+            members |= slave_members(ADDRESS_BITS)
+        super().__init__(members)
 
     def elaborate(self, platform: object) -> Module:
         """Build the core."""
@@ -196,13 +207,25 @@ class Shell(wiring.Component):
         if self.channels > 1:
             m.d.comb += self.m_axis_tdest.eq(handed.channel)
 
-    def join_port(self, m: Module, port: ReloadPort) -> None:
-        """Add the reload port, and connect it to `s_axil_*`."""
+    def join_port(self, m: Module, port: ReloadPort | BankPins, begun: Value = NEVER) -> None:
+        """Add the reload port, and connect it to `s_axil_*`, or to pins.
+
+        `begun` says whether a sample that is not taken yet, but perhaps at this clock, has chosen its bank; one that
+        does so at the clock at which it is taken may be left out.
+        """
+        if isinstance(port, BankPins):
+            port.join(m, self, begun)
+            return
         m.submodules.reload_port = port
         forward_slave(m, self, port)
 
     def report(
-        self, m: Module, guard: FaultGuard, port: ReloadPort | None, found: tuple[Value, Value], begins: Value
+        self,
+        m: Module,
+        guard: FaultGuard,
+        port: ReloadPort | BankPins | None,
+        found: tuple[Value, Value],
+        begins: Value,
     ) -> None:
         """Tell the guard, and the registers if there are any, what was corrected and what was not, at this clock.
 

@@ -178,5 +178,8 @@ def registers_of(*, protected: bool, lock: bool = False) -> tuple[Register, ...]
     return tuple(LOCKING_STATUS if lock and register is STATUS else register for register in registers)
 
 
+BANK_INPUTS = ("reload_write", "reload_address", "reload_data", "reload_bank", "reload_acknowledge")
+"""Inputs of a core whose registers are elsewhere; the last one only if it counts faults."""
+
 ADDRESS_BITS = (4 * len(PROTECTED_REGISTERS) - 1).bit_length()
 """Number of address lines of the slave."""

@@ -78,7 +78,8 @@ class StreamBench:
         pins.write("aresetn", 0)
         self.offer(Word(0, 0))
         self.offer(None)
-        pins.write("m_axis_tready", 0)
+        for name in ("m_axis_tready", *self.config["zeros"]):
+            pins.write(name, 0)
         for _ in range(4):
             await self.clock()
         pins.write("aresetn", 1)

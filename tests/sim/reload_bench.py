@@ -2,7 +2,9 @@
 
 Reads ``job.json`` of the folder named by RELOAD_BENCH: ``words`` of the input stream, ``dests`` (their channels; empty
 if there is one channel only), ``loads`` (each a list of register writes [address, data], and whether it is right),
-``seed``, ``behind`` (whether the core with the sets stands behind a decimator, whose samples count). Writes
+``seed``, ``behind`` (whether the core with the sets stands behind a decimator, whose samples count), and for a stage of
+a chain ``chain``: the prefix of its ``registers``, their instance ``port``, its ``core``, and the nets that say that it
+takes a sample. Writes
 ``outcome.json``: ``received`` (pairs of channel and word), ``swaps`` (number of swaps before each sample that was
 taken), ``accepted`` (numbers of the loads in the order in which they were accepted), ``refused`` (those whose last
 write was refused).
@@ -24,7 +26,11 @@ OKAY, SLVERR = 0, 2
 class Bench:
     def __init__(self, dut: Any, job: dict[str, Any]) -> None:
         self.dut, self.job = dut, job
-        self.core = dut.behind if job["behind"] else dut
+        chain = job.get("chain", {})
+        self.core = getattr(dut, chain["core"]) if chain else dut.behind if job["behind"] else dut
+        self.port = getattr(dut, chain["port"]).reload_port if chain else self.core.reload_port
+        self.registers = chain.get("registers", "s_axil")
+        self.taken_by = [getattr(dut, net) for net in chain.get("taken", [])]
         self.pace = random.Random(job["seed"])
         self.falling = FallingEdge(dut.aclk)
         self.swaps = 0
@@ -37,7 +43,7 @@ class Bench:
 
     async def count_swaps(self) -> None:
         while True:
-            await ValueChange(self.core.reload_port.bank)
+            await ValueChange(self.port.bank)
             self.swaps += 1
 
     def swaps_before_sample(self) -> int:
@@ -61,7 +67,7 @@ class Bench:
                     break
                 if self.job["folded"]:
                     await RisingEdge(dut.s_axis_tready)
-            if not self.job["behind"]:
+            if not self.job["behind"] and not self.taken_by:
                 self.used.append(self.swaps_before_sample())
             await RisingEdge(dut.aclk)
             number += 1
@@ -73,7 +79,9 @@ class Bench:
 
     async def watch(self) -> None:
         names = (("s_axis_tready", "advance"), ("s_axis_tvalid", "i_valid"))  # ports of a core, or of its buffer
-        ready, valid = (next(getattr(self.core, name) for name in each if hasattr(self.core, name)) for each in names)
+        ready, valid = self.taken_by or (
+            next(getattr(self.core, name) for name in each if hasattr(self.core, name)) for each in names
+        )
         while True:
             await self.falling
             if int(valid.value) and int(ready.value):
@@ -96,25 +104,30 @@ class Bench:
             await self.falling
             dut.m_axis_tready.value = 0
 
+    def pin(self, signal: str) -> Any:
+        """Return a signal of the registers."""
+        return getattr(self.dut, f"{self.registers}_{signal}")
+
     async def write(self, address: int, data: int) -> int:
-        dut = self.dut
         await self.falling
-        dut.s_axil_awaddr.value, dut.s_axil_wdata.value, dut.s_axil_wstrb.value = address, data, 15
-        dut.s_axil_awvalid.value, dut.s_axil_wvalid.value, dut.s_axil_bready.value = 1, 1, 1
-        waiting = {"awready": dut.s_axil_awvalid, "wready": dut.s_axil_wvalid}
+        for signal, value in (("awaddr", address), ("wdata", data), ("wstrb", 15)):
+            self.pin(signal).value = value
+        for signal in ("awvalid", "wvalid", "bready"):
+            self.pin(signal).value = 1
+        waiting = {"awready": self.pin("awvalid"), "wready": self.pin("wvalid")}
         while True:
-            taken = [name for name in waiting if int(getattr(dut, f"s_axil_{name}").value)]
-            answered = int(dut.s_axil_bvalid.value)
-            response = int(dut.s_axil_bresp.value) if answered else 0
+            taken = [name for name in waiting if int(self.pin(name).value)]
+            answered = int(self.pin("bvalid").value)
+            response = int(self.pin("bresp").value) if answered else 0
             if not taken and not answered and not waiting:
-                await RisingEdge(dut.s_axil_bvalid)
+                await RisingEdge(self.pin("bvalid"))
                 await self.falling
                 continue
             await self.falling
             for name in taken:
                 waiting.pop(name).value = 0
             if answered:
-                dut.s_axil_bready.value = 0
+                self.pin("bready").value = 0
                 return response
 
     async def load(self) -> None:
@@ -137,17 +150,17 @@ async def reloading(dut: Any) -> None:
     folder = Path(os.environ["RELOAD_BENCH"])
     bench = Bench(dut, json.loads((folder / "job.json").read_text()))
     Clock(dut.aclk, 10, "ns", impl="gpi").start(start_high=False)
-    for name in ("s_axis_tvalid", "m_axis_tready", "s_axil_awvalid", "s_axil_wvalid", "s_axil_arvalid"):
+    for name in ("s_axis_tvalid", "m_axis_tready"):
         getattr(dut, name).value = 0
-    for name in ("s_axil_bready", "s_axil_rready", "s_axil_araddr", "s_axil_awprot", "s_axil_arprot"):
-        getattr(dut, name).value = 0
+    for name in ("awvalid", "wvalid", "arvalid", "bready", "rready", "araddr", "awprot", "arprot"):
+        bench.pin(name).value = 0
     dut.aresetn.value = 0
     await ClockCycles(dut.aclk, 4)
     await FallingEdge(dut.aclk)
     dut.aresetn.value = 1
     cocotb.start_soon(bench.count_swaps())
     cocotb.start_soon(bench.receive())
-    if bench.job["behind"]:
+    if bench.job["behind"] or bench.taken_by:
         cocotb.start_soon(bench.watch())
     loading = cocotb.start_soon(bench.load())
     await bench.send()

@@ -102,7 +102,7 @@ class ChainCertificate(Entry):
     bound: Rational
     settling: Annotated[int, Field(strict=True, ge=0, le=1 << 30)] = 0
     folding: Annotated[tuple[FoldingEntry, ...], Field(max_length=8)] = ()
-    files: Annotated[tuple[FileEntry, ...], Field(max_length=8)] = ()
+    files: Annotated[tuple[FileEntry, ...], Field(max_length=32)] = ()
     certificate: Sha256
 
 

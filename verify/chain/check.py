@@ -151,7 +151,26 @@ def judge_chain(
         if with_files:
             progress("files", 0, 0)
             files += _check_files(chain, folder, groups, items, stages, flags)
-    return ChainJudgement(stages, chain.bound, budget, files, _scope(chain, stages, text is not None, with_files))
+    loaded = [e.name for e, own in zip(chain.stages, items, strict=True) if len(own) > 1 and own[0].reload]
+    scope = _scope(chain, stages, loaded, text is not None, with_files)
+    return ChainJudgement(stages, chain.bound, budget, files, scope)
+
+
+def read_cores(chain: ChainCertificate, folder: Path) -> list[tuple[Certificate, ...]]:
+    """Read the certificates of all stages' cores, which lie in a folder.
+
+    Raises
+    ------
+    RejectedError
+        If one is not the one that the chain names.
+    SpecificationError
+        If a file cannot be read.
+    """
+    _check_names(chain)
+    return [
+        tuple(_read(chain, label, file, folder) for label, file in zip(_labels(entry), entry.certificates, strict=True))
+        for entry in chain.stages
+    ]
 
 
 def _labels(entry: ChainStageEntry) -> list[str]:
@@ -243,6 +262,11 @@ def _check_core(
     what, item = f"stage {label}", about_of(core).item
     if item is None:
         raise RejectedError(f"the certificate of {what} must state what the item is")
+    alone = len(entry.certificates) == 1
+    require(
+        not item.reload or item.reload_registers == alone,
+        f"{what} must have {'registers of its own' if alone else 'pins in their place'} where constants can be loaded",
+    )
     require(not item.hold and item.samples == 1, f"{what} must be without hold and several samples a clock")
     require(item.channels == chain.channels, f"{what} must have {chain.channels} channels, not {item.channels}")
     require(
@@ -254,15 +278,14 @@ def _check_core(
 
 
 def _check_beside(entry: ChainStageEntry, items: Sequence[ItemEntry]) -> None:
-    """Check that cores of one stage have the same streams and check bits, and no registers."""
+    """Check that cores of one stage have the same streams and check bits, and that all can be loaded, or none."""
     if len(items) == 1:
         return
     what = f"the cores of stage {entry.name}"
     require(entry.kind in _RISING, f"{what} must be one for the kind {entry.kind}, not {len(items)}")
     for item in items:
-        for part in ("taken", "given", "flags", "calibrated", "protect"):
+        for part in ("taken", "given", "flags", "calibrated", "protect", "reload"):
             require(getattr(item, part) == getattr(items[0], part), f"{what} must have the same {part}")
-        require(not item.reload, f"{what} must be without reload")
 
 
 def _flags(chain: ChainCertificate, groups: Groups, items: Sequence[Sequence[ItemEntry]]) -> FlagsClaim | None:
@@ -344,23 +367,24 @@ def _check_files(
 ) -> int:
     """Check the files of the whole; return how many there are."""
     names = [entry.name for entry in chain.files]
+    joined = [
+        Stage(entry.name, tuple(core.name for core in own), own_items[0])
+        for entry, own, own_items in zip(chain.stages, groups, items, strict=True)
+    ]
     wanted = [name.format(chain.name) for name in _OWN_FILES]
+    wanted += [f"{chain.name}_{stage.name}{end}" for stage in joined if stage.loads for end in ("_registers.h", ".rdl")]
     require(names == wanted, f"the files of the chain must be {', '.join(wanted)}, not {', '.join(names)}")
     contents = {}
     for entry in chain.files:
         contents[entry.name] = content_of(folder / entry.name, links=False)
         _compare(str(folder / entry.name), entry.sha256, contents[entry.name])
-    sv, json, c, h = wanted
+    sv, json, c, h = wanted[: len(_OWN_FILES)]
     cores = [core for each in groups for core in each]
     texts = [
         ascii_text(f"{core.name}.sv", stage.files[f"{core.name}.sv"])
         for core, stage in zip(cores, stages.values(), strict=True)
     ]
     top = ascii_text(sv, contents[sv])
-    joined = [
-        Stage(entry.name, tuple(core.name for core in own), own_items[0])
-        for entry, own, own_items in zip(chain.stages, groups, items, strict=True)
-    ]
     check_top(texts, top, chain.name, joined, flags)
     check_chain_manifest(contents[json], chain, groups, items)
     check_chain_model(unicode_text(c, contents[c]), unicode_text(h, contents[h]), chain, groups, flags)
@@ -368,7 +392,7 @@ def _check_files(
 
 
 def _scope(
-    chain: ChainCertificate, stages: Mapping[str, Judgement], specified: bool, with_files: bool
+    chain: ChainCertificate, stages: Mapping[str, Judgement], loaded: Sequence[str], specified: bool, with_files: bool
 ) -> dict[str, ScopePart]:
     """Return how much of each part is proven: of the stages together, and of the chain."""
     scope: dict[str, ScopePart] = {}
@@ -383,10 +407,9 @@ def _scope(
         kept = ", and the whole keeps to its limits" if "pass band" in folds else ""
         chained["stages"] = ScopePart(State.PROVEN, f"each stage is the one that the words of the chain ask for{kept}")
     if with_files:
-        chained["top"] = ScopePart(
-            State.PROVEN,
-            "it has the cores, wires between their streams, and what joins their flags; manifest and C model follow",
-        )
+        has = "it has the cores, wires between their streams, and what joins their flags; manifest and C model follow"
+        shared = f"{has}; not proven are the registers that the cores of {' and '.join(loaded)} share"
+        chained["top"] = ScopePart(State.PARTIAL, shared) if loaded else ScopePart(State.PROVEN, has)
     return chained | scope
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from sosmith.verify.certificate_file import ItemEntry
 from sosmith.verify.chain.flags import FlagsClaim, check_flags
+from sosmith.verify.chain.shared import check_shared
 from sosmith.verify.chain.turns import TurnsClaim, check_turns
 from sosmith.verify.graph import require
 from sosmith.verify.reader.source import read_source
@@ -29,12 +30,24 @@ class Stage:
     @property
     def placed(self) -> list[str]:
         """Modules of which it has an instance: its cores, and what joins several."""
-        return [*self.cores, *([] if len(self.cores) == 1 else [self.joining])]
+        if len(self.cores) == 1:
+            return [*self.cores]
+        return [*self.cores, self.joining, *([self.registers] if self.loads else [])]
+
+    @property
+    def loads(self) -> bool:
+        """Whether the taps of several cores can be loaded, through registers that they share."""
+        return len(self.cores) > 1 and self.item.reload
 
     @property
     def joining(self) -> str:
         """Module that joins its cores."""
         return f"{self.cores[0].removesuffix('_p0')}_turns"
+
+    @property
+    def registers(self) -> str:
+        """Module of the registers that its cores share."""
+        return f"{self.cores[0].removesuffix('_p0')}_registers"
 
 
 def check_top(texts: Sequence[str], top: str, name: str, stages: Sequence[Stage], flags: FlagsClaim | None) -> None:
@@ -60,7 +73,8 @@ def check_top(texts: Sequence[str], top: str, name: str, stages: Sequence[Stage]
     """
     modules = read_source("\n".join([*texts, top]), name).modules
     module = modules[name]
-    check_ports(module, stages[-1].item.model_copy(update={"taken": stages[0].item.taken, "reload": True}))
+    has = {"taken": stages[0].item.taken, "reload": True, "reload_registers": True}
+    check_ports(module, stages[-1].item.model_copy(update=has))
     require(
         not module.registers and not module.depths and not module.clocked and not module.assigns,
         f"{name} must have instances and wires alone",
@@ -72,7 +86,7 @@ def check_top(texts: Sequence[str], top: str, name: str, stages: Sequence[Stage]
     rest, alone = iter(wires), dict[str, dict[str, str]]()
     for k, stage in enumerate(stages):
         own = [next(rest) for _ in stage.placed]
-        alone |= {stage.name: own[0]} if len(stage.cores) == 1 else {}
+        alone |= {stage.name: own[0]} if len(stage.cores) == 1 else {stage.name: own[-1]} if stage.loads else {}
         nets = _nets_of(stages, k, gated=flags is not None)
         for core, ports in zip(stage.cores, own, strict=False):
             for clock in _CLOCKS:
@@ -81,6 +95,8 @@ def check_top(texts: Sequence[str], top: str, name: str, stages: Sequence[Stage]
             _check_streams(stage.cores[0], own[0], nets)
         else:
             _check_in_turn(stage, own, nets, modules)
+        if stage.loads:
+            check_shared(stage, own, modules)
     _check_registers(module, name, alone)
     if flags is not None:
         for port, net in flags.inputs(f"stage_{stages[0].name}").items():
@@ -119,6 +135,7 @@ def _check_in_turn(
         cores=len(stage.cores),
         results=stage.item.given,
         guarded=stage.item.protect != "none",
+        loads=stage.loads,
     )
     for k, (core, ports) in enumerate(zip(stage.cores, own, strict=False)):
         each = f"stage_{stage.name}_p{k}"
@@ -128,10 +145,10 @@ def _check_in_turn(
     before, behind = (
         {port.removeprefix(prefix): net for port, net in nets.items() if port.startswith(prefix)} for prefix in _STREAMS
     )
-    joined = claim.nets(stage.name, before, behind)
-    require(own[-1].keys() == joined.keys(), f"{claim.name} must have the ports {', '.join(joined)}")
+    joined, ports = claim.nets(stage.name, before, behind), own[len(stage.cores)]
+    require(ports.keys() == joined.keys(), f"{claim.name} must have the ports {', '.join(joined)}")
     for port, net in joined.items():
-        _same(own[-1][port], net, f"{port} of {claim.name}")
+        _same(ports[port], net, f"{port} of {claim.name}")
     check_turns(modules[claim.name], claim)
 
 

@@ -2,6 +2,9 @@
 
 Each core takes every sample once, as it is offered until then and the sample stays until all cores have it. Result k of
 each sample is that of core k: the results of a core come in the order of its samples, and `turn` goes round.
+
+Where taps can be loaded, `between` is low behind a clock at which some of the cores have chosen the bank of the sample
+on offer, and others have not: registers that change the bank only while it is high give all of them the same.
 """
 
 from __future__ import annotations
@@ -18,12 +21,13 @@ _FAULT = 6
 
 @dataclass(frozen=True, kw_only=True)
 class TurnsClaim:
-    """What the module must be made of: its name, how many cores, their results, and whether they have check bits."""
+    """What the module must be made of: its name, how many cores, their results, check bits, and taps to be loaded."""
 
     name: str
     cores: int
     results: StreamEntry
     guarded: bool = False
+    loads: bool = False
 
     @property
     def signals(self) -> dict[str, int]:
@@ -38,7 +42,11 @@ class TurnsClaim:
         for k in range(self.cores):
             nets |= {f"o{k}_tvalid": f"stage_{stage}_p{k}_given", f"o{k}_tready": f"stage_{stage}_p{k}_taken"}
             nets |= {f"i{k}_{signal}": f"stage_{stage}_p{k}_{signal}" for signal in (*self.signals, "tvalid", "tready")}
-        return nets | {f"m_{signal}": behind[signal] for signal in (*self.signals, "tvalid", "tready")}
+        nets |= {f"m_{signal}": behind[signal] for signal in (*self.signals, "tvalid", "tready")}
+        if self.loads:
+            nets |= {f"i{k}_begun": f"stage_{stage}_p{k}_reload_begun" for k in range(self.cores)}
+            nets |= {"between": f"stage_{stage}_between"}
+        return nets
 
 
 def check_turns(module: Module, claim: TurnsClaim) -> None:
@@ -62,6 +70,8 @@ def _text(claim: TurnsClaim) -> str:
         ports += [("input", f"i{k}_tvalid", 1), ("output", f"i{k}_tready", 1)]
     ports += [("output", f"m_{signal}", width) for signal, width in claim.signals.items()]
     ports += [("output", "m_tvalid", 1), ("input", "m_tready", 1)]
+    if claim.loads:
+        ports += [*(("input", f"i{k}_begun", 1) for k in range(count)), ("output", "between", 1)]
     text = [f"module {claim.name}({', '.join(name for _, name, _ in ports)});"]
     for way, name, width in ports:
         text += [f"{way} {_sized(name, width)};", f"wire {_sized(name, width)};"]
@@ -96,6 +106,8 @@ def _text(claim: TurnsClaim) -> str:
     text += [f"always_ff @(posedge aclk) if (reset) turn <= {bits}'h0; else if (moves) turn <= next_turn;"]
     if claim.guarded:
         text += _faults(count)
+    if claim.loads:
+        text += _swaps(count)
     return "\n".join([*text, "endmodule", ""])
 
 
@@ -109,6 +121,19 @@ def _faults(count: int) -> list[str]:
         text += [f"always_ff @(posedge aclk) if (reset) fault{k} <= 1'h0; {loads}"]
         text += [f"wire any{k};", f"assign any{k} = fault{k} | {rest};"]
     return [*text, f"assign m_tuser = own | {{1'h0, any{count - 1}, {_FAULT}'h0}};"]
+
+
+def _swaps(count: int) -> list[str]:
+    """Return what says that all cores have chosen the bank of the sample on offer, or none."""
+    text = []
+    for k in range(count):
+        text += [f"wire chooses{k};", f"assign chooses{k} = i{k}_begun | o{k}_tready;"]
+        text += [f"wire offered{k};", f"assign offered{k} = s_tvalid & chooses{k};"]
+        text += [f"wire chosen{k};", f"assign chosen{k} = given{k} | offered{k};"]
+        for what, sign in (("some", "|"), ("every", "&")):
+            rest = f"{what}{k - 1} {sign} " if k else ""
+            text += [f"wire {what}{k};", f"assign {what}{k} = {rest}chosen{k};"]
+    return [*text, "wire none;", f"assign none = ~some{count - 1};", f"assign between = none | every{count - 1};"]
 
 
 def _sized(name: str, width: int) -> str:

@@ -106,6 +106,9 @@ def _check_core(
     wanted = {"clock": hardware.get("clock", _CLOCK)}
     for keys, words in ((_OF_ALL, hardware), (_OF_ONE, stage)):
         wanted |= {key: words[key] for key in keys if key in words}
+    if stage.get("interpolate", 1) > 1 and wanted.get("reload"):  # the registers are those of all cores of the stage
+        wanted.pop("reload_lock", None)
+        wanted |= {"reload_registers": False, "realization": wanted.get("realization", "fir_direct")}
     _same(f"the hardware of {what}", with_fractions(own.get("hardware", {})), with_fractions(wanted))
     others = [key for key in own if key not in _TABLES]
     require(not others, f"the specification of {what} must be without {', '.join(others)}")

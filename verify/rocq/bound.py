@@ -23,7 +23,7 @@ from sosmith.verify.rocq.start import StartNodes
 _MORE_BITS = (4, 12, 28, 60, 124)
 """Precision beside what the certificate's grid needs, tried in this order."""
 
-_GAIN_BITS = (96, 128, 192)
+GAIN_BITS = (96, 128, 192)
 """Precision of the coefficients for the gain of the exact filter, tried in this order."""
 
 _FINE = 1 << 64
@@ -34,10 +34,21 @@ def why_no_bound(certificate: Certificate) -> str | None:
     """Why the theorem cannot be written for this certificate, whose ranges are proven; None if it can."""
     if not certificate.ideal.sections:
         return "there are no sections"
+    if not certificate.claims.budget.get("output rounding") and not _rounds(certificate):
+        return "its output is not rounded"
     entry = certificate.decimation
     if entry is not None and entry.calibration is not None and entry.calibration.output.zero:
         return "the decimator takes values of which 0 has another code than 0"
     return None
+
+
+def _rounds(certificate: Certificate) -> bool:
+    """Whether the output is rounded, and then perhaps limited."""
+    last = certificate.stages[-1]
+    node = last.nodes[last.outputs[0]]
+    if node.op is Operation.CLAMP:
+        node = last.nodes[node.operands[0]]
+    return node.op is Operation.FLOOR
 
 
 @dataclass(frozen=True)
@@ -267,8 +278,10 @@ Qed.
 
 
 def _results(task: _Task, entry: Entry, kept: DownsamplingEntry) -> str:
-    """Write the theorem on the results of a filter that decimates, which fills its window with its first sample."""
+    """Write the theorem on the results of a filter that decimates, which may fill its window with its first sample."""
     require(task.start is None, "a filter of which every R-th result leaves must start from zero")
+    if not kept.filled:
+        return _kept(task, entry, kept)
     bound, codes = task.certificate.claims.bound, f"(filled {kept.filled} {entry.codes})"
     exactly = _exactly(task).replace("(Z.of_nat n)", f"(Z.of_nat ({kept.factor} * n))")
     difference = _difference(task, codes, f"({kept.filled} + {kept.factor} * n)", exactly)
@@ -282,6 +295,20 @@ Proof.
   destruct (filled_results exact_sections {kept.filled} {entry.exact} y ({kept.factor} * n) eq_refl Y) as [z [Z E]].
   rewrite <- E. exact (error_is_bounded {codes} (filled_within {kept.filled} {entry.ports} x X) z Z _).
 Qed.
+"""
+
+
+def _kept(task: _Task, entry: Entry, kept: DownsamplingEntry) -> str:
+    """Write the same of one that starts from zero."""
+    bound, head = task.certificate.claims.bound, f"forall x, inputs_within {entry.ports} x ->"
+    exactly = _exactly(task).replace("(Z.of_nat n)", f"(Z.of_nat ({kept.factor} * n))")
+    difference = _difference(task, entry.codes, f"({kept.factor} * n)", exactly)
+    return f"""\
+Theorem results_are_bounded : {head}
+  forall y, exact_filter exact_sections (from_zero {entry.exact}) y -> forall n : nat,
+  (Rabs ({difference})
+    <= IZR {number(bound.numerator)} / IZR {bound.denominator})%R.
+Proof. intros x X y Y n. exact (error_is_bounded x X y Y _). Qed.
 """
 
 
@@ -303,7 +330,7 @@ Proof. lra. Qed.
 
 def _peak_gain(certificate: Certificate, claimed: Fraction) -> str:
     sections = sections_of(certificate.ideal.sections)
-    for bits in _GAIN_BITS:
+    for bits in GAIN_BITS:
         whole = 1 << 2 * bits
         made = exact_row(sections, _FINE, whole, bits)
         total = sum(abs(int(value)) for value in made.row.coeffs()) * _FINE + made.rest

@@ -28,6 +28,9 @@ DATA = "Claims"
 _FOLDING = ("Angles", "Waves", "Forms", "Folding")
 """Theories that only claims of a decimator rest on."""
 
+OF_CHAINS = ("Rates", "Chain")
+"""Those that the theorems of a chain rest on, beside those of its stages."""
+
 _LAST = "error_is_bounded"
 """The theorem that all others are for."""
 
@@ -175,7 +178,8 @@ def theorems(certificate: Certificate) -> Theorems:
             claims.append(claim)
     except RejectedError as error:
         ended = str(error)
-    theories = tuple(name for name in THEORIES if certificate.decimation is not None or name not in _FOLDING)
+    beside = OF_CHAINS if certificate.decimation is not None else (*_FOLDING, *OF_CHAINS)
+    theories = tuple(name for name in THEORIES if name not in beside)
     return Theorems(core_definitions(graph), claims, tuple(_unchecked(certificate)), theories, ended)
 
 
@@ -218,17 +222,23 @@ def _unchecked(certificate: Certificate) -> Iterator[str]:
         yield "what folds into the pass band at the decimator"
 
 
-def _texts(made: Theorems, missing: Sequence[str] = ()) -> dict[str, str]:
+def data_text(made: Theorems, missing: Sequence[str] = ()) -> str:
+    """Return the file of a certificate's own theorems."""
     parts = [f"(* {claim.words}. *)\n{claim.text}{mark(claim)}" for claim in made.claims]
     names = [*(claim.name for claim in made.claims), *missing]
-    text = "\n".join([head(made.theories), made.definitions, *parts, ending(names)])
-    return theory_texts(made.theories) | {f"{DATA}.v": text, "Makefile": _makefile(made.theories)}
+    return "\n".join([head(made.theories), made.definitions, *parts, ending(names)])
 
 
-def _makefile(theories: Sequence[str]) -> str:
+def _texts(made: Theorems, missing: Sequence[str] = ()) -> dict[str, str]:
+    data = {f"{DATA}.v": data_text(made, missing)}
+    return theory_texts(made.theories) | data | {"Makefile": makefile((*made.theories, DATA))}
+
+
+def makefile(names: Sequence[str]) -> str:
+    """Return a Makefile that compiles files in this order."""
     return f"""\
 # Checks the claims with Rocq (coqc of version 8.16 or later) and prints the axioms that each rests on.
-FILES = {" ".join(f"{name}.v" for name in (*theories, DATA))}
+FILES = {" ".join(f"{name}.v" for name in names)}
 
 all:
 \tfor file in $(FILES); do coqc -Q . {LIBRARY} $$file || exit 1; done

@@ -38,6 +38,8 @@ THEORIES = (
     "Exact",
     "Bound",
     "Downsampling",
+    "Rates",
+    "Chain",
 )
 """The general theories, in the order in which they are compiled."""
 

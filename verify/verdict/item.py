@@ -134,6 +134,7 @@ def check_stated(certificate: Certificate, item: ItemEntry, tree: Mapping[str, A
         "reload": hardware.get("reload", False),
         "keep": hardware.get("keep", False),
         "reload_lock": hardware.get("reload_lock", False),
+        "reload_registers": hardware.get("reload_registers", True),
         "samples": hardware.get("samples_per_clock", 1),
         "calibrated": () if covered == everything else covered,
         "wear": _wear_codes(table_of(tree, "wear"), certificate.output),
@@ -182,7 +183,10 @@ def wear_limits(table: Mapping[str, Any]) -> list[tuple[Fraction, Fraction]]:
 _COMPARED = {
     "": {"name", "sample_rate", "channels", "input", "output", "calibration", "filter", "wear", "hardware"},
     "calibration": {"coefficients", "data"},
-    "hardware": {"architecture", "keep", "protect", "reload", "reload_lock", "samples_per_clock", "start"},
+    "hardware": {
+        *("architecture", "keep", "protect", "samples_per_clock", "start"),
+        *("reload", "reload_lock", "reload_registers"),
+    },
 }
 """Keys of a specification's tables that are held against something; those of other tables are all compared."""
 
@@ -205,7 +209,8 @@ def whole_core(tree: Mapping[str, Any]) -> str:
 
 def file_names(name: str, item: ItemEntry | None) -> list[str]:
     """Return the names of the files that are written with a certificate, in their order."""
-    registers = ["_registers.h", ".rdl"] if item is not None and item.reload else []
+    there = item is not None and item.reload and item.reload_registers
+    registers = ["_registers.h", ".rdl"] if there else []
     return [f"{name}{end}" for end in (".sv", ".il", ".json", ".c", ".h", *registers)]
 
 
@@ -226,7 +231,8 @@ def check_ports(top: Module, item: ItemEntry) -> None:
         wanted["m_axis_tdest"] = ("output", item.given.dest_width)
     ports = {name: (direction, top.widths[name]) for name, direction in top.ports.items()}
     if item.reload:  # the port that loads constants is not read further
-        ports = {name: port for name, port in ports.items() if not name.startswith("s_axil_")}
+        begins = "s_axil_" if item.reload_registers else "reload_"
+        ports = {name: port for name, port in ports.items() if not name.startswith(begins)}
     for name in sorted({*wanted, *ports}):
         require(name in wanted, f"the port {name} must not be there")
         require(name in ports, f"the port {name} must be there")

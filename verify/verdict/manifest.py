@@ -281,7 +281,8 @@ def _check_reload(manifest: Manifest, certificate: Certificate, item: ItemEntry)
         f"not {_cut(facts)}",
     )
     if facts is not None:
-        _compare("reload.registers", facts["registers"], [f"{certificate.name}_registers.h", f"{certificate.name}.rdl"])
+        files = [f"{certificate.name}_registers.h", f"{certificate.name}.rdl"] if item.reload_registers else []
+        _compare("reload.registers", facts["registers"], files)
         manifest.open += [f"reload.{key}" for key in facts if key != "registers"]
 
 

@@ -68,6 +68,11 @@ def packed(
         raise SpecificationError(
             f"{path}: not yet available: channels must be 1 with filter.decimate in a package, not {channels}"
         )
+    if design.architecture.bank_pins is not None:
+        raise SpecificationError(
+            f"{path}: hardware.reload_registers must be true in a package, not false: the registers of such a core are "
+            "in the package of its chain"
+        )
     facts = package_facts(design, vlnv)
     core = generated(design, progress, facts=facts.core)
     progress("bench")

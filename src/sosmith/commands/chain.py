@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -149,7 +150,15 @@ def run_chain(
 
 
 def prove_chain(
-    read: ChainCertificate, path: Path, *, spec: Path | None, files: Path | None, limit: dict[str, float], as_json: bool
+    read: ChainCertificate,
+    path: Path,
+    *,
+    spec: Path | None,
+    files: Path | None,
+    rocq: bool,
+    export: Path | None,
+    limit: dict[str, float],
+    as_json: bool,
 ) -> bool:
     """Prove the certificate of a chain and show what is proven; return whether all of it is.
 
@@ -161,12 +170,17 @@ def prove_chain(
     with show_progress() as step:
         try:
             proof = read.verify(step, spec=spec, files=files, **limit)
+            written = [] if export is None else read.export_rocq(export)
+            checked = read.check_in_rocq(step, **limit) if rocq else None
         except ShortfallError as error:
             raise ShortfallError(f"{path}: {error}") from None
     if as_json:
-        print_json({"name": read.name, **proof.as_dict()})
+        kernel = {} if checked is None else {"rocq": asdict(checked)}
+        print_json({"name": read.name, **proof.as_dict(), **kernel})
     else:
         from sosmith.commands.tables.certificate import print_chain_proof
+        from sosmith.commands.tables.rocq import print_rocq
 
         print_chain_proof(read.name, proof)
-    return not proof.missing
+        print_rocq(checked, written)
+    return not proof.missing and (checked is None or not checked.unchecked)

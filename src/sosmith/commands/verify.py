@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -101,8 +102,9 @@ def verify(
     if isinstance(read, ChainCertificate):
         stage = certificate.with_name(read.entries.stages[0].certificates[0].name)
         instead = f": give it with the certificate of each stage, such as {stage}"
-        refuse(instead, rebuild=rebuild, core=core, second_reader=second_reader, rocq=rocq, export=export, smt=smt)
-        if not prove_chain(read, certificate, spec=spec, files=files, limit=limit, as_json=as_json) and not partial:
+        refuse(instead, rebuild=rebuild, core=core, second_reader=second_reader, smt=smt)
+        options: dict[str, Any] = {"spec": spec, "files": files, "rocq": rocq, "export": export}
+        if not prove_chain(read, certificate, limit=limit, as_json=as_json, **options) and not partial:
             click.get_current_context().exit(_NOT_ALL)
         return
     with show_progress() as step:

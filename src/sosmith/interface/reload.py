@@ -11,7 +11,7 @@ from sosmith.gen.facts.table import Table, View
 from sosmith.gen.reload.register_writes import reload_json
 from sosmith.gen.reload.reload import Swap, check_swap, own_set, set_for
 from sosmith.interface.specification import Specification
-from sosmith.model.errors import falling_short
+from sosmith.model.errors import SpecificationError, falling_short
 
 if TYPE_CHECKING:
     from sosmith.interface.certificate import Progress
@@ -47,6 +47,11 @@ class Reload(View):
     ) -> Reload:
         """Prove a set; parameters and errors are those of `Design.reload`."""
         progress("set", 0, 0)
+        if core.architecture.bank_pins is not None:
+            raise SpecificationError(
+                f"{core.spec.path}: hardware.reload_registers must be true for a core to be loaded by itself, not "
+                "false: its registers belong to the chain that it is a part of"
+            )
         with falling_short(wanted.checked.path):
             new = set_for(core, wanted.checked)
         with falling_short((core.spec if active is None else active.checked).path):

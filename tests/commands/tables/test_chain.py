@@ -120,10 +120,10 @@ def test_other_commands_say_that_they_take_no_chain(sosmith: Command) -> None:
 def test_a_stage_alone_goes_where_a_chain_does_not(sosmith: Command) -> None:
     Path("rx.toml").write_text(CHAIN, encoding="utf-8")
     sosmith("generate", "rx.toml", "-o", "rx")
-    refused = sosmith("verify", "rx/rx.certificate.json", "--rocq")
+    refused = sosmith("verify", "rx/rx.certificate.json", "--rebuild")
     assert refused.status == 2
     assert refused.messages[-1] == (
-        "sosmith: error: --rocq must be left out with a chain of stages, as it is for a single core only: give it with "
-        "the certificate of each stage, such as rx/rx_slow.certificate.json"
+        "sosmith: error: --rebuild must be left out with a chain of stages, as it is for a single core only: give it "
+        "with the certificate of each stage, such as rx/rx_slow.certificate.json"
     )
     assert sosmith("verify", "rx/rx_slow.certificate.json", "--spec", "rx/rx_slow.toml").status == 0

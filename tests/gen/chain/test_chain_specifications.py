@@ -89,10 +89,9 @@ REFUSED: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
         stage(0, decimate=None, interpolate=3),
         "stage[0].interpolate must be a power of two for a CIC filter, whose weights are then exact, not 3",
     ),
-    "interpolate and reload": (
-        stage(0, decimate=None, interpolate=2, reload=True),
-        "not yet available: stage[0].reload must be false in a stage that interpolates, which has a core for each "
-        "result of a sample, not true",
+    "registers of the chain": (
+        lambda tree: tree.setdefault("hardware", {}).update(reload=True, reload_registers=False),
+        "hardware.reload_registers must be left out with [[stage]], as every stage has its own, not false",
     ),
     "unknown key": (
         stage(3, order=2),

@@ -1,4 +1,4 @@
-"""The key hardware.reload_lock: only for what can be loaded, and in all that says what the core is."""
+"""The keys hardware.reload_lock and reload_registers: only for what can be loaded, and in all that says what it is."""
 
 import pytest
 from tests.verify.parallel.cores import specified
@@ -6,6 +6,8 @@ from tests.verify.small_specifications import PLAIN
 
 from sosmith.gen.core import design_core
 from sosmith.gen.output.generate import generated
+from sosmith.gen.output.identity import core_item
+from sosmith.gen.output.packages.package import packed
 from sosmith.model.errors import SpecificationError
 from sosmith.verify.certificate_file import Certificate
 
@@ -29,3 +31,32 @@ def test_hardware_registers_and_certificate_have_it() -> None:
     assert "PLAIN_STATUS_LOCKED" not in plain["plain_registers.h"]
     of = [Certificate.model_validate_json(one["plain.certificate.json"]) for one in (plain, locked)]
     assert [c.about is not None and c.about.item is not None and c.about.item.reload_lock for c in of] == [False, True]
+
+
+@pytest.mark.parametrize(
+    ("lines", "beside"),
+    [
+        ('hardware.architecture = "folded"\n', r"hardware\.reload = false"),
+        (KEYS + "hardware.reload_lock = true\n", r"hardware\.reload_lock = true"),
+    ],
+)
+def test_pins_in_place_of_registers_have_something_to_load(lines: str, beside: str) -> None:
+    with pytest.raises(SpecificationError, match=rf"hardware\.reload_registers must be true with {beside}, not false$"):
+        specified(PLAIN + lines + "hardware.reload_registers = false\n")
+
+
+def test_a_core_with_pins_says_so_and_is_for_a_chain_alone() -> None:
+    core = design_core(specified(PLAIN + KEYS + "hardware.reload_registers = false\n"))
+    files = generated(core)
+    assert [name for name in files if "registers" in name or name.endswith(".rdl")] == []
+    assert "reload_begun" in files["plain.sv"]
+    assert "s_axil" not in files["plain.sv"]
+    about = Certificate.model_validate_json(files["plain.certificate.json"]).about
+    assert about is not None
+    assert about.item is not None
+    assert not about.item.reload_registers
+    for attempt in (packed, core_item):
+        with pytest.raises(
+            SpecificationError, match=r"hardware\.reload_registers must be true (in a package|on a board)"
+        ):
+            attempt(core)  # type: ignore[operator]

@@ -65,6 +65,7 @@ def cases() -> list[dict[str, Any]]:
                 "rates": (),
                 "copies_per_result": 1,
                 "tdata_bits": 64,
+                "zeros": [],
                 "tuser_bits": 64,
             },
         }

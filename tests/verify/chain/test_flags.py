@@ -12,7 +12,7 @@ from tests.gen.chain.chains import GUARDED
 from tests.verify.chain.sealing import CERTIFICATE, proven, replace_sealed, sealed_again
 
 import sosmith
-from sosmith.gen.chain.flags import FlagsUnit
+from sosmith.gen.chain.joints.flags import FlagsUnit
 from sosmith.gen.chain.rates import Pattern
 from sosmith.model.errors import ShortfallError
 from sosmith.verify.chain.flags import FlagsClaim, Timing, check_flags

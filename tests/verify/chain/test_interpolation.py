@@ -187,3 +187,39 @@ def test_check_bits_of_all_cores_are_proven(tmp_path: Path) -> None:
     sealed_again(tmp_path)
     with pytest.raises(ShortfallError, match=r"^the cores of stage fill must have the same protect$"):
         proven(tmp_path, spec=False)
+
+
+@pytest.mark.slow
+def test_registers_that_cores_share_are_joined_to_them(tmp_path: Path) -> None:
+    """What the registers do is not proven, and `verify` says so; each wire to them is."""
+    tree = TREE | {"stage": [UP["stage"][0] | {"reload": True}]}
+    chain = sosmith.design_chain(tree)
+    chain.generate(tmp_path)
+    (tmp_path / "rx.toml").write_text(chain.specification.toml(), encoding="utf-8")
+    scope = proven(tmp_path).scope
+    assert all(scope[name].state.value == "proven" for name in ("chain", "stages", "arithmetic", "c_model"))
+    assert scope["top"].why.endswith("; not proven are the registers that the cores of fill share")
+    path = tmp_path / "rx.sv"
+    text = path.read_text(encoding="utf-8")
+    for old, new, sentence in (
+        (
+            ".reload_bank(stage_fill_reload_bank)",
+            ".reload_bank(stage_fill_p0_reload_begun)",
+            "the pins of rx_fill_p0 at",
+        ),
+        (".reload_write(stage_fill_p1_", ".reload_write(stage_fill_p0_", "the pins of rx_fill_p1 at which constants"),
+        (".i_between(stage_fill_between)", ".i_between(aresetn)", "the ports of rx_fill_registers must be at "),
+        (".i1_free(stage_fill_p1_", ".i1_free(stage_fill_p0_", "the ports of rx_fill_registers must be at "),
+        (".i1_begun(stage_fill_p1_", ".i1_begun(stage_fill_p0_", "i1_begun of rx_fill_turns must be the net "),
+        ("assign between = none | every1;", "assign between = none | every0;", "rx_fill_turns must assign "),
+        (".s_axil_awaddr(s_axil_fill_awaddr)", ".s_axil_awaddr(s_axil_fill_araddr)", "the registers' net s_axil_"),
+    ):
+        replace_sealed(path, old, new)
+        with pytest.raises(ShortfallError, match=f"^{sentence}"):
+            proven(tmp_path, spec=False)
+        path.write_text(text, encoding="utf-8")
+    sealed_again(tmp_path, lambda tree: tree["files"].pop())
+    with pytest.raises(
+        ShortfallError, match=r"^the files of the chain must be .*, rx_fill_registers\.h, rx_fill\.rdl, not "
+    ):
+        proven(tmp_path, spec=False)

@@ -7,8 +7,8 @@ from fractions import Fraction
 
 import pytest
 
+from sosmith.gen.chain.joints.turns import TurnsUnit
 from sosmith.gen.chain.rates import Pattern, Rate, pattern_of, results_of, samples_of
-from sosmith.gen.chain.turns import TurnsUnit
 from sosmith.gen.output.core_facts import StreamFacts
 from sosmith.hdl.plan.streams import fields
 from sosmith.model.errors import ShortfallError
@@ -23,11 +23,12 @@ _TOKEN = re.compile(r"\d+'h[0-9a-f]+|\b\d+\b|[-+&|~?:]|==|\b[a-z_]\w*\b")
 _OTHER = {"-": "+", "+": "-", "&": "|", "|": "&", "==": "!=", "~": "!"}
 
 
-def pair(phases: int, dest: int, *, guarded: bool = False) -> tuple[str, TurnsClaim]:
+def pair(phases: int, dest: int, *, guarded: bool = False, loads: bool = False) -> tuple[str, TurnsClaim]:
     stream = StreamFacts(fields=fields((PORT,)), dest_width=dest, flags={"fault": 6})
-    unit = TurnsUnit(name="rx_fill_turns", phases=phases, results=stream, guarded=guarded)
+    unit = TurnsUnit(name="rx_fill_turns", phases=phases, results=stream, guarded=guarded, loads=loads)
     entry = StreamEntry.model_construct(width=stream.width, dest_width=dest, user_width=stream.user_width)
-    return unit.text(), TurnsClaim(name="rx_fill_turns", cores=phases, results=entry, guarded=guarded)
+    claim = TurnsClaim(name="rx_fill_turns", cores=phases, results=entry, guarded=guarded, loads=loads)
+    return unit.text(), claim
 
 
 def check(text: str, claim: TurnsClaim) -> None:
@@ -37,8 +38,9 @@ def check(text: str, claim: TurnsClaim) -> None:
 @pytest.mark.parametrize("dest", [0, 8])
 @pytest.mark.parametrize("phases", [2, 3, 4, 7])
 @pytest.mark.parametrize("guarded", [False, True])
-def test_each_variant_is_accepted(phases: int, dest: int, guarded: bool) -> None:
-    check(*pair(phases, dest, guarded=guarded))
+@pytest.mark.parametrize("loads", [False, True])
+def test_each_variant_is_accepted(phases: int, dest: int, guarded: bool, loads: bool) -> None:
+    check(*pair(phases, dest, guarded=guarded, loads=loads))
 
 
 def test_another_number_of_cores_is_refused() -> None:
@@ -58,9 +60,25 @@ def test_a_fault_that_is_one_of_a_core_alone_is_refused() -> None:
             check(given, wanted)
 
 
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("none | every2", "1'h1"),
+        ("chosen1 = given1 | offered1", "chosen1 = given1"),
+        ("i2_begun | o2_tready", "o2_tready"),
+        ("every1 & chosen2", "chosen2"),
+    ],
+)
+def test_a_bank_that_may_change_within_a_sample_is_refused(old: str, new: str) -> None:
+    text, claim = pair(3, 0, loads=True)
+    assert old in text
+    with pytest.raises(ShortfallError, match=r"^rx_fill_turns must assign "):
+        check(text.replace(old, new), claim)
+
+
 @pytest.mark.slow
 def test_no_token_may_be_another_one() -> None:
-    text, claim = pair(3, 8, guarded=True)
+    text, claim = pair(3, 8, guarded=True, loads=True)
     refused = 0
     for match in _TOKEN.finditer(text, text.index("wire reset;")):
         other = _OTHER.get(match[0], "moves" if match[0] != "moves" else "later")

@@ -15,10 +15,13 @@ from sosmith.interface.certificate import Certificate, Part, Progress
 from sosmith.interface.quantity import Quantity
 from sosmith.model.errors import SpecificationError
 from sosmith.model.foreign_files import MAX_JSON, read_bytes
+from sosmith.model.text_files import write_files
 from sosmith.verify.certificate_file import entries_text
 from sosmith.verify.chain.chain_file import ChainCertificate as Entries
 from sosmith.verify.chain.chain_file import is_chain_certificate, read_chain
-from sosmith.verify.chain.check import judge_chain
+from sosmith.verify.chain.check import judge_chain, read_cores
+from sosmith.verify.rocq.chain import chain_texts, check_chain_in_rocq
+from sosmith.verify.rocq.check import RocqVerdict
 from sosmith.verify.verdict.limits import SECONDS
 
 
@@ -166,6 +169,51 @@ class ChainCertificate:
             files=judged.files,
             scope=judged.scope,
         )
+
+    def check_in_rocq(
+        self, progress: Progress = lambda step, done, total: None, *, seconds: float = 600.0
+    ) -> RocqVerdict:
+        """Have the kernel of the proof assistant Rocq check the claims of a chain of filters at one rate.
+
+        Those are what it checks of each stage by itself, and that their errors add up to the bound of the chain.
+
+        Parameters
+        ----------
+        progress : callable
+        seconds : float
+            Time that this may take, in s; 0 for any.
+
+        Raises
+        ------
+        ShortfallError
+            If a claim is not accepted, or not within the time.
+        SpecificationError
+            If it is a chain of another kind, or the certificate was not read from a file.
+        ToolError
+            If `coqc` is missing or fails.
+        """
+        return check_chain_in_rocq(self.entries, read_cores(self.entries, self._folder), progress, seconds=seconds)
+
+    def export_rocq(self, folder: str | PathLike[str]) -> list[Path]:
+        """Write what Rocq checks into a folder, with a Makefile for a machine that has Rocq alone; return the paths.
+
+        Raises
+        ------
+        ShortfallError
+            If a claim of a stage is so wrong that no theorem can be written of it.
+        SpecificationError
+            As for `check_in_rocq`, or if a file cannot be written.
+        ToolError
+            If the disk is full.
+        """
+        texts = chain_texts(self.entries, read_cores(self.entries, self._folder))
+        return list(write_files(Path(fspath(folder)), texts))
+
+    @property
+    def _folder(self) -> Path:
+        if self.path is None:
+            raise SpecificationError("the certificate of a chain must be read from a file, beside those of its stages")
+        return self.path.parent
 
     def __repr__(self) -> str:
         return f"<sosmith.ChainCertificate {self.name}: error at most {self.bound}>"

@@ -6,10 +6,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from sosmith.gen.chain.design import ChainDesign
-from sosmith.gen.chain.reload import ChainSwap, reload_chain
+from sosmith.gen.chain.reload import ChainSwap, reload_chain, writes_json
 from sosmith.gen.chain.specification import ChainSpec
 from sosmith.gen.facts.table import Table, View
-from sosmith.gen.reload.register_writes import reload_json
 from sosmith.interface.quantity import Quantity
 from sosmith.model.errors import falling_short
 
@@ -53,14 +52,13 @@ class ChainReload(View):
             stage,
             Quantity(float(swap.bound), unit),
             Quantity(float(wanted.base.max_error), unit),
-            reload_json(swap.stage.design, swap.swap, version) | {"chain": chain},
+            writes_json(design, swap, version) | {"chain": chain},
             swap,
         )
 
     def tables(self) -> list[Table]:
         """Return the bound of the chain with the set, and what the swap takes."""
-        stage, swap = self._swap.stage, self._swap.swap
-        samples = swap.samples * swap.new_set.quantized.samples_of_input
+        stage, samples = self._swap.stage, self.writes["transient_samples"]
         seconds = samples / float(stage.spec.rate)
         fades = f"{samples:,} samples of the stage, {seconds:.3g} s; what it has put into later stages fades there"
         rows = [
@@ -70,4 +68,4 @@ class ChainReload(View):
             ("load", f"version {self.writes['version']}, {self.writes['words']:,} words"),
             ("for the design", f"0x{self.writes['design']:08X}"),
         ]
-        return [Table(f"{stage.design.spec.name}: the set may be loaded", rows)]
+        return [Table(f"{self.writes['name']}: the set may be loaded", rows)]

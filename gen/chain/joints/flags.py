@@ -27,8 +27,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from sosmith.gen.chain.design import ChainDesign
+from sosmith.gen.chain.joints.verilog_text import emptied, net, part_of, range_of, register
 from sosmith.gen.chain.rates import Pattern
-from sosmith.gen.chain.verilog_text import emptied, net, part_of, range_of, register
 from sosmith.gen.output.core_facts import interface_facts
 from sosmith.hdl.plan.streams import dest_width
 from sosmith.model.dataflow.status import STATUS_BITS, Flag

@@ -9,6 +9,10 @@
 A sample is offered to each core until that has taken it, and is taken itself once all of them have. So the cores may
 work at different paces. Result k of a sample is that of core k: `turn` counts them. The data of a sample goes to all
 cores past this module. Where cores have check bits, a fault of one is a fault of all results from then on.
+
+Where their taps can be loaded, `between` is high at a clock behind which either all cores have chosen the bank for
+their sample, or none: the bank may change then, and all results of a sample have taps of one set. A core has chosen
+while `i0_begun` is high, or at the latest as it takes the sample.
 """
 
 from __future__ import annotations
@@ -17,7 +21,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from sosmith.gen.chain.design import ChainDesign, StageDesign
-from sosmith.gen.chain.verilog_text import net, range_of, register
+from sosmith.gen.chain.joints.verilog_text import net, range_of, register
 from sosmith.gen.output.core_facts import StreamFacts, interface_facts
 from sosmith.model.dataflow.status import Flag
 
@@ -36,12 +40,15 @@ class TurnsUnit:
         Stream of the results of each.
     guarded : bool
         Whether they have check bits: a fault of one is then one of all.
+    loads : bool
+        Whether their taps can be loaded.
     """
 
     name: str
     phases: int
     results: StreamFacts
     guarded: bool = False
+    loads: bool = False
 
     @property
     def payload(self) -> list[tuple[str, int]]:
@@ -76,6 +83,8 @@ class TurnsUnit:
             *(("output", f"m_{signal}", width) for signal, width in self.payload),
             ("output", "m_tvalid", 1),
             ("input", "m_tready", 1),
+            *(("input", f"i{k}_begun", 1) for k in range(self.phases if self.loads else 0)),
+            *([("output", "between", 1)] if self.loads else []),
         ]
 
     def text(self) -> str:
@@ -83,7 +92,7 @@ class TurnsUnit:
         lines = [f"module {self.name}({', '.join(name for _, name, _ in self.ports)});"]
         for way, name, width in self.ports:
             lines += [f"{way} {range_of(width)}{name};", f"wire {range_of(width)}{name};"]
-        body = [*self._offer(), *self._turn()]
+        body = [*self._offer(), *self._turn(), *(self._swap() if self.loads else [])]
         return "\n".join([lines[0], *(f"  {line}" for line in [*lines[1:], *body]), "endmodule", ""])
 
     def _offer(self) -> Iterator[str]:
@@ -124,6 +133,18 @@ class TurnsUnit:
         if self.guarded:
             yield from self._faults()
 
+    def _swap(self) -> Iterator[str]:
+        """Say whether the bank may change: all cores have chosen that of the sample on offer, or none."""
+        for k in range(self.phases):
+            yield from net(f"chooses{k}", 1, f"i{k}_begun | o{k}_tready")
+            yield from net(f"offered{k}", 1, f"s_tvalid & chooses{k}")
+            yield from net(f"chosen{k}", 1, f"given{k} | offered{k}")
+            before = (f"some{k - 1} | ", f"every{k - 1} & ") if k else ("", "")
+            yield from net(f"some{k}", 1, f"{before[0]}chosen{k}")
+            yield from net(f"every{k}", 1, f"{before[1]}chosen{k}")
+        yield from net("none", 1, f"~some{self.phases - 1}")
+        yield f"assign between = none | every{self.phases - 1};"
+
     def _faults(self) -> Iterator[str]:
         """Say whether the last result of any core had a fault: so has each result then, in all turns."""
         any_of = f"own[{Flag.FAULT.value}]"
@@ -145,6 +166,7 @@ def turns_unit(design: ChainDesign, stage: StageDesign) -> TurnsUnit | None:
         phases=len(stage.cores),
         results=interface_facts(stage.design).outputs,
         guarded=stage.design.spec.hardware.protect != "none",
+        loads=stage.design.spec.hardware.reload,
     )
 
 
