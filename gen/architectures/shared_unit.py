@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar
 
 from sosmith.gen.architectures.architecture import Architecture
@@ -35,9 +35,8 @@ _TRIALS = 100
 """Orders of sums that are tried for a program with two products a clock, where words have to be waited for."""
 
 
-@lru_cache(maxsize=32)
 def _shortest(datapath: Datapath, digit_bits: int) -> Program:
-    """Return the shortest program with two products a clock; the same datapath is asked for again and again.
+    """Return the shortest program with two products a clock.
 
     Its constants are fixed: `hardware.reload` leaves `hardware.multipliers` to the hardware.
     """

@@ -45,6 +45,9 @@ _WORDS, _ACCUMULATOR_BITS = Fraction(1, 1 << 16), Fraction(1, 1 << 24)
 class Objective(Protocol):
     """The size that a design should have as little of."""
 
+    def __hash__(self) -> int:
+        """Return the same for the same kind of size."""
+
     @property
     def best(self) -> str:
         """What the smallest design has, for a sentence."""

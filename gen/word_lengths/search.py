@@ -20,6 +20,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import cached_property, lru_cache
 from itertools import combinations, pairwise
 from typing import NamedTuple
 
@@ -31,10 +32,11 @@ from sosmith.gen.realizations.registry import realization_of
 from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
 from sosmith.gen.word_lengths.bit_limits import MIN_BITS
 from sosmith.gen.word_lengths.cost import MULTIPLIER_BITS
-from sosmith.gen.word_lengths.estimates import Array, estimates_of, largest_magnitude
+from sosmith.gen.word_lengths.estimates import Array, Estimate, estimates_of, largest_magnitude
 from sosmith.gen.word_lengths.input_stage import InputStage
 from sosmith.gen.word_lengths.objective import SMALL_AREA, Objective
 from sosmith.model.dataflow.graph import Op, Range
+from sosmith.model.dataflow.structure import Stage
 from sosmith.model.errors import ShortfallError
 
 _FEW = 16
@@ -94,10 +96,7 @@ class Search:
     steady : bool
         Whether the filter starts from its first sample, and not from zero.
 
-    Raises
-    ------
-    ShortfallError
-        If a section cannot be built, or its response does not decay in time.
+    Whatever looks at the sections raises ShortfallError if one cannot be built, or its response does not decay in time.
     """
 
     def __init__(
@@ -119,12 +118,16 @@ class Search:
         x = self._inputs[0].x
         low, high = x.low * 2.0**-x.frac, x.high * 2.0**-x.frac
         self._windows = [(0.0, high), (low, 0.0)] if steady else [(low, high)]
-        self._estimates = estimates_of(rows, realization, self._windows)
+        self._realization = realization
         self._base: _Base | None = None
         self._ranges: dict[tuple[object, ...], dict[str, tuple[int, int]]] = {}
         self._known: dict[tuple[object, ...], tuple[float, Range, dict[str, int]]] = {}
         self._saved: dict[tuple[object, ...], list[float]] = {}
         self._merely: tuple[Choice, float, Choice] | None = None
+
+    @cached_property
+    def _estimates(self) -> list[Estimate]:
+        return estimates_of(self._rows, self._realization, self._windows)
 
     @property
     def work(self) -> int:
@@ -133,10 +136,10 @@ class Search:
 
     @property
     def key(self) -> tuple[object, ...]:
-        """All that `trimmed` depends on besides the realization, with equal representations where it is equal."""
+        """All that its results depend on besides what they are asked with, with equal representations if equal."""
         rows = [[float(value) for value in row] for row in self._rows]
         inputs = [(*each.x, float(each.error), float(each.size)) for each in self._inputs]
-        return rows, inputs, self._windows, self._objective
+        return self._realization, rows, inputs, self._windows, self._objective
 
     def under(self, objective: Objective) -> Search:
         """Return the same search for another objective."""
@@ -151,10 +154,7 @@ class Search:
 
     def _sized_inputs(self) -> list[_Input]:
         return [
-            _Input(
-                s.output, float(s.error * self._gain), sum(self._objective.of_graph(part.graph) for part in s.stages)
-            )
-            for s in self._input_stages
+            _Input(s.output, float(s.error * self._gain), _size(s.stages, self._objective)) for s in self._input_stages
         ]
 
     def start(self, share: float, most: int) -> Choice | None:
@@ -517,6 +517,11 @@ class Search:
                 ranges[node] = math.floor(low * 2.0**bits), math.ceil(high * 2.0**bits)
             self._ranges[key] = ranges
         return self._ranges[key]
+
+
+@lru_cache(maxsize=64)  # an input stage is the same for every realization
+def _size(stages: tuple[Stage, ...], objective: Objective) -> float:
+    return sum(objective.of_graph(stage.graph) for stage in stages)
 
 
 def _kind(integer: int) -> int | None:
