@@ -11,11 +11,15 @@ from pathlib import Path
 
 import pytest
 from hypothesis import settings
+from hypothesis.internal.conjecture import providers
 
 from tests.suite.sweeps import covering
 
 settings.register_profile("sosmith", derandomize=True, deadline=None)  # the same cases every time, however slow
 settings.load_profile("sosmith")
+# Hypothesis also draws numbers that stand in our modules: reading all of them takes longer than most folders of tests,
+# and which they are depends on what was imported before.
+vars(providers)["_get_local_constants"] = lambda: providers._local_constants
 
 pytest_plugins = ["pytester", "tests.suite.kept_designs"]
 

@@ -734,7 +734,6 @@ class Design:
         """
         # The simulation modules are slow to import; a design that only computes does not need them.
         from sosmith.gen.output.vectors import check_format, result_rate
-        from sosmith.instrument.calibration.store.measurement_files import parse_date
         from sosmith.interface.report import Report
         from sosmith.sim.simulation import simulate
         from sosmith.sim.simulators import check_name
@@ -746,6 +745,8 @@ class Design:
         if vectors is not None:
             check_format(Path(fspath(vectors)), result_rate(self.facts.interface, self.core.spec.sample_rate))
         if date is not None:
+            from sosmith.instrument.calibration.store.measurement_files import parse_date  # and what reads workbooks
+
             parse_date(date)
         board = None if gates is None else find_board(gates, MODELLED)
         place = Path("build") / self.core.spec.name if folder is None else Path(fspath(folder))
