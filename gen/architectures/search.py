@@ -175,9 +175,10 @@ class Search:
             raise ShortfallError(f"{error}{self._other_that_does(selection)}") from None
 
     def _key_of(self, kind: type[Architecture]) -> tuple[object, ...]:
-        """Return all that it depends on whether an architecture takes a datapath, but for the datapath."""
-        spec = replace(self.spec, path=Path())
-        return kind.terms.name, self.budget, self.board, spec, self.response.polynomial, self.response.codes
+        """Return all that it depends on whether an architecture takes a datapath, but for the datapath's formats."""
+        response, spec = self.response, replace(self.spec, path=Path())
+        rows = None if response.ideal is None else response.ideal.rows
+        return kind.terms.name, self.budget, self.board, spec, response.polynomial, response.codes, rows
 
     def _other_that_does(self, selection: Selection) -> str:
         """Say which realization meets the specification as it is, if one does."""

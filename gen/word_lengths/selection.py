@@ -37,7 +37,7 @@ class Selection:
     accept : callable
         Raises ShortfallError, with the reason, if a datapath does not suit the hardware.
     key : tuple
-        All that `accept` depends on, with equal representations if equal.
+        All that `floor_of` and `accept` depend on besides, with equal representations if equal.
     fir : bool
         Whether the filter is an FIR filter, which has other realizations than second-order sections.
     """
@@ -118,13 +118,25 @@ class Selection:
 
     def _floors(self, failures: dict[str, str]) -> dict[str, float]:
         """Least sizes of all realizations, in the order of planning."""
-        floors = {}
+        floors: dict[str, float] = {}
+        key = "least", self._objective, self._key
+        bounds: dict[str, tuple[float, str | None]] = kept_or_made(key, self._bounds, dict, dict)
+        for name, (floor, reason) in bounds.items():
+            if reason is None:
+                floors[name] = floor
+            else:
+                failures[name] = reason
+        return dict(sorted(floors.items(), key=lambda item: (not REALIZATIONS[item[0]].cascade, item[1])))
+
+    def _bounds(self) -> dict[str, tuple[float, str | None]]:
+        """Least sizes of all realizations; for those that do not suit, the reason."""
+        bounds: dict[str, tuple[float, str | None]] = {}
         for name in self._realizations:
             try:
-                floors[name] = self._floor_of(name)
+                bounds[name] = self._floor_of(name), None
             except ShortfallError as error:
-                failures[name] = str(error)
-        return dict(sorted(floors.items(), key=lambda item: (not REALIZATIONS[item[0]].cascade, item[1])))
+                bounds[name] = 0.0, str(error)
+        return bounds
 
     def _promising(self, floors: dict[str, float], least: float, failures: dict[str, str]) -> list[str]:
         """Plan and trim those that may be smaller than `least`, and take them from `floors`."""
