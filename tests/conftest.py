@@ -51,6 +51,7 @@ def pytest_collection() -> None:
 def pytest_collection_finish() -> None:
     """Keep the collector of garbage from looking at all tests again and again: they are not let go before the end."""
     gc.freeze()
+    gc.set_threshold(20_000)
     gc.enable()
 
 
