@@ -71,7 +71,7 @@ import random
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import nullcontext, suppress
 from dataclasses import replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.folding.columns import columns_of_sum
@@ -127,13 +127,6 @@ def program(
     FoldingError
         If the datapath has an operation that cannot be folded, or the new program cannot take over from `like`.
     """
-    return _program(datapath, digit_bits, spare_words, like, products, trials)
-
-
-@lru_cache(maxsize=16)  # the size of a design, its clocks and its hardware ask for the same one
-def _program(
-    datapath: Datapath, digit_bits: int, spare_words: int, like: Program | None, products: int, trials: int
-) -> Program:
     kept = {} if like is None else {location.name: location.digits for location in like.locations}
     least = 0 if like is None else like.words
     flat = flattened(datapath)
