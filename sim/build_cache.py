@@ -71,6 +71,10 @@ class BuildCache:
         """Whether there is an undamaged entry."""
         return _is_whole(self._place(kind, key), self._key())
 
+    def has_any(self, kind: str) -> bool:
+        """Whether there is an entry of a kind, damaged or not."""
+        return any(place.suffix != _NEW for place in self._folder.glob(f"{kind}-*"))
+
     @contextlib.contextmanager
     def entry(self, kind: str, key: str, make: Callable[[Path], None]) -> Iterator[Path]:
         """Lock an entry, made if it is missing or damaged, and yield its folder; what is needed later is to be copied.

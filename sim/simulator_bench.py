@@ -22,6 +22,7 @@ from sosmith.gen.output.core_facts import InterfaceFacts, StreamFacts
 from sosmith.model.errors import ShortfallError, ToolError
 from sosmith.sim.beats import Beats
 from sosmith.sim.bench import BenchRun, Progress
+from sosmith.sim.build_cache import BuildCache, cache_folder
 from sosmith.sim.simulators import Simulator, find_simulator
 from sosmith.sim.verilated_model import LIBRARY_SECONDS, Builder
 
@@ -156,11 +157,16 @@ class SimulatorBench:
 def has_library() -> bool:
     """Whether Verilator's library has been compiled for earlier simulations, and need not be for the next one.
 
+    Where there is one already, it is not asked whether it is that of the present Verilator and compiler.
+
     Raises
     ------
     ToolError
         If Verilator or the compiler is missing.
     """
+    cache = cache_folder()
+    if cache is not None and BuildCache(cache).has_any("library"):
+        return True
     with tempfile.TemporaryDirectory(prefix="sosmith-") as folder:
         tool = find_simulator("verilator", Path(folder) / "bin")
         return _builder(tool, Path(folder)).has_library()

@@ -11,11 +11,15 @@ from pathlib import Path
 
 import pytest
 from hypothesis import settings
+from hypothesis.internal.conjecture import providers
 
 from tests.suite.sweeps import covering
 
 settings.register_profile("sosmith", derandomize=True, deadline=None)  # the same cases every time, however slow
 settings.load_profile("sosmith")
+# Hypothesis also draws numbers that stand in our modules: reading all of them takes longer than most folders of tests,
+# and which they are depends on what was imported before.
+vars(providers)["_get_local_constants"] = lambda: providers._local_constants
 
 pytest_plugins = ["pytester", "tests.suite.kept_designs"]
 
@@ -47,6 +51,7 @@ def pytest_collection() -> None:
 def pytest_collection_finish() -> None:
     """Keep the collector of garbage from looking at all tests again and again: they are not let go before the end."""
     gc.freeze()
+    gc.set_threshold(20_000)
     gc.enable()
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from pathlib import Path
 from typing import NamedTuple
 
 from sosmith.gen.architectures.architecture import Architecture
@@ -159,22 +160,30 @@ class Search:
             lambda name: least_size(ideal, name, objective),
             objective,
             self.progress,
+            accept=partial(self._in_hardware, kind, look_ahead=self._looks_ahead),
+            key=self._key_of(kind),
             fir=ideal.is_fir,
         )
         if asked.widths_of is not None:
             quantized = with_realization(selection.proven(asked.widths_of), asked.name)
             return quantized, f"{asked.name} at the word lengths chosen for {asked.widths_of}, as asked"
         if asked.name == AUTO:
-            return selection.cheapest(partial(self._in_hardware, kind, look_ahead=self._looks_ahead))
+            return selection.cheapest()
         try:
             return selection.proven(asked.name), f"{asked.name}: asked for {asked.source}"
         except ShortfallError as error:
-            raise ShortfallError(f"{error}{self._other_that_does(kind, selection)}") from None
+            raise ShortfallError(f"{error}{self._other_that_does(selection)}") from None
 
-    def _other_that_does(self, kind: type[Architecture], selection: Selection) -> str:
+    def _key_of(self, kind: type[Architecture]) -> tuple[object, ...]:
+        """Return all that it depends on whether an architecture takes a datapath, but for the datapath's formats."""
+        response, spec = self.response, replace(self.spec, path=Path())
+        rows = None if response.ideal is None else response.ideal.rows
+        return kind.terms.name, self.budget, self.board, spec, response.polynomial, response.codes, rows
+
+    def _other_that_does(self, selection: Selection) -> str:
         """Say which realization meets the specification as it is, if one does."""
         try:
-            other, _ = selection.cheapest(partial(self._in_hardware, kind, look_ahead=self._looks_ahead))
+            other, _ = selection.cheapest()
         except ShortfallError:
             return ""
         return f'; hardware.realization = "{other.realization}" meets the specification as it is'

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar
 
 from sosmith.gen.architectures.architecture import Architecture
 from sosmith.gen.architectures.blocks import NO_LIMIT, Blocks
 from sosmith.gen.fpga.boards import Board
-from sosmith.gen.word_lengths.objective import Objective, ShortProgram, unsuitable
+from sosmith.gen.word_lengths.objective import Objective, ShortProgram, folded, unsuitable
 from sosmith.hdl.plan import folded_clocks
 from sosmith.hdl.plan.instructions import encoded, instruction_bits
 from sosmith.model.dataflow.datapath import Datapath
-from sosmith.model.dataflow.folding.fold import program
 from sosmith.model.dataflow.folding.values import FoldingError
 from sosmith.model.dataflow.program import Program
 from sosmith.model.errors import ShortfallError
@@ -35,13 +34,12 @@ _TRIALS = 100
 """Orders of sums that are tried for a program with two products a clock, where words have to be waited for."""
 
 
-@lru_cache(maxsize=32)
 def _shortest(datapath: Datapath, digit_bits: int) -> Program:
-    """Return the shortest program with two products a clock; the same datapath is asked for again and again.
+    """Return the shortest program with two products a clock.
 
     Its constants are fixed: `hardware.reload` leaves `hardware.multipliers` to the hardware.
     """
-    return program(datapath, digit_bits, products=2, trials=_TRIALS)
+    return folded(datapath, digit_bits, products=2, trials=_TRIALS)
 
 
 @dataclass(frozen=True)
@@ -80,17 +78,17 @@ class SharedUnit(Architecture):
         try:
             if self.products_with(self.blocks) > 1:
                 return _shortest(self.datapath.behind_decimator, self.digit_bits)
-            folded = program(self.datapath.behind_decimator, self.digit_bits, spare_words=SPARE_WORDS * self.reload)
+            made = folded(self.datapath.behind_decimator, self.digit_bits, spare_words=SPARE_WORDS * self.reload)
             for digit_bits in range(self.digit_bits - 1, 0, -1):
-                if not self.reload or instruction_bits(folded) <= BITS:  # one register holds an instruction
+                if not self.reload or instruction_bits(made) <= BITS:  # one register holds an instruction
                     break
-                folded = program(self.datapath.behind_decimator, digit_bits, spare_words=SPARE_WORDS)
+                made = folded(self.datapath.behind_decimator, digit_bits, spare_words=SPARE_WORDS)
         except FoldingError as error:
             raise ShortfallError(unsuitable(self.name, error)) from None
         if not self.reload:
-            return folded
-        roomy = replace(folded, accumulator_bits=folded.accumulator_bits + SPARE_ACCUMULATOR_BITS)
-        return roomy.padded(len(folded.instructions) + len(folded.instructions) // SPARE_INSTRUCTIONS)
+            return made
+        roomy = replace(made, accumulator_bits=made.accumulator_bits + SPARE_ACCUMULATOR_BITS)
+        return roomy.padded(len(made.instructions) + len(made.instructions) // SPARE_INSTRUCTIONS)
 
     @property
     def multiplier_blocks(self) -> int:

@@ -26,7 +26,7 @@ from operator import mul
 
 import numpy as np
 import numpy.typing as npt
-from flint import arb, arb_mat, ctx, fmpq_poly
+from flint import arb, arb_mat, ctx, fmpq_poly, fmpz_mat
 
 from sosmith.gen.proof.decimation import decimated
 from sosmith.gen.proof.poles import Coefficients, pole_radii, power_of
@@ -86,6 +86,8 @@ class Nodes:
         Phi in units of ``2**-bits``, within two units.
     powers : list of array of int, shape (degree, degree)
         ``K**(2**k)`` likewise, for every k up to that of J.
+    steps : list of fmpz_mat
+        The same as `powers`, for products.
     norms : list of Fraction
         Bound on the maximum norm of each of `powers`; the last one is far below 1.
 
@@ -121,6 +123,7 @@ class Nodes:
         self.fine = bits + self.gain.bit_length() + self.spread.bit_length() + _GUARD_BITS
         """Fraction bits of `impulse` and `samples_at`."""
         self._wider, self._neighbours = 1, _NEIGHBOURS
+        self._known: dict[int, tuple[list[int], list[list[int]]]] = {}
         while True:
             try:
                 self._enclose()
@@ -152,6 +155,12 @@ class Nodes:
     def impulse(self, length: int) -> list[int]:
         """Return at least `length` samples of the response of 1/D from its beginning, within `spread`."""
         return self._continued([1 << self.fine], length)
+
+    def beginnings(self, length: int) -> tuple[list[int], list[list[int]]]:
+        """Return `impulse`, and `samples_at` each of `places`, the last sample first; each length is computed once."""
+        if length not in self._known:
+            self._known[length] = self.impulse(length), [self.samples_at(at, length)[::-1] for at in self.places]
+        return self._known[length]
 
     def samples_at(self, place: int, more: int) -> list[int]:
         """Return d samples of the response of 1/D up to `place`, one of `places`, and `more` behind it.
@@ -205,6 +214,7 @@ class Nodes:
         """Distances of the nodes from the beginning of a block."""
         self.weights = np.zeros((size, d), dtype=object)
         self.powers: list[Integers] = []
+        self.steps: list[fmpz_mat] = []
         self.norms: list[Fraction] = []
         self._distant: dict[int, list[int]] = {}
         if not d:
@@ -268,6 +278,7 @@ class Nodes:
         self.powers = [
             _rounded(power.entries(), self.bits).reshape(d, d) for power in powers[: self.blocks.bit_length()]
         ]
+        self.steps = [fmpz_mat(d, d, power.ravel().tolist()) for power in self.powers]
         self.norms = [_norm(power) for power in powers[: len(self.powers)]]
 
 
@@ -296,14 +307,13 @@ def _pivots(matrix: Integers, bits: int) -> tuple[list[int], int]:
 def _rounded(balls: Sequence[arb], bits: int) -> Integers:
     """Multiples of ``2**-bits`` within two units of all that the balls enclose."""
     result = np.empty(len(balls), dtype=object)
-    scale = arb(2) ** bits
-    half = arb(0.5)
+    half = arb(0.5) * arb(2) ** -bits
     for index, value in enumerate(balls):
-        scaled = value * scale
-        if not scaled.rad() < half:
+        if not value.rad() < half:
             raise _CoarseError(bits)
-        mantissa, exponent = (int(part) for part in scaled.mid().man_exp())
-        result[index] = mantissa << exponent if exponent >= 0 else mantissa >> -exponent
+        mantissa, exponent = value.mid().man_exp()
+        shift = int(exponent) + bits
+        result[index] = int(mantissa << shift if shift >= 0 else mantissa >> -shift)
     return result
 
 

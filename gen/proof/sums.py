@@ -25,7 +25,7 @@ from operator import mul
 
 import numpy as np
 import numpy.typing as npt
-from flint import fmpq_poly, fmpz_mat
+from flint import fmpq_poly, fmpz, fmpz_mat
 
 from sosmith.gen.proof.nodes import Integers, Nodes
 from sosmith.gen.proof.poles import Coefficients
@@ -267,8 +267,7 @@ class Recursion:
     def _samples_over(self, table: Nodes, numerators: Sequence[fmpq_poly], start: int) -> list[_Samples]:
         """Compute responses over one denominator; 0 in blocks that only others last for."""
         bits = self._bits
-        impulse = table.impulse(start)
-        windows = [table.samples_at(place, start)[::-1] for place in table.places]
+        impulse, windows = table.beginnings(start)
         heads, firsts, errors = [], [], []
         for numerator in numerators:
             scale = int(numerator.denom()) << table.fine - bits
@@ -277,12 +276,14 @@ class Recursion:
             firsts.append([sum(map(mul, taps, samples)) // scale for samples in windows])
             errors.append(2 + sum(map(abs, taps)) * table.spread // scale)
         count = len(firsts)
-        nodes = np.array(firsts, dtype=object).reshape(count, table.degree).T.reshape(table.degree, 1, count)
-        for power in table.powers:
-            more = min(nodes.shape[1], table.blocks - nodes.shape[1])
-            nodes = np.concatenate([nodes, self._product(power, nodes[:, :more])], axis=1)
-        missing = np.zeros((table.degree, max(0, self._blocks - nodes.shape[1]), count), dtype=object)
-        nodes = np.concatenate([nodes, missing], axis=1)
+        rows = [[fmpz(value) for value in at_node] for at_node in zip(*firsts, strict=True)]
+        for step in table.steps:
+            _extend(rows, step, min(len(rows[0]), table.blocks * count - len(rows[0])), bits)
+        nodes = np.zeros((table.degree, self._blocks, count), dtype=object)
+        if rows:
+            nodes[:, : table.blocks] = np.array([[*map(int, row)] for row in rows], dtype=object).reshape(
+                table.degree, table.blocks, count
+            )
         values = nodes.astype(np.float64) * 2.0**-bits
         sizes = np.abs(values).sum(axis=0).max(axis=0, initial=0.0) * _SLACK
         largest = [math.ceil(size) for size in sizes.tolist()]
@@ -292,12 +293,6 @@ class Recursion:
         return [
             _Samples(heads[k], nodes[..., k], np.ascontiguousarray(values[..., k]), errors[k]) for k in range(count)
         ]
-
-    def _product(self, power: Integers, nodes: Integers) -> Integers:
-        d, *shape = nodes.shape
-        product = fmpz_mat(d, d, power.ravel().tolist()) * fmpz_mat(d, math.prod(shape), nodes.ravel().tolist())
-        result = np.array([int(value) >> self._bits for value in product.entries()], dtype=object)
-        return result.reshape(d, *shape)
 
     # Signs and sums.
 
@@ -414,6 +409,14 @@ _nodes = lru_cache(maxsize=128)(Nodes)
 
 def _key(numerators: Numerators) -> tuple[str, ...]:
     return tuple(",".join(map(str, over.coeffs())) for over in numerators)
+
+
+def _extend(rows: list[list[fmpz]], step: fmpz_mat, count: int, bits: int) -> None:
+    """Append the products of the first `count` columns and a matrix with `bits` fraction bits, rounded down."""
+    columns = fmpz_mat(len(rows), count, [value for row in rows for value in row[:count]])
+    products = (step * columns).entries()
+    for k, row in enumerate(rows):
+        row += [value >> bits for value in products[k * count : (k + 1) * count]]
 
 
 def _limbs(weights: Integers, bits: int) -> Floats:

@@ -1,9 +1,8 @@
-"""Trimmed formats that are kept from one command to the next, in the user's cache folder.
+"""What the search for formats comes to, kept from one command to the next in the user's cache folder.
 
-A file is named by a digest of all that the search depends on: its rows, input stages, objective, start and the allowed
-error, the sources of the search, and the version of numpy. What is read is a proposal like that of the search itself:
-the proof decides whether a design may have it. A file that is not as it was written, or a folder that cannot be used,
-is as none.
+A file is named by a digest of all that its content depends on: rows, input stages, objective and the allowed error, the
+sources of the search, and the version of numpy. What is read is a proposal like that of the search itself: the proof
+decides whether a design may have it. A file that is not as it was written, or a folder that cannot be used, is as none.
 """
 
 from __future__ import annotations
@@ -12,14 +11,18 @@ import contextlib
 import hashlib
 import json
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from itertools import count
 from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
 
 from sosmith.gen.realizations.section_format import SectionFormat
+
+_Kept = TypeVar("_Kept")
 
 
 @dataclass(frozen=True)
@@ -34,35 +37,64 @@ class Choice:
         return Choice(self.input_stage, (*self.formats[:k], form, *self.formats[k + 1 :]))
 
 
-LIMIT = 4096
+LIMIT = 16384
 """Files that are kept; beyond, the older half of them goes."""
 
-_SOURCES = ("gen/word_lengths", "gen/realizations", "gen/proof", "model/dataflow", "model/sections", "model/arithmetic")
+_LOOKS = 64
+"""Of the files that are written, each of so many is a reason to count them."""
+
+_SOURCES = (
+    *("gen/architectures", "gen/filter", "gen/fpga", "gen/proof", "gen/realizations", "gen/word_lengths", "hdl/plan"),
+    *("model/arithmetic", "model/dataflow", "model/sections"),
+)
 """What decides on the result, from the folder that holds the rooms."""
 
+_written = count()
 
-def kept_or_made(start: Choice, key: tuple[object, ...], make: Callable[[], Choice]) -> Choice:
+
+def kept_or_made(
+    key: tuple[object, ...], make: Callable[[], _Kept], to_tree: Callable[[_Kept], Any], of_tree: Callable[[Any], _Kept]
+) -> _Kept:
     """Return the result for a key that is kept, or make it and keep that.
 
     Parameters
     ----------
-    start : Choice
-        What the search begins with, and what is the same of every result: which coefficients and quantizers there are.
     key : tuple
-        What it depends on besides; equal keys have equal representations.
+        What it is, and all that it depends on; equal keys have equal representations.
     make : callable
         The search.
+    to_tree, of_tree : callable
+        Convert a result to what JSON can hold, and back.
     """
-    text = repr((start, key))
+    text = repr(key)
     folder = None if " object at 0x" in text else cache_folder()
     if folder is None:
         return make()
     place = folder / f"{hashlib.sha256(f'{_sources()} {text}'.encode()).hexdigest()}.json"
-    known = _read(place, start)
-    if known is None:
-        known = make()
-        _write(place, known)
-    return known
+    tree = _read(place)
+    if tree is not None:
+        return of_tree(tree[0])
+    result = make()
+    _write(place, to_tree(result))
+    return result
+
+
+def tree_of_choice(choice: Choice) -> dict[str, Any]:
+    """Return a choice as `choice_of_tree` takes it."""
+    formats = [{"coefficients": dict(each.coefficients), "fracs": dict(each.fracs)} for each in choice.formats]
+    return {"input_stage": choice.input_stage, "formats": formats}
+
+
+def choice_of_tree(tree: dict[str, Any]) -> Choice:
+    """Return the choice that `tree_of_choice` had."""
+    formats = tuple(
+        SectionFormat(
+            coefficients={name: (integer, frac) for name, (integer, frac) in part["coefficients"].items()},
+            fracs=part["fracs"],
+        )
+        for part in tree["formats"]
+    )
+    return Choice(tree["input_stage"], formats)
 
 
 def cache_folder() -> Path | None:
@@ -85,46 +117,25 @@ def _sources() -> str:
     return digest.hexdigest()
 
 
-def _read(place: Path, start: Choice) -> Choice | None:
-    """Return what is kept; None if it is nothing that the search could have come to."""
+def _read(place: Path) -> list[Any] | None:
+    """Return what is kept, as the only element of a list; None if it is not as it was written."""
     try:
-        tree = json.loads(place.read_text(encoding="utf-8"))
-        formats = tuple(
-            SectionFormat(coefficients=_pairs(part["coefficients"]), fracs=_numbers(part["fracs"]))
-            for part in tree["formats"]
-        )
-        choice = Choice(_number(tree["input_stage"]), formats)
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        digest, text = place.read_text(encoding="utf-8").split("\n")
+        if digest != hashlib.sha256(text.encode()).hexdigest():
+            return None
+        return [json.loads(text)]
+    except (OSError, ValueError):
         return None
-    alike = len(formats) == len(start.formats) and all(
-        set(mine.coefficients) == set(theirs.coefficients) and set(theirs.fracs) <= set(mine.fracs)
-        for mine, theirs in zip(formats, start.formats, strict=True)
-    )
-    return choice if alike and choice.input_stage >= start.input_stage else None
 
 
-def _number(value: object) -> int:
-    if type(value) is not int:
-        raise TypeError("a kept format must be a whole number")
-    return value
-
-
-def _numbers(tree: Mapping[str, object]) -> dict[str, int]:
-    return {name: _number(value) for name, value in tree.items()}
-
-
-def _pairs(tree: Mapping[str, list[object]]) -> dict[str, tuple[int, int]]:
-    return {name: (_number(integer), _number(frac)) for name, (integer, frac) in tree.items()}
-
-
-def _write(place: Path, choice: Choice) -> None:
-    formats = [{"coefficients": dict(each.coefficients), "fracs": dict(each.fracs)} for each in choice.formats]
-    text = json.dumps({"input_stage": choice.input_stage, "formats": formats})
+def _write(place: Path, tree: Any) -> None:
+    text = json.dumps(tree)
     new = place.with_suffix(f".{os.getpid()}.new")
     try:
-        new.write_text(text, encoding="utf-8")
+        new.write_text(f"{hashlib.sha256(text.encode()).hexdigest()}\n{text}", encoding="utf-8")
         new.replace(place)
-        _shrink(place.parent)
+        if next(_written) % _LOOKS == 0:
+            _shrink(place.parent)
     except OSError:  # a full disk, or a folder that has gone: the next command searches again
         with contextlib.suppress(OSError):
             new.unlink(missing_ok=True)

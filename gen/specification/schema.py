@@ -120,7 +120,7 @@ def read_decimate(value: object, info: ValidationInfo) -> int | str:
 class Table(BaseModel):
     """A table of the specification: immutable, without unknown keys."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)  # tables of others build it in
 
 
 class InputTable(Table):

@@ -57,6 +57,11 @@ class CalibrationSpec:
     data: Path | None
     uncertainty: CoefficientsSpec | None = None
 
+    @property
+    def has_uncertainty(self) -> bool:
+        """Whether anything says what the coefficients are worth: measurements, or what is stated."""
+        return self.data is not None or self.uncertainty is not None
+
 
 @dataclass(frozen=True, kw_only=True)
 class FilterSpec:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 from typing import Protocol
 
 from sosmith.gen.word_lengths.cost import (
@@ -44,6 +45,9 @@ _WORDS, _ACCUMULATOR_BITS = Fraction(1, 1 << 16), Fraction(1, 1 << 24)
 
 class Objective(Protocol):
     """The size that a design should have as little of."""
+
+    def __hash__(self) -> int:
+        """Return the same for the same kind of size."""
 
     @property
     def best(self) -> str:
@@ -264,11 +268,11 @@ class ShortProgram:
         Infinite if it cannot be folded.
         """
         try:
-            folded = program(datapath, self.digit_bits, products=self.products)
+            made = folded(datapath, self.digit_bits, products=self.products)
         except FoldingError:
             return math.inf
-        clocks = folded.serial_cycles if self.bit_serial else len(folded.instructions)
-        return float(clocks + folded.words * _WORDS + folded.accumulator_bits * _ACCUMULATOR_BITS)
+        clocks = made.serial_cycles if self.bit_serial else len(made.instructions)
+        return float(clocks + made.words * _WORDS + made.accumulator_bits * _ACCUMULATOR_BITS)
 
     def least(self, graphs: Sequence[Graph]) -> float:
         """Count the products of values with one digit each.
@@ -286,11 +290,9 @@ class ShortProgram:
 
     def size_text(self, datapath: Datapath) -> str:
         """Return the length of the program, its memory and its accumulator in words."""
-        folded = program(datapath, self.digit_bits, products=self.products)
-        length = (
-            f"at most {folded.serial_cycles:,}" if self.bit_serial else f"{len(folded.instructions):,} instructions"
-        )
-        return f"{length}, {folded.words:,} words of memory, an accumulator of {folded.accumulator_bits} bits"
+        made = folded(datapath, self.digit_bits, products=self.products)
+        length = f"at most {made.serial_cycles:,}" if self.bit_serial else f"{len(made.instructions):,} instructions"
+        return f"{length}, {made.words:,} words of memory, an accumulator of {made.accumulator_bits} bits"
 
     def _clocks(self, column: Column) -> int:
         """Clocks of a column's instructions; one without products still takes one, which ends it."""
@@ -301,6 +303,10 @@ class ShortProgram:
             for product in column.products
         ]
         return sum(clocks) or 1
+
+
+folded = lru_cache(maxsize=16)(program)
+"""Folds a datapath; its size, its clocks and its hardware ask for the same program."""
 
 
 def unsuitable(architecture: str, error: FoldingError) -> str:

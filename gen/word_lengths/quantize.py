@@ -12,12 +12,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import cast
 
 from sosmith.gen.filter.design import Filter
 from sosmith.gen.proof.cascade_proof import CascadeProof, ideal_gain
-from sosmith.gen.realizations.kept_formats import Choice, kept_or_made
+from sosmith.gen.realizations.kept_formats import Choice, choice_of_tree, kept_or_made, tree_of_choice
 from sosmith.gen.realizations.registry import REALIZATIONS, Section, realization_of
 from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
 from sosmith.gen.word_lengths.bit_limits import MAX_BITS
@@ -105,10 +105,24 @@ class Plan:
             return self.objective.of_datapath(self.quantized.datapath)
         if self.search is None or self.start is None:
             return math.inf
-        before = self.input_stages[self.start.input_stage].start
+        search, start = self.search, self.start
+        before = self.input_stages[start.input_stage].start
         first_sample = None if before is None else before.first_sample
-        last, _ = output_stage(self.search.output(self.start), self.output, first_sample)
-        return self.search.size(self.start) + self.objective.of_graph(last.graph)
+
+        def estimate() -> float:
+            last, _ = output_stage(search.output(start), self.output, first_sample)
+            return search.size(start) + self.objective.of_graph(last.graph)
+
+        key = "size", search.key, start, self.output, first_sample
+        return kept_or_made(key, estimate, float, float)
+
+    @property
+    def key(self) -> tuple[object, ...] | None:
+        """All that its proof depends on, with equal representations if equal; None if it is proven already."""
+        if self.search is None or self.ideal is None:
+            return None
+        ports, asked = (*self.inputs, self.output), (self.max_error, self.polynomial, self.ideal.exact)
+        return self.search.key, self.start, self.instead, ports, asked, self.steady
 
     @property
     def is_long(self) -> bool:
@@ -128,10 +142,18 @@ class Plan:
         if self.search is None or self.start is None:
             return self
         search, start, allowed = self.search, self.start, float(self.allowed)
-        key = self.realization, search.key, allowed
-        smallest = kept_or_made(start, ("smallest", *key), lambda: search.trimmed(start, allowed))
-        merely = kept_or_made(start, ("merely trimmed", *key), lambda: search.merely_trimmed(start, allowed))
-        return replace(self, start=search.with_free_bits(smallest), instead=(smallest, merely))
+
+        def search_formats() -> tuple[Choice, ...]:
+            smallest = search.trimmed(start, allowed)
+            return search.with_free_bits(smallest), smallest, search.merely_trimmed(start, allowed)
+
+        closest, *instead = kept_or_made(
+            ("trimmed", search.key, start, allowed),
+            search_formats,
+            lambda choices: [*map(tree_of_choice, choices)],
+            lambda trees: tuple(map(choice_of_tree, trees)),
+        )
+        return replace(self, start=closest, instead=tuple(instead))
 
 
 def plan(
@@ -177,18 +199,15 @@ def plan(
     parts = scaled + (0 if ideal is None else 1 if ideal.is_fir else 2)  # an FIR filter rounds nothing
     share = (max_error / output.lsb - Fraction(1, 2)) / max(parts, 1)
     gain = Fraction(1) if ideal is None else gain_of(ideal)
-    before = input_stages(polynomial, inputs, output, share / gain)
     steady = steady and ideal is not None
-    if steady:
-        by_taps = loads and cast("Filter", ideal).is_fir
-        zero_gain = gain_at_zero(cast("Filter", ideal))
-        before = tuple(starting(stage, zero_gain, share, loads=by_taps) for stage in before)
+    at_zero = gain_at_zero(cast("Filter", ideal)) if steady else None
+    by_taps = steady and loads and cast("Filter", ideal).is_fir
+    before = _input_stages(polynomial, inputs, output, share, gain, at_zero, loads=by_taps)
     search, start = None, None
     if ideal is not None and realization_of(realization).searched:
         ideal = _ordered(ideal, realization) if realization_of(realization).cascade else ideal
         search = Search(parts_of(ideal, realization), realization, before, gain, steady=steady)
-        fine = 1 if realization_of(realization).cascade else _FINER
-        start = search.start(float(share) / fine, MAX_BITS)
+        start = _start(search, float(share) / (1 if realization_of(realization).cascade else _FINER))
     planned = Plan(
         name=name,
         inputs=inputs,
@@ -208,6 +227,36 @@ def plan(
     if ideal is None or search is not None:
         return planned
     return replace(planned, quantized=_by_taps(planned) if ideal.is_fir else _equally_shared(planned, ideal))
+
+
+@lru_cache(maxsize=8)
+def _input_stages(
+    polynomial: Polynomial | None,
+    inputs: tuple[Port, ...],
+    output: Port,
+    share: Fraction,
+    gain: Fraction,
+    at_zero: Fraction | None,
+    *,
+    loads: bool,
+) -> tuple[InputStage, ...]:
+    """Return the possible input stages, which are the same for every realization.
+
+    `at_zero` is the gain at zero frequency of a filter that starts from its first sample, None for another one; `loads`
+    is as for `starting`.
+    """
+    before = input_stages(polynomial, inputs, output, share / gain)
+    return before if at_zero is None else tuple(starting(stage, at_zero, share, loads=loads) for stage in before)
+
+
+def _start(search: Search, share: float) -> Choice | None:
+    """Find formats that keep to `share`; None if there are none."""
+    return kept_or_made(
+        ("start", search.key, share),
+        lambda: search.start(share, MAX_BITS),
+        lambda choice: None if choice is None else tree_of_choice(choice),
+        lambda tree: None if tree is None else choice_of_tree(tree),
+    )
 
 
 def quantize(
@@ -352,9 +401,12 @@ def gain_of(ideal: Filter) -> Fraction:
         If a pole lies too close to the unit circle; the message says what would help.
     """
     try:
-        return ideal_gain(ideal.exact)
+        return _ideal_gain(ideal.exact)
     except ShortfallError as error:
         raise ShortfallError(f"{error}{_remedy_of_poles(ideal)}") from None
+
+
+_ideal_gain = lru_cache(maxsize=32)(ideal_gain)  # asked for by every realization
 
 
 def _remedy_of_poles(ideal: Filter) -> str:
@@ -370,8 +422,13 @@ def _remedy_of_poles(ideal: Filter) -> str:
 
 def _ordered(ideal: Filter, realization: str) -> Filter:
     """Return the filter with its sections in the order with the smallest rounding error, if the gain is worth it."""
-    try:
-        models = [model for (model,) in unquantized(ideal, realization, _BITS_TO_ORDER)]
-    except ShortfallError:
-        return ideal  # cannot be built with so few bits
-    return replace(ideal, rows=tuple(ideal.rows[k] for k in best_order(models)))
+
+    def search_order() -> list[int]:
+        try:
+            models = [model for (model,) in unquantized(ideal, realization, _BITS_TO_ORDER)]
+        except ShortfallError:
+            return [*range(len(ideal.rows))]  # cannot be built with so few bits
+        return [*best_order(models)]
+
+    order: list[int] = kept_or_made(("order", realization, ideal.rows), search_order, list, list)
+    return replace(ideal, rows=tuple(ideal.rows[k] for k in order))

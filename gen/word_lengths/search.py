@@ -20,8 +20,9 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import cached_property, lru_cache
 from itertools import combinations, pairwise
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -31,10 +32,11 @@ from sosmith.gen.realizations.registry import realization_of
 from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
 from sosmith.gen.word_lengths.bit_limits import MIN_BITS
 from sosmith.gen.word_lengths.cost import MULTIPLIER_BITS
-from sosmith.gen.word_lengths.estimates import Array, estimates_of, largest_magnitude
+from sosmith.gen.word_lengths.estimates import Array, Estimate, estimates_of, largest_magnitude
 from sosmith.gen.word_lengths.input_stage import InputStage
 from sosmith.gen.word_lengths.objective import SMALL_AREA, Objective
 from sosmith.model.dataflow.graph import Op, Range
+from sosmith.model.dataflow.structure import Stage
 from sosmith.model.errors import ShortfallError
 
 _FEW = 16
@@ -55,6 +57,9 @@ _STEPS = (1, 2, 3)
 
 _MANY, _ALIKE = 10, 0.5
 """Coefficients of a stage beyond which one look at all steps takes several, and how much of the best one's merit."""
+
+
+_V = TypeVar("_V")
 
 
 class _Input(NamedTuple):
@@ -98,10 +103,7 @@ class Search:
     steady : bool
         Whether the filter starts from its first sample, and not from zero.
 
-    Raises
-    ------
-    ShortfallError
-        If a section cannot be built, or its response does not decay in time.
+    Whatever looks at the sections raises ShortfallError if one cannot be built, or its response does not decay in time.
     """
 
     def __init__(
@@ -123,12 +125,16 @@ class Search:
         x = self._inputs[0].x
         low, high = x.low * 2.0**-x.frac, x.high * 2.0**-x.frac
         self._windows = [(0.0, high), (low, 0.0)] if steady else [(low, high)]
-        self._estimates = estimates_of(parts, realization, self._windows)
+        self._realization = realization
         self._base: _Base | None = None
         self._ranges: dict[tuple[object, ...], dict[str, tuple[int, int]]] = {}
         self._known: dict[tuple[object, ...], tuple[float, Range, dict[str, int]]] = {}
         self._saved: dict[tuple[object, ...], list[float]] = {}
         self._merely: tuple[Choice, float, Choice] | None = None
+
+    @cached_property
+    def _estimates(self) -> list[Estimate]:
+        return estimates_of(self._parts, self._realization, self._windows)
 
     @property
     def work(self) -> int:
@@ -137,11 +143,11 @@ class Search:
 
     @property
     def key(self) -> tuple[object, ...]:
-        """All that `trimmed` depends on besides the realization, with equal representations where it is equal."""
+        """All that its results depend on besides what they are asked with, with equal representations if equal."""
         plain = self._transfer is None  # rows, of numbers that may have other types
         parts = [[float(value) for value in part] if plain else part for part in self._parts]
         inputs = [(*each.x, float(each.error), float(each.size)) for each in self._inputs]
-        return parts, inputs, self._windows, self._objective
+        return self._realization, parts, inputs, self._windows, self._objective
 
     def under(self, objective: Objective) -> Search:
         """Return the same search for another objective."""
@@ -156,10 +162,7 @@ class Search:
 
     def _sized_inputs(self) -> list[_Input]:
         return [
-            _Input(
-                s.output, float(s.error * self._gain), sum(self._objective.of_graph(part.graph) for part in s.stages)
-            )
-            for s in self._input_stages
+            _Input(s.output, float(s.error * self._gain), _size(s.stages, self._objective)) for s in self._input_stages
         ]
 
     def start(self, share: float, most: int) -> Choice | None:
@@ -552,14 +555,25 @@ def _with_step(choice: Choice, before: Choice, candidate: Choice) -> Choice | No
         if new is old:
             continue
         now = choice.formats[k]
-        for field in ("coefficients", "fracs"):
-            values, others, current = (dict(getattr(form, field)) for form in (old, new, now))
-            changed = {name: value for name, value in others.items() if values.get(name) != value}
-            if any(current.get(name) != values.get(name) for name in changed):
-                return None
-            now = replace(now, **{field: current | changed}) if changed else now
-        choice = choice.with_format(k, now)
+        coefficients = _with_changes(now.coefficients, old.coefficients, new.coefficients)
+        fracs = _with_changes(now.fracs, old.fracs, new.fracs)
+        if coefficients is None or fracs is None:
+            return None
+        choice = choice.with_format(k, replace(now, coefficients=coefficients, fracs=fracs))
     return choice
+
+
+def _with_changes(now: Mapping[str, _V], old: Mapping[str, _V], new: Mapping[str, _V]) -> Mapping[str, _V] | None:
+    """Return values with what has changed from `old` to `new`; None if one of these has changed otherwise by now."""
+    changed = {name: value for name, value in new.items() if old.get(name) != value}
+    if any(now.get(name) != old.get(name) for name in changed):
+        return None
+    return {**now, **changed} if changed else now
+
+
+@lru_cache(maxsize=64)  # an input stage is the same for every realization
+def _size(stages: tuple[Stage, ...], objective: Objective) -> float:
+    return sum(objective.of_graph(stage.graph) for stage in stages)
 
 
 def _kind(integer: int) -> int | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 
+from sosmith.gen.realizations.kept_formats import kept_or_made
 from sosmith.gen.realizations.registry import BEST_KEPT, REALIZATIONS, realizations_for
 from sosmith.gen.word_lengths.objective import Objective
 from sosmith.gen.word_lengths.quantize import Plan, prove
@@ -13,8 +14,8 @@ from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.errors import ShortfallError
 
 Progress = Callable[[str], None]
-Best = tuple[float, Quantized]
-"""A proven design and its size."""
+Best = tuple[float, str]
+"""The size of a realization that is proven, and its name."""
 
 Accept = Callable[[Datapath], object]
 """Raises ShortfallError, with the reason, if a datapath does not suit the hardware."""
@@ -33,6 +34,10 @@ class Selection:
         The size to be made small.
     progress : callable
         Called with the name of each step.
+    accept : callable
+        Raises ShortfallError, with the reason, if a datapath does not suit the hardware.
+    key : tuple
+        All that `floor_of` and `accept` depend on besides, with equal representations if equal.
     fir : bool
         Whether the filter is an FIR filter, which has other realizations than second-order sections.
     """
@@ -44,6 +49,8 @@ class Selection:
         objective: Objective,
         progress: Progress,
         *,
+        accept: Accept,
+        key: tuple[object, ...],
         fir: bool = False,
     ) -> None:
         self._realizations = realizations_for(fir=fir)
@@ -51,10 +58,14 @@ class Selection:
         self._floor_of = floor_of
         self._objective = objective
         self._progress = progress
+        self._accept = accept
+        self._key = key
         self._plans: dict[str, Plan] = {}
         self._trimmed: set[str] = set()
         self._proven: dict[str, Quantized] = {}
         self._failures: dict[str, str] = {}
+        self._sizes: dict[str, float] = {}
+        self._trusting = True
 
     def proven(self, name: str) -> Quantized:
         """Plan, trim and prove the realization `name`.
@@ -71,12 +82,13 @@ class Selection:
         self._trim(name)
         return self._prove(name)
 
-    def cheapest(self, accept: Accept) -> tuple[Quantized, str]:
-        """Return the proven realization of the smallest size that `accept` permits, and the reason.
+    def cheapest(self) -> tuple[Quantized, str]:
+        """Return the proven realization of the smallest size that is accepted, and the reason.
 
         Realizations are planned in the order of their least possible sizes, those that are no cascades last, until no
         remaining one can be smaller. Plans that are not much larger than the smallest are trimmed. They are proven in
-        the order of their planned sizes until no remaining plan promises to be smaller.
+        the order of their planned sizes until no remaining plan promises to be smaller. What size they come to is kept
+        from one command to the next; the smallest one is proven each time.
 
         Raises
         ------
@@ -89,7 +101,7 @@ class Selection:
         unsuited = {*failures}
         best: Best | None = None
         while promising := self._promising(floors, math.inf if best is None else best[0], failures):
-            best = self._smallest(promising, best, accept, failures)
+            best = self._smallest(promising, best, failures)
         if best is None:
             suited = [name for name in failures if name not in unsuited] or [*failures]
             best_kept = BEST_KEPT if BEST_KEPT in suited else suited[0]
@@ -97,17 +109,34 @@ class Selection:
             raise ShortfallError(
                 f"none of the {len(failures)} realizations meets the specification: {with_best}{failures[best_kept]}"
             )
-        return best[1], self._reason(best[1], {*failures} - unsuited, unsuited, [*floors])
+        size, name = best
+        if name not in self._proven and not self._is_as_kept(name, size):
+            self._begin_anew()
+            return self.cheapest()
+        quantized = self._proven[name]
+        return quantized, self._reason(quantized, {*failures} - unsuited, unsuited, [*floors])
 
     def _floors(self, failures: dict[str, str]) -> dict[str, float]:
         """Least sizes of all realizations, in the order of planning."""
-        floors = {}
+        floors: dict[str, float] = {}
+        key = "least", self._objective, self._key
+        bounds: dict[str, tuple[float, str | None]] = kept_or_made(key, self._bounds, dict, dict)
+        for name, (floor, reason) in bounds.items():
+            if reason is None:
+                floors[name] = floor
+            else:
+                failures[name] = reason
+        return dict(sorted(floors.items(), key=lambda item: (not REALIZATIONS[item[0]].cascade, item[1])))
+
+    def _bounds(self) -> dict[str, tuple[float, str | None]]:
+        """Least sizes of all realizations; for those that do not suit, the reason."""
+        bounds: dict[str, tuple[float, str | None]] = {}
         for name in self._realizations:
             try:
-                floors[name] = self._floor_of(name)
+                bounds[name] = self._floor_of(name), None
             except ShortfallError as error:
-                failures[name] = str(error)
-        return dict(sorted(floors.items(), key=lambda item: (not REALIZATIONS[item[0]].cascade, item[1])))
+                bounds[name] = 0.0, str(error)
+        return bounds
 
     def _promising(self, floors: dict[str, float], least: float, failures: dict[str, str]) -> list[str]:
         """Plan and trim those that may be smaller than `least`, and take them from `floors`."""
@@ -126,21 +155,54 @@ class Selection:
                     least = min(least, self._size(name))
         return names
 
-    def _smallest(self, names: list[str], best: Best | None, accept: Accept, failures: dict[str, str]) -> Best | None:
-        """Prove those that promise to be smaller than the best one so far."""
+    def _smallest(self, names: list[str], best: Best | None, failures: dict[str, str]) -> Best | None:
+        """Look at those that promise to be smaller than the best one so far."""
         for name in sorted(names, key=self._size):
             if best is not None and self._size(name) >= best[0]:
                 break
             try:
-                quantized = self._prove(name)
-                accept(quantized.datapath)
+                size = self._sizes[name] = self._size_once_proven(name)
             except ShortfallError as error:
                 failures[name] = str(error)
                 continue
-            size = self._objective.of_datapath(quantized.datapath)
             if best is None or size < best[0]:
-                best = size, quantized
+                best = size, name
         return best
+
+    def _size_once_proven(self, name: str) -> float:
+        """Return the size of a realization that is proven and accepted, now or in an earlier command.
+
+        Raises
+        ------
+        ShortfallError
+            If it cannot meet the specification, or is not accepted.
+        """
+
+        def prove_it() -> float:
+            quantized = self._prove(name)
+            self._accept(quantized.datapath)
+            return self._objective.of_datapath(quantized.datapath)
+
+        planned = self._plans[name].key if self._trusting else None
+        if planned is None:
+            return prove_it()
+        return kept_or_made(("proven", self._objective, planned, self._key), prove_it, float, float)
+
+    def _is_as_kept(self, name: str, size: float) -> bool:
+        """Prove a realization, and say whether what is kept of it holds."""
+        try:
+            quantized = self._prove(name)
+            self._accept(quantized.datapath)
+        except ShortfallError:
+            return False
+        return self._objective.of_datapath(quantized.datapath) == size
+
+    def _begin_anew(self) -> None:
+        """Leave nothing that a size which does not hold has led to."""
+        self._trusting = False
+        for known in (self._plans, self._failures, self._sizes):
+            known.clear()
+        self._trimmed.clear()
 
     def _reason(self, quantized: Quantized, failures: set[str], unsuited: set[str], dropped: list[str]) -> str:
         short = {*failures, *(name for name in self._plans if self._size(name) == math.inf)}
@@ -166,8 +228,7 @@ class Selection:
 
     def _known_size(self, name: str) -> float:
         """Size as proven, if it was: a proof may have needed longer words than were planned."""
-        proven = self._proven.get(name)
-        return self._size(name) if proven is None else self._objective.of_datapath(proven.datapath)
+        return self._sizes.get(name, self._size(name))
 
     def _plan(self, name: str) -> None:
         if name in self._plans or name in self._failures:

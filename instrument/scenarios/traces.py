@@ -13,7 +13,6 @@ from sosmith.instrument.scenarios.catalogue import SCENARIOS, emulate
 from sosmith.instrument.scenarios.file import emulate_file, load_scenario, range_notes
 from sosmith.instrument.scenarios.instrument_signals import least_wear_ramp
 from sosmith.instrument.scenarios.summaries import check_scenario
-from sosmith.instrument.scenarios.vehicle_clearance import vehicle_clearance
 from sosmith.model.errors import SpecificationError
 from sosmith.model.foreign_files import read_bytes
 from sosmith.model.full_scale import is_sound
@@ -60,6 +59,9 @@ def traces_for(design: CoreDesign, source: str, *, seed: int, seconds: float | N
     if is_scenario_file(source):
         if seconds is not None:
             raise SpecificationError(f"--seconds must come with a scenario's name, not with the file {source}")
+        # With it comes scipy's interpolation, which no other source of traces needs.
+        from sosmith.instrument.scenarios.vehicle_clearance import vehicle_clearance  # noqa: PLC0415
+
         scenario, bench = load_scenario(Path(source)), bench_of(design)
         traces = [emulate_file(scenario, bench, seed=seed + k, channel=k, vehicle=vehicle_clearance) for k in channels]
         return tuple(trace.delayed(k) for k, trace in enumerate(traces))

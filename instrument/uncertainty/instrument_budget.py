@@ -200,7 +200,7 @@ def instrument_of(spec: Specification, bound: float | None = None, *, filtered: 
     filtered : bool
         Whether the core has the filter.
     """
-    if spec.calibration is None:
+    if spec.calibration is None or not spec.calibration.has_uncertainty:
         return None
     polynomial, fitted = polynomial_of(spec)
     known = _coefficients(spec.calibration, fitted)

@@ -31,6 +31,11 @@ void settle(bool clock) {
     if (clock) core.step();  // what depends on registers follows them
 }
 
+void tick() {
+    settle(false);
+    settle(true);
+}
+
 bool input_ready() { return core.p_s__axis__tready.get<bool>(); }
 bool output_valid() { return core.p_m__axis__tvalid.get<bool>(); }
 void set_input_valid(bool value) { core.p_s__axis__tvalid.set(value); }

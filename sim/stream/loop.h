@@ -18,6 +18,7 @@ struct Word {
 };
 
 void settle(bool clock);  // set the clock, and let everything follow
+void tick();              // the same for a clock that falls and rises, where nobody looks in between
 bool input_ready();       // s_axis_tready
 bool output_valid();      // m_axis_tvalid
 Word output();            // m_axis_tdest, m_axis_tdata, m_axis_tuser; 0 for what the core lacks
@@ -127,9 +128,8 @@ uint64_t sleep_while_busy(uint64_t limit) {
     uint64_t clocks = 1;
     for (;; ++clocks) {
         const bool woken = input_ready() || output_valid();
-        settle(true);
+        tick();
         if (woken || clocks == limit || input_ready() || output_valid()) return clocks;
-        settle(false);
     }
 }
 
@@ -196,8 +196,7 @@ extern "C" int32_t sosmith_stream(Stream *stream, uint64_t clocks) {
             s.clocks += slept;
             s.silence += slept - 1;
         } else {
-            settle(false);
-            settle(true);
+            tick();
             ++s.clocks;
         }
     }

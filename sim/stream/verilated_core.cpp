@@ -2,11 +2,15 @@
 //
 // cocotb's own main program is included as it is; only the model that it makes is remembered. A cocotb test calls the
 // loop by ctypes. -DBENCH_TDEST and -DBENCH_TUSER tell which optional signals the streams have, and -DBENCH_WIDE
-// that one has more than 64 bits: then nobody calls the loop.
+// that one has more than 64 bits: then nobody calls the loop. -DBENCH_CLOCK_BEFORE names the member of the model in
+// which Verilator remembers the clock of the last evaluation, if it has one.
 
 #include <cstdint>
 
 #include "Vtop.h"
+#ifdef BENCH_CLOCK_BEFORE
+#include "Vtop___024root.h"
+#endif
 #include "loop.h"
 
 static Vtop *core;
@@ -25,6 +29,15 @@ namespace {
 void settle(bool clock) {
     core->aclk = clock;
     core->eval();
+}
+
+void tick() {
+#ifdef BENCH_CLOCK_BEFORE
+    core->rootp->BENCH_CLOCK_BEFORE = 0;  // as if it had fallen: nothing follows that but what follows inputs anyway
+#else
+    settle(false);
+#endif
+    settle(true);
 }
 
 bool input_ready() { return core->s_axis_tready; }

@@ -19,7 +19,7 @@ def test_the_document_shows_the_recorded_figures() -> None:
 def test_both_architectures_are_recorded_with_long_runs_at_the_speed_that_is_asked() -> None:
     rows = {row.architecture: row for row in simulation.BENCHMARK.recorded()}
     assert {name: row.samples for name, row in rows.items()} == {"parallel": 1_000_000, "folded": 60_000}
-    assert all(row.ratio > 0.8 and row.build < simulation.BUILD for row in rows.values())
+    assert all(row.ratio > 1.0 and row.build < simulation.BUILD for row in rows.values())
 
 
 def test_one_and_twelve_channels_are_recorded_faster_than_scipy() -> None:

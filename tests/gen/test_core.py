@@ -12,8 +12,10 @@ from tests.gen.designs import EXAMPLES
 
 from sosmith.gen.architectures import search
 from sosmith.gen.core import CoreDesign, design_core
+from sosmith.gen.realizations import kept_formats
 from sosmith.gen.realizations.registry import SECTIONS
-from sosmith.gen.specification.specification import Specification, from_tree, load
+from sosmith.gen.specification.specification import Specification, from_text, from_tree, load
+from sosmith.gen.word_lengths import selection
 from sosmith.gen.word_lengths.cost import cost_of
 from sosmith.gen.word_lengths.quantize import Plan, plan
 from sosmith.model.errors import ShortfallError
@@ -192,3 +194,70 @@ def test_none_for_several_reasons(spec: Specification, monkeypatch: pytest.Monke
     )
     with pytest.raises(ShortfallError, match=f"^{re.escape(sentence)}$"):
         design_core(spec)
+
+
+PROVEN = ["proof, df1_ef1", "proof, delta", "proof, df1_ef2"]
+"""What the choice comes to for the specification below; the second one is taken."""
+
+
+@pytest.fixture(name="tiny")
+def small_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Specification:
+    monkeypatch.setattr(kept_formats, "cache_folder", lambda: tmp_path)
+    port = "bits = 10\nsigned = true\nrange = [-1.0, 1.0]"
+    return from_text(
+        f"""
+        name = "tiny"
+        sample_rate = 1.0
+        [input.x]
+        {port}
+        [filter]
+        family = "butterworth"
+        kind = "lowpass"
+        order = 2
+        cutoff = 0.04
+        [output]
+        {port}
+        max_error = "faithful"
+        [hardware]
+        architecture = "folded"
+        clock = 1000.0
+        """,
+        Path("tiny.toml"),
+    )
+
+
+def designed(spec: Specification) -> tuple[CoreDesign, list[str]]:
+    """Return a design, and which realizations were proven."""
+    steps: list[str] = []
+    made = design_core(spec, progress=steps.append)
+    return made, [step for step in steps if step.startswith("proof")]
+
+
+def test_the_one_taken_is_proven_again_and_no_other(tiny: Specification) -> None:
+    first, proven = designed(tiny)
+    assert (first.quantized.realization, proven) == ("delta", PROVEN)
+    again, proven = designed(tiny)
+    assert proven == PROVEN[1:2]
+    assert (again.quantized, again.reasons, again.datapath) == (first.quantized, first.reasons, first.datapath)
+
+
+def test_what_a_slower_clock_leaves_no_time_for_falls_short(
+    tiny: Specification, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first, _ = designed(tiny)
+    slow = replace(tiny, hardware=replace(tiny.hardware, clock=Fraction(first.architecture.clocks_per_sample)))
+    kept, _ = designed(slow)
+    monkeypatch.setattr(kept_formats, "cache_folder", lambda: None)
+    searched, _ = designed(slow)
+    assert kept.reasons == searched.reasons
+    assert "fall short" in kept.reasons["realization"]
+    assert "fall short" not in first.reasons["realization"]
+
+
+@pytest.mark.parametrize("size", [1.0, 1e9])
+def test_a_size_that_is_not_so_is_no_reason(size: float, tiny: Specification, monkeypatch: pytest.MonkeyPatch) -> None:
+    right, _ = designed(tiny)
+    monkeypatch.setattr(selection, "kept_or_made", lambda key, make, *_: size if key[0] == "proven" else make())
+    made, proven = designed(tiny)
+    assert sorted(proven) == sorted(PROVEN)
+    assert (made.quantized, made.reasons) == (right.quantized, right.reasons)

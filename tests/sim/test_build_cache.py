@@ -14,7 +14,7 @@ from tests.sim.stand_in import SOUND, write
 from sosmith.sim.build_cache import LIMIT, BuildCache, cache_folder, key_of
 from sosmith.sim.simulator_bench import has_library
 from sosmith.sim.simulators import find_simulator
-from sosmith.sim.verilated_model import Builder, Model
+from sosmith.sim.verilated_model import Builder, Model, _clock_before
 
 ENDS = ("tdata", "tvalid", "tready")
 
@@ -142,6 +142,16 @@ def test_what_was_not_used_for_long_is_removed_beyond_the_limit(tmp_path: Path) 
     assert LIMIT == 512 * 2**20
 
 
+def test_a_kind_is_known_by_what_is_there(tmp_path: Path) -> None:
+    cache = BuildCache(tmp_path)
+    assert not cache.has_any("library")
+    (tmp_path / "library-0123.new").mkdir()  # of a killed process
+    (tmp_path / "model-0123").mkdir()
+    assert not cache.has_any("library")
+    (tmp_path / "library-0123").mkdir()
+    assert cache.has_any("library")
+
+
 def test_emptying_it(tmp_path: Path) -> None:
     cache = BuildCache(tmp_path)
     for key in ("aa", "bb"):
@@ -185,3 +195,21 @@ def test_a_core_built_elsewhere_is_not_built_again(tmp_path: Path, monkeypatch: 
     assert has_library()
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert not has_library()
+
+
+CLOCK = "__Vtrigprevexpr___TOP__aclk__0"
+
+
+@pytest.mark.parametrize(
+    ("members", "flags"),
+    [
+        (f"CData/*0:0*/ {CLOCK};\n    CData/*0:0*/ __VactContinue;", [f"-DBENCH_CLOCK_BEFORE={CLOCK}"]),
+        ("CData/*0:0*/ __Vtrigprevexpr___TOP__sclk__0;", []),  # another clock
+        (f"CData/*0:0*/ {CLOCK};\n    CData/*0:0*/ {CLOCK[:-1]}1;", []),  # which of the two, nobody knows
+        ("VL_IN8(aclk,0,0);", []),  # as another version may have it
+    ],
+)
+def test_the_member_that_remembers_the_clock_is_found(members: str, flags: list[str], tmp_path: Path) -> None:
+    header = tmp_path / "Vtop___024root.h"
+    header.write_text(f"class Vtop___024root {{\n  public:\n    {members}\n}};\n", encoding="utf-8")
+    assert _clock_before(header) == flags

@@ -153,7 +153,10 @@ class Design:
     @cached_property
     def uncertainty(self) -> InstrumentBudget | None:
         """The uncertainty budget of a reading in the terms of the GUM; None if the calibration's is not known."""
-        from sosmith.instrument.uncertainty.instrument_budget import budget_of
+        calibration = self.core.spec.calibration
+        if calibration is None or not calibration.has_uncertainty:
+            return None
+        from sosmith.instrument.uncertainty.instrument_budget import budget_of  # and scipy.special, which is slow
 
         return budget_of(self.core)
 
@@ -731,8 +734,6 @@ class Design:
         """
         # The simulation modules are slow to import; a design that only computes does not need them.
         from sosmith.gen.output.vectors import check_format, result_rate
-        from sosmith.instrument.calibration.store.measurement_files import parse_date
-        from sosmith.instrument.uncertainty.instrument_budget import budget_in_json
         from sosmith.interface.report import Report
         from sosmith.sim.simulation import simulate
         from sosmith.sim.simulators import check_name
@@ -744,6 +745,8 @@ class Design:
         if vectors is not None:
             check_format(Path(fspath(vectors)), result_rate(self.facts.interface, self.core.spec.sample_rate))
         if date is not None:
+            from sosmith.instrument.calibration.store.measurement_files import parse_date  # and what reads workbooks
+
             parse_date(date)
         board = None if gates is None else find_board(gates, MODELLED)
         place = Path("build") / self.core.spec.name if folder is None else Path(fspath(folder))
@@ -769,7 +772,7 @@ class Design:
                 hardware=hardware,
                 vectors=None if vectors is None else Path(fspath(vectors)),
                 date=date,
-                uncertainty=budget_in_json(self.core),
+                uncertainty=self._uncertainty_json(),
                 facts=self.facts,
                 claims=self.certificate.entries,
                 progress=progress,
@@ -807,13 +810,17 @@ class Design:
             details=details,
         )
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return the `manifest`, ``uncertainty`` (None if unknown), `estimates`, with a decimator ``rate_costs``."""
+    def _uncertainty_json(self) -> dict[str, Any] | None:
+        if self.uncertainty is None:
+            return None
         from sosmith.instrument.uncertainty.instrument_budget import budget_json
 
-        worth = None if self.uncertainty is None else budget_json(self.uncertainty)
+        return budget_json(self.uncertainty)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the `manifest`, ``uncertainty`` (None if unknown), `estimates`, with a decimator ``rate_costs``."""
         beside = {name: asdict(costs) for name, costs in self.rate_costs.items()}
-        tree = {"uncertainty": worth, "estimates": [each.as_dict() for each in self.estimates]}
+        tree = {"uncertainty": self._uncertainty_json(), "estimates": [each.as_dict() for each in self.estimates]}
         return self.manifest | tree | ({"rate_costs": beside} if beside else {})
 
     def _repr_html_(self) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
+from typing import TYPE_CHECKING
 
 from sosmith.gen.architectures.architecture import Architecture
 from sosmith.gen.architectures.folded_fir import FoldedFir
@@ -19,10 +20,12 @@ from sosmith.gen.output.decimation_facts import DecimationFacts, DownsamplingFac
 from sosmith.gen.quantity import count, quantity
 from sosmith.gen.specification.specification import Specification
 from sosmith.gen.specification.wear_limits import WearSpec
-from sosmith.instrument.uncertainty.instrument_budget import InstrumentBudget, budget_json
 from sosmith.interface.quantity import Quantity
 from sosmith.model.dataflow.program import Program
 from sosmith.model.port import Port
+
+if TYPE_CHECKING:
+    from sosmith.instrument.uncertainty.instrument_budget import InstrumentBudget
 
 Rows = list[Sequence[str]]
 
@@ -49,6 +52,8 @@ def design_tables(
     if not details:
         return tables
     if uncertainty is not None:
+        from sosmith.instrument.uncertainty.instrument_budget import budget_json
+
         tables.append(uncertainty_table(budget_json(uncertainty)))
     if facts.sections:
         tables += [_sections(facts.sections), limit_cycles_table(facts.limit_cycles, facts)]
