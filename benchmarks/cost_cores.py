@@ -203,8 +203,11 @@ def _blocks(core: Core, key: str) -> Blocks:
 
 
 @cache
-def design(core: Core, objective: Objective) -> CoreDesign:
-    """Design a core for one channel and without protection; the datapath is the same for more and with it."""
+def design(core: Core, objective: Objective, target: str = "") -> CoreDesign:
+    """Design a core for one channel and without protection; the datapath is the same for more and with it.
+
+    Without a target, it is that of the first one with the same objective.
+    """
     example, architecture, bits = core.example, core.architecture, core.bits
     path = ROOT / "examples" / f"{example}.toml"
     spec = load(path)
@@ -219,14 +222,15 @@ def design(core: Core, objective: Objective) -> CoreDesign:
     if core.clock:
         hardware = replace(hardware, pipeline="look-ahead", clock=Fraction(core.clock * 10**6))
     wanted = replace(spec, hardware=hardware)
-    first = next(target for key, target in TARGETS.items() if objective_on(core, key) == objective)
-    return design_core(wanted, core=EXAMPLES[example], realization=core.realization or None, board=first)
+    first = target or next(key for key in TARGETS if objective_on(core, key) == objective)
+    return design_core(wanted, core=EXAMPLES[example], realization=core.realization or None, board=TARGETS[first])
 
 
 def design_on(core: Core, key: str) -> CoreDesign:
     """Return the design of a core, for one channel, as it is made for a target."""
     objective = objective_on(core, key)
-    return design(replace(core, channels=1, protect="none"), objective)
+    # How far loops look ahead, and for which multiplier blocks, is up to the FPGA.
+    return design(replace(core, channels=1, protect="none"), objective, key if core.clock else "")
 
 
 def architecture_on(core: Core, key: str) -> Architecture:

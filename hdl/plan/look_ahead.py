@@ -233,7 +233,7 @@ def _spread_with(
         longest if index in registered else min(operation_time(graph, node, powers=True), longest)
         for index, node in enumerate(nodes)
     ]
-    early = _earliest(graph, loops, times, longest, _reading(turns), lead)
+    early = _earliest(graph, loops, times, longest, _reading(turns), lead, registered)
     depth = max(stage for stage, _ in early) + 1
     planned = _latest(graph, loops, times, longest, early, depth)
     for index, node in enumerate(nodes):
@@ -246,9 +246,18 @@ def _spread_with(
 
 
 def _earliest(
-    graph: Graph, loops: frozenset[int], times: list[int], longest: int, reading: int, lead: int
+    graph: Graph,
+    loops: frozenset[int],
+    times: list[int],
+    longest: int,
+    reading: int,
+    lead: int,
+    registered: frozenset[int],
 ) -> list[_Moment]:
-    """Return the earliest moment at which each value can be there; that of older states, `lead` stages before."""
+    """Return the earliest moment at which each value can be there; that of older states, `lead` stages before.
+
+    What enters is registered once more before it goes to blocks: they are many, and far from each other.
+    """
     early: list[_Moment] = []
     for index, node in enumerate(graph.nodes):
         if index in loops:
@@ -259,6 +268,8 @@ def _earliest(
             early.append((early[node.operands[0]][0], 0))
         else:
             stage, time = max(early[i] for i in node.operands)
+            if index in registered:
+                stage, time = max((stage, time), (1, 0))
             took = times[index]
             early.append((stage, time + took) if time + took <= longest else (stage + 1, took))
     return early

@@ -13,7 +13,7 @@ from tests.gen.chain.chains import PLAIN, draw, instrument, stimulus
 from tests.gen.chain.rising import SHAPES
 
 import sosmith
-from sosmith.gen.chain import flags
+from sosmith.gen.chain.joints import flags
 from sosmith.gen.chain.rates import results_of
 from sosmith.sim import chain as simulation
 

@@ -108,7 +108,7 @@ class Stage:
         k, name = self.index, "error_is_bounded" if self.every == 1 else "results_are_bounded"
         where = "Z.of_nat n" if self.every == 1 else f"Z.of_nat ({self.every} * n)"
         return (
-            f"unfold every; replace (Z.of_nat n * Z.of_nat {self.every}) with ({where}) by lia; "
+            f"unfold one_in; replace (Z.of_nat n * Z.of_nat {self.every}) with ({where}) by lia; "
             f"exact ({self.file}.{name} (codes_{k} x) (codes_{k}_within x X) Y E n)"
         )
 
@@ -201,8 +201,8 @@ def _between(stage: Stage, reach: Fraction, begins: str) -> Claim:
     text = f"""\
 Theorem stage_{k} : forall x, inputs_within Stage0.ports x ->
   forall Y, exact_filter {stage.file}.exact_sections (begins {begins} (values_{k} x)) Y ->
-  (forall j, (Rabs (every {stage.every} Y j) <= {real(reach)})%R) ->
-  forall n, (Rabs (values_{k + 1} x n - every {stage.every} Y (Z.of_nat n)) <= {real(stage.error)})%R.
+  (forall j, (Rabs (one_in {stage.every} Y j) <= {real(reach)})%R) ->
+  forall n, (Rabs (values_{k + 1} x n - one_in {stage.every} Y (Z.of_nat n)) <= {real(stage.error)})%R.
 Proof.
   intros x X. apply (stage_between {begins} {stage.file}.exact_sections {stage.every} {real(stage.unit)} {real(bound)}
     {real(reach)} {real(stage.error)} (fun n => {stage.file}.calibrated (codes_{k} x n)) (values_{k} x)

@@ -160,7 +160,7 @@ Qed.
 
 (* Stages in a row: as each of them, so are all. *)
 Definition stages_ := list (sections * nat).
-Lemma every_constant r u : (0 < r)%nat -> constant_before u -> constant_before (every r u).
+Lemma every_constant r u : (0 < r)%nat -> constant_before u -> constant_before (one_in r u).
 Proof. intros P [s U]. exists s. intros k K. apply U. nia. Qed.
 Lemma chain_ext l : forall x x' y y', (forall k, x k = x' k) -> (forall k, y k = y' k) -> exact_chain l x y -> exact_chain l x' y'.
 Proof.
@@ -192,7 +192,7 @@ Lemma chain_exists l : forall x, can_run l = true -> constant_before x -> exists
 Proof.
   induction l as [|[S r] l IH]; intros x H X; [exists x; intros k; reflexivity|].
   apply can_run_next in H. destruct H as [H [P L]]. destruct (exact_exists S x H X) as [m M].
-  destruct (IH (every r m) L (every_constant r m P (exact_constant S x m X M))) as [y Y]. exists y, m. auto.
+  destruct (IH (one_in r m) L (every_constant r m P (exact_constant S x m X M))) as [y Y]. exists y, m. auto.
 Qed.
 
 (* Such a chain is one filter at the first rate, of which some results remain: those behind have zeros between their taps. *)
@@ -205,16 +205,16 @@ Proof.
   induction n as [|n IH]; intros l u k; cbn [repeat app]; [rewrite Z.sub_0_r; reflexivity|].
   cbn [taps]. rewrite IH, Rmult_0_l, Rplus_0_l. f_equal. lia.
 Qed.
-Lemma taps_apart r l u : (0 < r)%nat -> forall k, taps (zeros_between r l) u (k * Z.of_nat r) = taps l (every r u) k.
+Lemma taps_apart r l u : (0 < r)%nat -> forall k, taps (zeros_between r l) u (k * Z.of_nat r) = taps l (one_in r u) k.
 Proof.
   intros P. induction l as [|c l IH]; intros k; cbn [zeros_between flat_map app taps]; [reflexivity|].
-  fold (zeros_between r l). rewrite taps_zeros. unfold every at 1. f_equal. rewrite <- IH. f_equal. nia.
+  fold (zeros_between r l). rewrite taps_zeros. unfold one_in at 1. f_equal. rewrite <- IH. f_equal. nia.
 Qed.
-Lemma exact_apart r S : (0 < r)%nat -> forall x y, exact_filter (apart r S) x y -> exact_filter S (every r x) (every r y).
+Lemma exact_apart r S : (0 < r)%nat -> forall x y, exact_filter (apart r S) x y -> exact_filter S (one_in r x) (one_in r y).
 Proof.
   intros P. induction S as [|[B A] S IH]; intros x y; cbn [apart map exact_filter fst snd].
   - intros E k. apply E.
-  - intros [m [C [E F]]]. exists (every r m). split; [apply every_constant; assumption|split; [|exact (IH m y F)]].
+  - intros [m [C [E F]]]. exists (one_in r m). split; [apply every_constant; assumption|split; [|exact (IH m y F)]].
     intros k. rewrite <- !taps_apart by exact P. apply E.
 Qed.
 Lemma sum_apart r l : (0 < r)%nat -> sum (zeros_between r l) = sum l.
@@ -241,11 +241,11 @@ Proof.
   - intros E. exists x, 1. split; [intros k; reflexivity|]. intros k. rewrite Z.mul_1_r. symmetry. apply E.
   - intros [m [M F]]. apply can_run_next in H. destruct H as [H [P L]].
     pose proof (exact_constant S x m X M) as C.
-    destruct (IH (every r m) y L (every_constant r m P C) F) as [Y [d [G D]]].
+    destruct (IH (one_in r m) y L (every_constant r m P C) F) as [Y [d [G D]]].
     destruct (exact_exists (apart r (at_first_rate l)) m (sound_apart r _ P (sound_at_first_rate l L)) C) as [W HW].
     exists W, (d * Z.of_nat r). split; [exact (exact_joined _ _ _ _ _ M HW)|]. intros k. rewrite <- D.
-    rewrite (exact_unique (at_first_rate l) _ Y (every r W) (sound_at_first_rate l L) G (exact_apart r _ P _ _ HW)).
-    unfold every. f_equal. ring.
+    rewrite (exact_unique (at_first_rate l) _ Y (one_in r W) (sound_at_first_rate l L) G (exact_apart r _ P _ _ HW)).
+    unfold one_in. f_equal. ring.
 Qed.
 
 Definition has_gain (l : stages_) (g : R) : Prop := forall x y M, (0 <= M)%R -> constant_before x -> exact_chain l x y ->
@@ -260,16 +260,16 @@ Qed.
 Lemma begins_constant steady u : constant_before (begins steady u).
 Proof. exists (if steady then u O else 0%R). intros k K. apply after_before, K. Qed.
 Lemma near_at_all_times steady S r v Y v' e : sound S = true -> (0 < r)%nat -> exact_filter S (begins steady v) Y -> (0 <= e)%R ->
-  (forall n, (Rabs (v' n - every r Y (Z.of_nat n)) <= e)%R) -> forall k, (Rabs (begins steady v' k - every r Y k) <= e)%R.
+  (forall n, (Rabs (v' n - one_in r Y (Z.of_nat n)) <= e)%R) -> forall k, (Rabs (begins steady v' k - one_in r Y k) <= e)%R.
 Proof.
   intros H P E e0 N k. destruct (Z.ltb_spec k 0) as [K|K].
   - unfold begins. rewrite after_before by exact K. destruct steady.
     + assert (X : forall j, j <= 0 -> begins true v j = v O).
       { intros j J. unfold begins. destruct (Z.eq_dec j 0) as [->|J0]; [apply (after_at (v O) v 0)|apply after_before; lia]. }
-      destruct (steady_until S _ Y (v O) H X E) as [c C]. specialize (N O). unfold every in *.
+      destruct (steady_until S _ Y (v O) H X E) as [c C]. specialize (N O). unfold one_in in *.
       rewrite (C (k * Z.of_nat r)) by nia. rewrite (C (Z.of_nat 0 * Z.of_nat r)) in N by lia. exact N.
     + assert (X : forall j, j < 0 -> begins false v j = 0%R) by (intros j J; unfold begins; apply after_before, J).
-      unfold every. rewrite (silent_before S _ Y H X E) by nia. rewrite Rminus_0_r, Rabs_R0. exact e0.
+      unfold one_in. rewrite (silent_before S _ Y H X E) by nia. rewrite Rminus_0_r, Rabs_R0. exact e0.
   - rewrite <- (Z2Nat.id k K). unfold begins. rewrite after_at. apply N.
 Qed.
 
@@ -283,8 +283,8 @@ Fixpoint made (steady : bool) (l : list link) (v last : nat -> R) : Prop :=
   match l with
   | [] => forall n, last n = v n
   | s :: l' => exists v', (forall Y, exact_filter (filter_ s) (begins steady v) Y ->
-        (forall k, (Rabs (every (every_ s) Y k) <= range_ s)%R) ->
-        forall n, (Rabs (v' n - every (every_ s) Y (Z.of_nat n)) <= error_ s)%R)
+        (forall k, (Rabs (one_in (every_ s) Y k) <= range_ s)%R) ->
+        forall n, (Rabs (v' n - one_in (every_ s) Y (Z.of_nat n)) <= error_ s)%R)
       /\ made steady l' v' last
   end.
 (* D bounds the difference to the exact value before the first of these stages, and `before` are the stages there. *)
@@ -315,26 +315,26 @@ Proof.
     destruct Fit as [E0 [O0 [Own [On [Most [Room Fit]]]]]]. destruct Made as [v' [Step Made]].
     apply can_run_next in Run. destruct Run as [So [P Run]].
     destruct W as [m [M1 M2]]. destruct Y as [z' [Z1 Z2]]. set (r := every_ s) in *.
-    assert (Z3 : exact_chain (before ++ [(filter_ s, r)]) u (every r z')).
+    assert (Z3 : exact_chain (before ++ [(filter_ s, r)]) u (one_in r z')).
     { apply (chain_joined _ _ _ _ _ Z). exists z'. split; [exact Z1|intros k; reflexivity]. }
-    assert (One : forall a b, exact_filter (filter_ s) a b -> exact_chain [(filter_ s, r)] a (every r b)).
+    assert (One : forall a b, exact_filter (filter_ s) a b -> exact_chain [(filter_ s, r)] a (one_in r b)).
     { intros a b E. exists b. split; [exact E|intros k; reflexivity]. }
     assert (Cd : forall a b, constant_before a -> constant_before b -> constant_before (fun k => a k - b k)%R).
     { intros a b [i I] [j J]. exists (i - j)%R. intros k K. rewrite I, J by exact K. reflexivity. }
-    assert (Off : forall k, (Rabs (every r m k - every r z' k) <= own_ s * D)%R).
+    assert (Off : forall k, (Rabs (one_in r m k - one_in r z' k) <= own_ s * D)%R).
     { exact (Own _ _ D D0 (Cd _ _ (begins_constant steady v) Cz) (chain_difference _ _ _ _ _ (One _ _ M1) (One _ _ Z1)) Near). }
-    assert (In : forall k, (Rabs (every r m k) <= range_ s)%R).
-    { intros k. replace (every r m k) with (every r m k - every r z' k + every r z' k)%R by ring.
+    assert (In : forall k, (Rabs (one_in r m k) <= range_ s)%R).
+    { intros k. replace (one_in r m k) with (one_in r m k - one_in r z' k + one_in r z' k)%R by ring.
       eapply Rle_trans; [apply Rabs_triang|]. pose proof (Off k). pose proof (Most _ Z3 k). lra. }
     pose proof (near_at_all_times steady _ r v m v' _ So P M1 E0 (Step m M1 In)) as Close.
     destruct (chain_exists (stages_of l rest) (begins steady v') Run (begins_constant steady v')) as [w' W'].
     assert (D1 : (0 <= error_ s + own_ s * D)%R) by (pose proof (Rmult_le_pos _ _ O0 D0); lra).
     pose proof (every_constant r _ P (exact_constant _ _ _ Cz Z1)) as Cz'.
     pose proof (every_constant r _ P (exact_constant _ _ _ (begins_constant steady v) M1)) as Cm.
-    destruct (IH (before ++ [(filter_ s, r)]) v' last (every r z') w' (error_ s + own_ s * D)%R (A + onward_ s * error_ s)%R)
+    destruct (IH (before ++ [(filter_ s, r)]) v' last (one_in r z') w' (error_ s + own_ s * D)%R (A + onward_ s * error_ s)%R)
       as [w2 [W2 F2]]; try assumption.
-    + intros k. replace (begins steady v' k - every r z' k)%R
-        with ((begins steady v' k - every r m k) + (every r m k - every r z' k))%R by ring.
+    + intros k. replace (begins steady v' k - one_in r z' k)%R
+        with ((begins steady v' k - one_in r m k) + (one_in r m k - one_in r z' k))%R by ring.
       eapply Rle_trans; [apply Rabs_triang|]. pose proof (Close k). pose proof (Off k). lra.
     + intros k. replace (w' k - y k)%R with ((w' k - w k) + (w k - y k))%R by ring.
       eapply Rle_trans; [apply Rabs_triang|].
@@ -347,7 +347,7 @@ Qed.
 Theorem chain_error steady l S r v last y out lo hi off e :
   can_run (stages_of l [(S, r)]) = true -> fits [] (begins steady v) l [(S, r)] 0 -> made steady l v last ->
   (forall Y, exact_filter S (begins steady last) Y ->
-    forall n : nat, (Rabs (out n - limited lo hi (every r Y (Z.of_nat n) - off)) <= e)%R) ->
+    forall n : nat, (Rabs (out n - limited lo hi (one_in r Y (Z.of_nat n) - off)) <= e)%R) ->
   exact_chain (stages_of l [(S, r)]) (begins steady v) y ->
   forall n : nat, (Rabs (out n - limited lo hi (y (Z.of_nat n) - off)) <= added l + e)%R.
 Proof.
@@ -375,16 +375,16 @@ Proof.
 Qed.
 Theorem stage_between steady S r (u b range e : R) (c v code : nat -> R) lo hi : (0 < u)%R -> (forall n, u * c n = v n)%R ->
   (forall Y, exact_filter S (begins steady c) Y ->
-    forall n : nat, (Rabs (code n - limited lo hi (every r Y (Z.of_nat n))) <= b)%R) ->
+    forall n : nat, (Rabs (code n - limited lo hi (one_in r Y (Z.of_nat n))) <= b)%R) ->
   (range <= u * hi)%R -> (u * lo <= - range)%R -> (u * b <= e)%R ->
-  forall Y, exact_filter S (begins steady v) Y -> (forall k, (Rabs (every r Y k) <= range)%R) ->
-  forall n, (Rabs (u * code n - every r Y (Z.of_nat n)) <= e)%R.
+  forall Y, exact_filter S (begins steady v) Y -> (forall k, (Rabs (one_in r Y k) <= range)%R) ->
+  forall n, (Rabs (u * code n - one_in r Y (Z.of_nat n)) <= e)%R.
 Proof.
   intros U V H Hi Lo E Y F In n.
   assert (X : exact_filter S (begins steady c) (fun k => / u * Y k)%R).
   { apply (exact_ext S (fun k => / u * begins steady v k)%R _ (fun k => / u * Y k)%R); [|intros; reflexivity|apply exact_scaled, F].
     intros k. rewrite <- begins_scaled. apply begins_ext. intros j. rewrite <- V. field. lra. }
-  specialize (H _ X n). specialize (In (Z.of_nat n)). unfold every in *. cbv beta in H. set (y := Y (Z.of_nat n * Z.of_nat r)) in *.
+  specialize (H _ X n). specialize (In (Z.of_nat n)). unfold one_in in *. cbv beta in H. set (y := Y (Z.of_nat n * Z.of_nat r)) in *.
   assert (In' : (- range <= y <= range)%R).
   { split; [apply Ropp_le_cancel; rewrite Ropp_involutive; eapply Rle_trans; [apply Rle_abs|rewrite Rabs_Ropp; exact In]|].
     eapply Rle_trans; [apply Rle_abs|exact In]. }
