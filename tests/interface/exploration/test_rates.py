@@ -111,5 +111,5 @@ def test_the_studio_tells_times_of_results() -> None:
 
 def test_the_studio_says_that_look_ahead_chooses_for_itself() -> None:
     rows = told(jobs.side_by_side, with_hardware(pipeline="look-ahead", realization="auto"), stage=0)
-    message = 'the realization must be auto with hardware.pipeline = "look-ahead", not df1'
+    message = "hardware.realization must be 'auto' with hardware.pipeline = \"look-ahead\", not 'df1'"
     assert rows[0] == {"realization": "df1", "refused": message}
