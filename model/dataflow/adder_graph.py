@@ -117,7 +117,7 @@ def adder_graph(constants: tuple[int, ...]) -> tuple[Adder, ...]:
             levels[number] = 1 + max(levels[part] for part in split.parts)
             splits[number] = split
         wanted -= levels.keys()
-    numbers = {number: k for k, number in enumerate(levels)}
+    numbers = _in_order(splits)
     return tuple(
         Adder(
             number,
@@ -125,8 +125,27 @@ def adder_graph(constants: tuple[int, ...]) -> tuple[Adder, ...]:
             (numbers[split.parts[1]], split.shifts[1]),
             split.subtract,
         )
-        for number, split in splits.items()
+        for number in numbers
+        if number != 1
+        for split in [splits[number]]
     )
+
+
+def _in_order(splits: Mapping[int, _Split]) -> dict[int, int]:
+    """Return the numbers of the sums, each of which follows what it is made of.
+
+    One that was made on a level too high for a later constant is made again on a lower one, of later sums.
+    """
+    numbers = {1: 0}
+    for start in splits:
+        pending = [start]
+        while pending:
+            missing = [part for part in splits[pending[-1]].parts if part not in numbers]
+            if missing and pending[-1] not in numbers:
+                pending += missing[::-1]
+                continue
+            numbers.setdefault(pending.pop(), len(numbers))
+    return numbers
 
 
 def by_operand(graph: Graph, products: Iterable[int]) -> list[tuple[int, list[int]]]:

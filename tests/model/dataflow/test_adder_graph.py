@@ -124,3 +124,14 @@ def test_products_by_operand_see_through_shifts() -> None:
     nodes = [g.scale(wire, 3, 0) for wire in (x, g.shift(g.shift(x, 1), 2), y)]
     graph = g.build([x])
     assert by_operand(graph, nodes) == [(x, nodes[:2]), (y, nodes[2:])]
+
+
+def test_a_sum_that_is_made_again_on_a_lower_level_follows_what_it_is_made_of() -> None:
+    """79 is there as a long chain first; a later constant asks for it on a lower level, as 16 + 63."""
+    constants = (79, 49, -193, -27, -553, -159, 51, 1, 85, 229, 77)
+    values = [1]
+    for adder in adder_graph(constants):
+        (left, up), (right, along) = adder.left, adder.right
+        values.append((values[left] << up) + (-1 if adder.subtract else 1) * (values[right] << along))
+        assert values[-1] == adder.multiple
+    assert {odd_part(constant)[0] for constant in constants} <= {*values}
