@@ -173,7 +173,8 @@ class Forms:
             for inside in [self._atoms[monomial[0]].inside]
             if inside is not None and atoms & {atom for inner in inside for atom in inner}
         ]
-        for replaced in ([floor] for floor in floors) if len(floors) < 2 else (*([floor] for floor in floors), floors):
+        alone = [[floor] for floor in floors]
+        for replaced in alone if len(alone) < 2 else [*alone, floors]:
             gone = {monomial for monomial, _ in replaced}
             whole: Form = {m: value for m, value in form.items() if m not in gone}
             below: int | Fraction = 0
