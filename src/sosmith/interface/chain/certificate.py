@@ -173,7 +173,7 @@ class ChainCertificate:
     def check_in_rocq(
         self, progress: Progress = lambda step, done, total: None, *, seconds: float = 600.0
     ) -> RocqVerdict:
-        """Have the kernel of the proof assistant Rocq check the claims of a chain of filters at one rate.
+        """Have the kernel of the proof assistant Rocq check the claims of a chain of filters, which may decimate.
 
         Those are what it checks of each stage by itself, and that their errors add up to the bound of the chain.
 
