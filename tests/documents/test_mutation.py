@@ -138,6 +138,7 @@ def test_a_toy_is_tried(toy: Path, cache: Cache) -> None:
     assert share(entry) == 2 / 4
 
 
+@pytest.mark.slow
 def test_tests_that_fail_by_themselves_are_refused(toy: Path) -> None:
     (toy / "tests/test_toy.py").write_text(TESTS.replace("== 2", "== 3"), encoding="utf-8")
     slow = "import pytest\npytestmark = pytest.mark.slow\ndef test_nothing(): assert False\n"

@@ -198,6 +198,7 @@ def test_the_exact_filter_loses_at_the_edge_what_it_is_to_lose() -> None:
     assert -20 * np.log10(np.abs(response[0])) == pytest.approx(0.02, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_the_interval_of_a_mean_holds_it_as_often_as_it_says() -> None:
     rng = np.random.default_rng(7)
     held = [found["low"] <= 5 <= found["high"] for found in (spread(rng.normal(5, 2, 12), 0.9) for _ in range(2000))]

@@ -47,6 +47,7 @@ def test_a_trace_is_read_in_pieces(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert bytes_a_row(lambda: read_traces(path, (PORT,), Fraction(100))) < 8 + 4 + 24
 
 
+@pytest.mark.slow
 def test_a_trace_is_written_in_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(trace_file, "_WRITTEN", 1 << 10)
     trace = Trace(name="t", ports=(PORT,), sample_rate=Fraction(100), codes=np.zeros((ROWS, 1), dtype=np.int64))

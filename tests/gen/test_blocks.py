@@ -300,6 +300,7 @@ def test_twelve_poles_look_ahead_eight_samples() -> None:
     assert verify(proven(made)).bound * made.datapath.output.lsb <= made.spec.max_error
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("searches_anew", [True])
 def test_a_wrong_recursion_exceeds_its_bound(searches_anew: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """With A(w) in place of A(-w), it is another filter, which no word lengths bring within the error allowed."""

@@ -123,6 +123,7 @@ def test_each_architecture_tried_is_designed_for_itself(spec: Specification) -> 
     assert tried.reasons["realization"] == design_core(fast).reasons["realization"]
 
 
+@pytest.mark.slow
 def test_what_was_dropped_is_planned_if_nothing_else_suits(
     spec: Specification, monkeypatch: pytest.MonkeyPatch
 ) -> None:

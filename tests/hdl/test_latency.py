@@ -27,7 +27,7 @@ def taken(made: Core | FoldedCore) -> set[int]:
     return {result.clocks for result in run(made, [(k % made.channels, sample) for k, sample in enumerate(codes)])}
 
 
-@pytest.mark.sweep(3)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("make", "channels"),
     [(limiter, 1), (limiter, 3), (resonator, 1), (resonator, 2), (resonator, 8), (resonator, 17), (worn, 3)],
@@ -37,6 +37,7 @@ def test_parallel(make: Callable[[], Datapath], channels: int) -> None:
     assert taken(Core(datapath, channels)) == {parallel_clocks.latency_cycles(datapath, channels)}
 
 
+@pytest.mark.slow
 def test_a_protected_core_waits_for_a_scrub_at_most() -> None:
     """Of a sample's own channel: one has come at a clock at which it does, another at one at which it does not."""
     states = [parallel_clocks.latency_cycles(resonator(), 2, protect=protect) for protect in ("none", "correct")]

@@ -204,13 +204,14 @@ def codes_of(built: Built, beats: Beats) -> list[int]:
     return found
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 def test_without_an_upset_it_is_the_model(built: Built) -> None:
     (beats,) = beats_of(built, [Hit(built.target.places[0], 0, 0, -1, -1)])
     assert codes_of(built, beats) == from_reset(built, 0)
     assert not (beats.tuser & FAULT).any()
 
 
+@pytest.mark.sweep(1)
 def test_no_upset_in_a_memory_is_silent(built: Built) -> None:
     memories = built.target.memories
     case = built.case

@@ -41,6 +41,7 @@ def status(datapath: Datapath, channel: int, codes: Sequence[int]) -> int:
 RANGES = [((6, 24), (-5, 4)), ((1, 30), (-7, 6)), ((0, 24), (-5, 7)), ((6, 31), (-8, 4)), (A, B)]
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("calibrated", RANGES)
 def test_the_software_at_the_ends_of_every_range(calibrated: tuple[Ends, Ends]) -> None:
     datapath = adder(calibrated, ((10, 20),))
@@ -63,7 +64,7 @@ def test_the_hardware_at_the_ends_of_every_range(calibrated: tuple[Ends, Ends], 
     assert [result.status for result in found] == [status(datapath, 0, sample) for sample in codes]
 
 
-@pytest.mark.sweep(3)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("architecture", ["parallel", "folded", "serial"])
 @pytest.mark.parametrize("limits", [((-3, 5),), ((-3, 5), (0, 9), (-7, 15))])
 def test_the_hardware_at_the_limits_of_wear(limits: tuple[Ends, ...], architecture: str) -> None:

@@ -69,7 +69,7 @@ def step_of(datapath: Datapath, folder: Path) -> Any:
     return step
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("architecture", ["parallel", "folded", pytest.param("serial", marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
     ("channels", "limits", "start", "protect"),

@@ -187,6 +187,7 @@ def test_frames_that_make_no_sense_end_in_a_typed_error(script: list[bytes]) -> 
         Board.on(ScriptedLine(Message(0x81, 0, bytes([1, 4, 0])).frame, *script))
 
 
+@pytest.mark.slow
 @given(st.lists(st.one_of(FRAMES, st.binary(max_size=99)), max_size=40))
 def test_between_good_responses_nonsense_changes_nothing(noise: list[bytes]) -> None:
     made = filter_design()

@@ -249,7 +249,7 @@ def test_packed_results_of_a_board_that_measures() -> None:
     assert numbers == list(range(len(numbers)))
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [0.99, 1.01])
 def test_times_follow_a_board_whose_clock_is_wrong(factor: float) -> None:
     clock = Time()

@@ -220,6 +220,7 @@ def test_files_and_certificate(tmp_path: Path) -> None:
     assert saved.text() == design.certificate.text()
 
 
+@pytest.mark.slow
 @unpainted
 def test_co_simulation(tmp_path: Path) -> None:
     design = instrument_design()

@@ -31,7 +31,7 @@ def test_no_error_exceeds_the_bound(seed: int) -> None:
     assert 0 < largest_error(results, codes, drawn) <= bound
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", CASES)
 def test_certificate_and_files_are_proven(seed: int, tmp_path: Path) -> None:
     drawn = draw(seed)

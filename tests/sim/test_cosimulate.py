@@ -72,6 +72,7 @@ def test_a_broken_core_is_found(what: str, tmp_path: Path) -> None:
         run(source, stimulus(), build_dir=tmp_path, simulator="icarus", idle=0.5, stall=0.5)
 
 
+@pytest.mark.slow
 def test_a_wrong_bit_comes_through_as_it_is(tmp_path: Path) -> None:
     """Values are not the bench's business: whoever has the integer model compares."""
     source = write(tmp_path, SOUND.replace("+ 16'sd3", "+ 16'sd2"))

@@ -68,7 +68,7 @@ def run_of(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, str], Run
     return run
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("example", ALL)
 def test_the_kinds_are_those_of_the_designs(example: str) -> None:
     assert KIND[example] == bench_of(parallel_design(example), errors=False).kind

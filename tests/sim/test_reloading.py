@@ -208,7 +208,7 @@ def test_first_samples_are_held_through_reloads(architecture: str, example: str,
     assert [word for _, word in outcome["received"]] == expected(made, outcome, chosen)
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("architecture", "example", "channels", "count"), COUNTS)
 def test_reloads_at_any_moment(architecture: str, example: str, channels: int, count: int, tmp_path: Path) -> None:
     made = hardware_in(architecture, example, channels)

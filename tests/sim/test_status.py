@@ -45,6 +45,7 @@ def made_in(folder: Path, architecture: str) -> CoreDesign:
     return design_core(replace(spec, output=replace(spec.output, lsb=spec.output.lsb / 4), hardware=hardware))
 
 
+@pytest.mark.slow
 def test_the_range_is_that_of_the_measurements(tmp_path: Path) -> None:
     made = made_in(tmp_path, "parallel")
     assert made.fit is not None
@@ -68,7 +69,7 @@ def test_judging_the_range_takes_clocks_that_count(tmp_path: Path) -> None:
             design_core(replace(made.spec, hardware=hardware))
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("architecture", ["parallel", "folded", "serial"])
 def test_every_flag_is_seen_and_right(architecture: str, tmp_path: Path) -> None:
     made = made_in(tmp_path, architecture)

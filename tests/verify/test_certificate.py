@@ -198,7 +198,7 @@ def test_verification_has_nothing_in_common_with_the_proof() -> None:
 # Any number that matters.
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("realization", ["df1_ef2", "delta"])
 def test_one_unit_off_in_any_number_is_rejected(realization: str) -> None:
     tree = tree_of(BENCH, realization)

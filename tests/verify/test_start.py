@@ -55,6 +55,7 @@ def test_examples(name: str) -> None:
     proven(design.quantized, design.spec.max_error)
 
 
+@pytest.mark.slow
 def test_a_range_without_zero_and_a_gain_that_is_not_1() -> None:
     proven(plain(ripple(), inputs=CURRENT, output=Port.from_range("y", 12, Fraction(4), Fraction(20)), steady=True))
 
@@ -72,6 +73,7 @@ def tree_of(spec: str = STEADY) -> Any:
     return json.loads(text_of(spec))
 
 
+@pytest.mark.slow
 def test_one_unit_off_in_any_number_is_rejected() -> None:
     tree = tree_of(STEADY_INSTRUMENT)
     chosen = all_edits(tree)
@@ -237,11 +239,12 @@ def test_parallel_hardware(realization: str, channels: int) -> None:
     small_parallel(STEADY, realization, channels).check()
 
 
+@pytest.mark.slow
 def test_parallel_hardware_of_an_example() -> None:
     parallel(steady_design("audio_lowpass.toml", architecture="parallel")).check()
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("architecture", ["folded", "serial"])
 def test_programs(architecture: str) -> None:
     small_folded(STEADY, architecture).check()

@@ -73,6 +73,7 @@ def test_add_as_json() -> None:
     assert len(made["largest_residuals"]) == 5
 
 
+@pytest.mark.slow
 def test_add_tells_the_shift_and_a_step_of_the_voltage() -> None:
     first = good("add", "a.csv", *DAY)
     assert "health   no alarm; the first day, held against nothing" in first.stdout
@@ -217,6 +218,7 @@ def test_a_refused_first_file_leaves_no_store() -> None:
         assert len(opened.measurements("sensor")) == 60
 
 
+@pytest.mark.slow
 def test_a_store_that_another_process_makes_meanwhile_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     """The file is read before the store is opened, and checked against it again once it is."""
 
@@ -244,6 +246,7 @@ def test_one_of_them_is_no_plural() -> None:
     assert "sosmith: stored 1 measurement from one.csv in calibration.db, 1 row skipped\n" in result.stderr
 
 
+@pytest.mark.slow
 def test_a_shortfall_keeps_the_measurements_and_says_so() -> None:
     message = (
         "calibration.db, sensor sensor: adjusted r must reach 0.99999 with a polynomial up to order 6, not at most "
@@ -389,6 +392,7 @@ def test_a_bayesian_calibration_says_what_it_is_worth() -> None:
     assert "2, 1 bayes" in good("history").stdout
 
 
+@pytest.mark.slow
 def test_a_fit_with_a_curve_in_its_residuals_is_warned_of() -> None:
     """The linear polynomial that reaches r = 0.975 misses the curve of the sensor."""
     warned = good("add", "a.csv", *DAY, *PAPER)
@@ -434,6 +438,7 @@ def test_the_type_of_a_sensor_is_kept() -> None:
     assert "2 of 2" in good("history", "--verify").stderr
 
 
+@pytest.mark.slow
 def test_advice_reaches_what_it_promises() -> None:
     good("add", "a.csv", *DAY)
     call = ("advise", "2mm", "4 mm", "--within", "0.05mm", "--temperature", "60", "--date", "2024-03-02")
@@ -478,6 +483,7 @@ def test_a_sensor_mounted_anew_raises_an_alarm_until_it_is_accepted() -> None:
     assert good("health", "--since", "2024-03-11").stdout.startswith("Sensor sensor: no alarm; 2 days on the charts")
 
 
+@pytest.mark.slow
 def test_health_says_which_measurements_it_leaves_out() -> None:
     """Those of `add` are others: off the polynomial of all days."""
     for number, month in enumerate(("march", "april"), start=3):
@@ -488,6 +494,7 @@ def test_health_says_which_measurements_it_leaves_out() -> None:
     assert re.search(r"; \d+ of 90 measurements left out, off the plane of their own day", shown)
 
 
+@pytest.mark.slow
 def test_an_export_carries_what_the_calibration_is_worth(tmp_path: Path) -> None:
     good("add", "a.csv", *DAY)
     table = tomllib.loads(good("export").stdout)["calibration"]

@@ -73,6 +73,7 @@ def test_a_filter_does_for_every_channel_of_a_trace_or_for_those_chosen() -> Non
     refused("two.csv must have rows of channel 2, not only of 0, 1", "two.csv", "--channel", "2")
 
 
+@pytest.mark.slow
 def test_the_copy_of_a_specification_designs_to_what_was_proposed() -> None:
     proposal = json.loads(good("ramp.csv", "--into", "my.toml", "--json").stdout)["proposal"]
     printed = good("ramp.csv", "--into", "my.toml", "-o", "out/new.toml")
@@ -148,6 +149,7 @@ def test_refusals() -> None:
     assert not Path("f.toml").exists()
 
 
+@pytest.mark.slow
 def test_a_specification_with_measurements_is_copied_beside_them_only() -> None:
     text = re.sub(r"coefficients = \[.*?\n\]\n", 'data = "m.csv"\n', example(), flags=re.DOTALL)
     Path("data.toml").write_text(text)
@@ -161,6 +163,7 @@ def test_a_specification_with_measurements_is_copied_beside_them_only() -> None:
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_no_filter_needed_is_a_shortfall() -> None:
     result = run("ramp.csv", "--tolerance", "5", "-o", "none.toml")
     assert "0.4 mm at 1.5 Hz" in result.stdout

@@ -64,6 +64,7 @@ def test_details_show_modes_motions_and_the_paper() -> None:
     assert re.search(r"7  yaw, wheelset 1 to bogie 1  rad  0.012578  0.0\d+  differs  4", shown)
 
 
+@pytest.mark.slow
 def test_the_linear_model_tells_what_it_exceeds() -> None:
     result = good("short.toml", "--model", "linear")
     assert "smooth track, linear contacts" in result.stdout
@@ -140,6 +141,7 @@ def test_a_plot_is_the_same_bytes_every_time(name: str) -> None:
     assert Path(name).read_bytes() == first
 
 
+@pytest.mark.slow
 def test_a_tangent_track_can_be_within_the_limits() -> None:
     text = Path("short.toml").read_text().replace("irregularity = { value = 0.02,", "irregularity = { value = 0.002,")
     Path("calm.toml").write_text(text)

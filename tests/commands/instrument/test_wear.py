@@ -119,6 +119,7 @@ def test_a_specification_in_another_unit_is_refused() -> None:
     refused("um.toml: output.unit must be 'mm' for --spec, not 'um'", "days.csv", "--spec", "um.toml")
 
 
+@pytest.mark.slow
 def test_plots() -> None:
     for name in ("a.svg", "b.svg", "c.png"):
         assert f"sosmith: wrote {name}\n" in good("days.csv", *LIMITS, "--plot", name).stderr
@@ -204,6 +205,7 @@ def test_an_error_of_a_day_goes_with_a_risk() -> None:
     refused("--day-error must go with --risk, not without it", "days.csv", *LIMITS, "--day-error", "0.1")
 
 
+@pytest.mark.slow
 def test_the_known_sum_of_an_axle_narrows_both_wheels() -> None:
     errors = [0.2 * (-1) ** (k // 2) for k in range(40)]
     rows = [f"{k},{2 + 0.05 * k + off:.6g},{3 + 0.05 * k + off:.6g},{5 + 0.1 * k:.6g}" for k, off in enumerate(errors)]

@@ -72,6 +72,7 @@ def test_hardware_with_room_takes_the_curves_of_all_sensors(record: dict[str, An
         assert all(reason.endswith(f"; {ROOM}") for reason in row["reasons"])
 
 
+@pytest.mark.slow
 def test_the_tables_of_the_first_curve_are_those_of_the_record(record: dict[str, Any], tmp_path: Any) -> None:
     spec = day_table.specification(next(day_table.curves()), tmp_path)
     core = day_table.normalised_curve(spec)

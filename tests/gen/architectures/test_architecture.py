@@ -53,7 +53,7 @@ def test_the_smallest_that_keeps_up_is_taken() -> None:
     )
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("board", "architecture", "there"),
     [

@@ -73,6 +73,7 @@ def loaded(room: Fraction | None, polynomial: Polynomial) -> OtherSet:
     ).new_set
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("room", [Fraction(1, 4), Fraction(1)])
 def test_hardware_with_room_takes_every_curve_within_it(room: Fraction) -> None:
     """The products of Chebyshev polynomials have the largest coefficients of all that are as small."""

@@ -88,6 +88,7 @@ def source_of(item: BoardItem, folder: Path) -> Path:
     return source
 
 
+@pytest.mark.slow
 def test_every_sample_has_a_result(chain: sosmith.Chain, tmp_path: Path) -> None:
     """What stands in the board, with random handshakes; the bench compares all copies of a result."""
     item, factor = chain_item(chain.core), chain.factor

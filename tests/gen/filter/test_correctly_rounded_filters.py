@@ -62,7 +62,7 @@ def cases() -> list[tuple[str, str, int, tuple[str, ...]]]:
     return found
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("family", FAMILIES)
 def test_poles_are_scipys(family: str) -> None:
     """Symmetric functions of all poles, which do not depend on how they are paired."""
@@ -85,7 +85,7 @@ def gain(made: Filter, frequency: Fraction) -> arb:
     return abs(value)
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("family", FAMILIES)
 def test_edges_are_where_the_family_has_them(family: str) -> None:
     """The loss at the cutoff is the family's by definition, up to what a rounding of the coefficients moves it."""
@@ -124,6 +124,7 @@ def test_coefficients_are_the_nearest_doubles() -> None:
             assert distance <= abs(exact - math.nextafter(value, -math.inf))
 
 
+@pytest.mark.slow
 def test_structure_is_exact() -> None:
     assert designed("butterworth", "lowpass", 2, ("0.25",)).rows[0][4] == 0.0
     assert designed("butterworth", "lowpass", 1, ("0.25",)).rows == ((0.5, 0.5, 0.0, 1.0, 0.0, 0.0),)

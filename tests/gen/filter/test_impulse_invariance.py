@@ -126,6 +126,7 @@ def test_agrees_with_scipy_where_scipy_is_exact() -> None:
         assert np.abs(ours - signal.freqz(theirs[0][0], theirs[1], worN=w)[1]).max() < 1e-12
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(("family", "order", "cutoff"), ALL_POLE)
 def test_the_aliasing_is_that_of_the_poisson_sum(family: str, order: int, cutoff: float) -> None:
     """The response is the sum of the analog one over all multiples of the sample rate, for an h_a that starts at 0."""
@@ -185,6 +186,7 @@ def test_the_design_says_what_it_is() -> None:
     assert made.aliasing.max_deviation < 1e-6
 
 
+@pytest.mark.slow
 def test_from_the_specification_to_the_manifest(tmp_path: Path) -> None:
     text = (EXAMPLES / "audio_lowpass.toml").read_text(encoding="utf-8").replace("bilinear", "impulse_invariant")
     path = tmp_path / "spec.toml"
@@ -202,7 +204,7 @@ def test_from_the_specification_to_the_manifest(tmp_path: Path) -> None:
     assert f"at most {deviation} % of the gain, {dc} % at zero frequency" in shown
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("family", "order", "cutoff", "realization"),
     [

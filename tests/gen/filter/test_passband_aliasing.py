@@ -62,6 +62,7 @@ def test_ripple_and_correction_count() -> None:
     assert 0 < larger < len(SEEDS)
 
 
+@pytest.mark.slow
 def test_a_sine_through_the_chain() -> None:
     specification = sosmith.Specification.load(
         {

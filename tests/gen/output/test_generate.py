@@ -39,6 +39,7 @@ def test_two_runs_write_the_same_bytes(name: str, tmp_path: Path) -> None:
         assert path.read_bytes() == (tmp_path / "two" / path.name).read_bytes()
 
 
+@pytest.mark.slow
 def test_manifest_says_what_the_contract_asks(tmp_path: Path) -> None:
     design = example_design("flange_wear_locomotive.toml")
     generate(design, tmp_path)

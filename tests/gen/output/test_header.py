@@ -15,7 +15,7 @@ from sosmith.gen.output.generate import generated
 from sosmith.gen.output.header import with_comments
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
 
-CASES = ["flange_wear_bench.toml", "audio_lowpass.toml"]
+CASES = ["audio_lowpass.toml", "flange_wear_bench.toml"]
 """One in the parallel architecture, one folded."""
 
 

@@ -16,6 +16,7 @@ def test_a_unit_is_spelled(unit: str, spelled: str) -> None:
     assert in_ascii(unit) == spelled
 
 
+@pytest.mark.slow
 def test_a_core_with_such_a_unit_is_proven_with_its_files(tmp_path: Path) -> None:
     sos = [[0.5, 0.5, 0.0, 1.0, -0.5, 0.0]]
     spec = sosmith.Specification.from_sos(sos, 1000, input_bits=6, architecture="serial", unit="µm*/°")

@@ -75,7 +75,7 @@ def test_plain_direct_form_is_stuck() -> None:
         assert 0 < amplitude <= limit_cycles(graph).largest
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("realization", ["df1_ef1", "df1_ef2"])
 @pytest.mark.parametrize("level", [1000.3, -7.5, 0.7])
 def test_error_feedback_follows_a_constant(realization: str, level: float) -> None:
@@ -85,7 +85,7 @@ def test_error_feedback_follows_a_constant(realization: str, level: float) -> No
     assert max(abs(y - level) for y in settled) <= 0.7 + 1 / 1024
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("realization", ["df1_ef1", "df1_ef2"])
 def test_error_feedback_comes_to_rest_within_an_lsb(realization: str) -> None:
     graph = graph_of(realization, section_0(), 8)
@@ -107,6 +107,7 @@ def test_exhaustive_search_stays_within_the_bound(realization: str, bits: int) -
     assert found.amplitude <= (0 if told.none else told.largest)
 
 
+@pytest.mark.slow
 def test_what_the_search_finds() -> None:
     """The dead band of a plain direct form holds whole LSBs up to its edge; truncated magnitudes hold none."""
     graph = graph_of("df1", SECTION, 5)

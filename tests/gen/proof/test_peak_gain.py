@@ -164,6 +164,7 @@ def test_brute_force_and_the_second_method_agree(cascade: list[Section]) -> None
     assert closer.gain - 2 * closer.error < found < closer.gain * (1 + Fraction(1, 2**20)) + Fraction(1, 2**30)
 
 
+@pytest.mark.slow
 @given(st.floats(-2, 2), st.floats(-1, 1))
 @settings(max_examples=200)
 def test_radii_lie_just_above_the_poles(a1: float, a2: float) -> None:

@@ -159,7 +159,7 @@ def test_the_uncertainty_of_a_sum_is_what_it_was(name: str, uncertainties: tuple
     assert [float(one.uncertainty) for one in found] == pytest.approx(list(uncertainties), rel=1e-9, abs=0)
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("accuracy", [40, 128])
 @pytest.mark.parametrize("name", DENOMINATORS)
 def test_the_largest_sum_up_to_any_sample(name: str, accuracy: int) -> None:

@@ -277,7 +277,7 @@ def evaluated(polynomial: tuple[Fraction, ...], w: Complex) -> Complex:
 # Rounding noise.
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "order", "cutoff"),
     [("lowpass", 3, 0.02), ("lowpass", 5, 0.1), ("highpass", 3, 0.05), ("bandpass", 1, 0.05), ("lowpass", 7, 0.2)],

@@ -116,7 +116,7 @@ def test_exact_noise_gains_are_the_closed_forms(realization: str, cutoff: float)
     assert found == pytest.approx(expected, rel=1e-5)
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("realization", "cutoff"), CASES)
 def test_measured_noise_is_that_of_the_closed_forms(realization: str, cutoff: float) -> None:
     """Mean square of the integer model minus the same transfer function in double precision, within 0.2 dB."""

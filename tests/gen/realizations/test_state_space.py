@@ -162,7 +162,7 @@ def test_energy_is_that_of_the_impulse_response(name: str) -> None:
     assert companion(row).energy == pytest.approx(np.sum(response**2), rel=1e-6)
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("structure", JENSSEN)
 def test_published_noise_of_a_cascade(structure: str) -> None:
     """The published figures again: gain and estimate to the last printed digit, simulation within a tenth.
@@ -191,6 +191,7 @@ def coarse(row: Row, realization: str, *, bits: int = 24) -> StateSpace:
     return stage
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cutoff", [*CUTOFFS[:-1], 0.2])
 def test_measured_noise_is_the_predicted_one(cutoff: float) -> None:
     """A section with whole-numbered states: its output minus that of exact arithmetic, within 0.2 dB.
@@ -246,7 +247,7 @@ def cycles(graph: Graph, reach: int) -> set[tuple[int, ...]]:
     return found
 
 
-@pytest.mark.sweep(4)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*POLES, *REAL_POLES])
 @pytest.mark.parametrize("bits", [6, 12])
 def test_truncated_states_come_to_rest_and_rounded_ones_do_not(name: str, bits: int) -> None:
@@ -273,7 +274,7 @@ def test_energy_of_a_truncated_section_falls(name: str) -> None:
     assert first * second > mixed * mixed
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("realization", "silent"), [("normal", True), ("df1", False), ("state_space", False)])
 def test_output_is_silent_after_the_input(realization: str, silent: bool) -> None:
     section, *_ = plain(butterworth(2, 0.01), realization).sections

@@ -216,7 +216,7 @@ def test_output_without_the_newest_input(row: Row, realization: str) -> None:
     quantized.datapath.compute_exact(codes[6000:9000])
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("realization", ["df2t", "delta"])
 @pytest.mark.parametrize(
     "row",

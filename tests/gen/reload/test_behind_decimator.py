@@ -61,7 +61,7 @@ def hardware(text: str) -> CoreDesign:
     return design_core(read(text))
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "old", "new"),
     [

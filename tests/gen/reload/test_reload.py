@@ -119,6 +119,7 @@ def test_a_program_takes_over_at_any_sample(example: str) -> None:
     assert interpreted(hardware, [(0, first), (38, one.program), *swaps[2:]], codes) != expected
 
 
+@pytest.mark.slow
 def test_a_set_that_settles_too_slowly_is_refused() -> None:
     """The hardware counts to three times the length with its own filter, and no further."""
     hardware = hardware_in("parallel")
@@ -244,6 +245,7 @@ def test_a_realization_that_changes_its_coefficients_is_refused(monkeypatch: pyt
         own_set(hardware)
 
 
+@pytest.mark.slow
 def test_a_swap_in_the_parallel_architecture_has_one_bit_of_room() -> None:
     hardware = hardware_in("parallel")
     own, wide = own_set(hardware), 4 * hardware.spec.max_error

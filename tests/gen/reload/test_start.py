@@ -53,7 +53,7 @@ def during(made: CoreDesign, active: Quantized, other: Quantized) -> Datapath:
     return with_ranges(other.datapath, [*[{}] * before, held_codes(other, held), *found, {}])
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("example", ["audio_lowpass", "flange_wear_bench"])
 def test_nothing_leaves_its_range_whatever_is_held(example: str) -> None:
     """First samples, and all others, at the ends of the codes: before, during and after swaps there and back."""

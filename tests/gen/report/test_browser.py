@@ -63,7 +63,7 @@ def _accuracy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("width", "dark"), [(390, False), (1200, False), (1200, True)])
 def test_comparison(tab: Tab, comparison: Path, width: int, dark: bool) -> None:
     tab.show(comparison, width, dark=dark)

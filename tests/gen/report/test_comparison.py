@@ -171,6 +171,7 @@ def test_what_differs() -> None:
     assert differences([report(), report()]) == []
 
 
+@pytest.mark.slow
 def test_differences_are_rows_and_designs_columns() -> None:
     page = comparison_page([report(), report(realization="df1")])
     cells = '<td class="piece">df1_ef2</td><td class="piece">df1</td>'

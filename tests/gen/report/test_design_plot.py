@@ -8,7 +8,7 @@ from tests.gen.designs import example_design
 from sosmith.gen.report.design_plot import design_plot
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("core", "titles"),
     [

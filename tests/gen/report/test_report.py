@@ -81,7 +81,7 @@ def build(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
 # the summary
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 def test_summary_has_the_keys_of_the_contract(built: tuple[str, Path, dict[str, Any]]) -> None:
     """CONTRACT.md, section "The report"."""
     _, directory, _ = built
@@ -179,6 +179,7 @@ def test_accuracy_is_null_where_it_has_no_meaning(changes: dict[str, Any]) -> No
     assert measured == {"unfiltered": None, "golden": None, "hardware": None}
 
 
+@pytest.mark.slow
 @without_pictures
 def test_json_has_no_infinities(tmp_path: Path) -> None:
     """Hardware equal to golden has no finite ratio of signal to error."""
@@ -501,7 +502,7 @@ def test_measures_are_taken_everywhere_and_at_every_edge() -> None:
 # the page
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 def test_same_evidence_gives_the_same_bytes(built: tuple[str, Path, dict[str, Any]], tmp_path: Path) -> None:
     case, directory, _ = built
     write_report(CASES[case](), tmp_path)
@@ -545,6 +546,7 @@ def test_every_colour_of_a_figure_follows_the_page(built: tuple[str, Path, dict[
         assert style.count(f"--{role}:") == 2
 
 
+@pytest.mark.sweep(1)
 def test_page_says_the_verdict_first(built: tuple[str, Path, dict[str, Any]]) -> None:
     case, directory, _ = built
     content = (directory / "report.html").read_text(encoding="utf-8")
@@ -615,6 +617,7 @@ def test_a_dollar_sign_in_a_figure_is_no_formula() -> None:
     assert "output in $x^2$" in Page(page_of(evidence(output=replace(OUTPUT, unit="$x^2$")))).words
 
 
+@pytest.mark.slow
 @without_pictures
 def test_page_shows_what_rounding_keeps_up() -> None:
     words = " ".join(Page(page_of(evidence())).words).replace("\u00a0", " ")
@@ -646,6 +649,7 @@ def test_this_design_is_not_its_own_alternative() -> None:
     assert page_of(evidence(alternatives=(*known, itself))) == page_of(evidence())
 
 
+@pytest.mark.sweep(1)
 @without_pictures
 @pytest.mark.parametrize(("length", "unfolded"), [(24, True), (25, False)])
 def test_many_formats_are_folded_up(length: int, unfolded: bool) -> None:
@@ -656,7 +660,7 @@ def test_many_formats_are_folded_up(length: int, unfolded: bool) -> None:
     assert (("open", "") in page.attributes) == unfolded
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("length", [1, 2, 7])
 def test_a_handful_of_samples_makes_a_page(length: int) -> None:
     run = plain(time=np.arange(float(length)), golden=np.zeros(length), hardware=np.zeros(length))
@@ -699,6 +703,7 @@ def test_close_up_holds_the_largest_error() -> None:
 # files
 
 
+@pytest.mark.slow
 @without_pictures
 def test_a_page_that_fails_leaves_the_old_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Neither file is written before both are made."""
@@ -714,6 +719,7 @@ def test_a_page_that_fails_leaves_the_old_report(tmp_path: Path, monkeypatch: py
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
+@pytest.mark.slow
 @without_pictures
 def test_the_verdict_tells_the_signal_from_the_arithmetic() -> None:
     run = evidence()
@@ -727,6 +733,7 @@ def test_the_verdict_tells_the_signal_from_the_arithmetic() -> None:
     assert "from the true value, and" not in render_page(unknown, summarise(unknown))
 
 
+@pytest.mark.sweep(1)
 @without_pictures
 @pytest.mark.parametrize("off", [0, 1])
 def test_a_bound_of_zero_is_told(off: int) -> None:
@@ -837,6 +844,7 @@ def test_the_worst_channel_has_the_largest_error_of_either_sign() -> None:
     assert several.run.of_channel(1).worst_channel == 0
 
 
+@pytest.mark.slow
 @without_pictures
 def test_several_channels_are_measured_together_and_the_worst_is_shown() -> None:
     one = evidence()

@@ -360,7 +360,7 @@ def assert_loads_or_is_refused(path: Path) -> None:
 
 
 hypothesis_settings = settings(
-    max_examples=300,
+    max_examples=120,
     database=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )

@@ -46,7 +46,7 @@ def case(name: str, realization: str) -> Any:
     return pytest.param(name, realization, marks=[pytest.mark.slow] if long else [])
 
 
-@pytest.mark.sweep(3)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(("name", "realization"), [case(*each) for each in product(ALL, SECTIONS)])
 def test_examples_stay_within_their_bound(name: str, realization: str) -> None:
     design = example_design(name, realization=realization)
@@ -95,7 +95,7 @@ def test_parts_of_the_instrument(core: str) -> None:
     assert quantized.datapath.compute(codes[:2000]).tolist() == quantized.datapath.compute_exact(codes[:2000])
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("inputs", "output"),
     [
@@ -113,6 +113,7 @@ def test_any_input_and_output_range(inputs: Port, output: Port) -> None:
     assert quantized.datapath.compute(codes[:2000]).tolist() == quantized.datapath.compute_exact(codes[:2000])
 
 
+@pytest.mark.slow
 def test_two_products_make_a_low_pass_section() -> None:
     quantized = plain(butterworth(5, 0.02))
     assert [len(section.products) for section in quantized.sections] == [1, 2, 2]
@@ -149,7 +150,7 @@ INTEGER_ROWS = {
 }
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("realization", CASCADES)
 @pytest.mark.parametrize("name", INTEGER_ROWS)
 def test_a_section_of_whole_numbers_rounds_nothing(name: str, realization: str) -> None:
@@ -161,6 +162,7 @@ def test_a_section_of_whole_numbers_rounds_nothing(name: str, realization: str) 
     assert quantized.datapath.compute(codes[6500:8500]).tolist() == quantized.datapath.compute_exact(codes[6500:8500])
 
 
+@pytest.mark.slow
 def test_a_state_that_copies_another_keeps_all_its_bits() -> None:
     """In normal form a real pole and two zeros make a second state that is the first one, a sample ago."""
     ideal = with_rows(butterworth(2, 0.1), [(0.25, 0.1, 0.25, 1.0, -0.4, 0.0), butterworth(2, 0.1).rows[0]])

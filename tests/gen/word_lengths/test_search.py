@@ -209,7 +209,7 @@ def test_no_further_step_both_fits_and_saves(kind: str, order: int, cutoff: floa
     ] == []
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_no_further_step_is_left_where_a_calibration_comes_first(name: str) -> None:
     trimmed, made = trimmed_and_proven(name, "df1_ef2")
@@ -271,7 +271,7 @@ def test_the_gain_at_zero_frequency_stays_exactly_one(order: int, cutoff: float,
         assert sum(model.transfer) == sum(model.denominator)
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("realization", CASCADES)
 def test_the_same_words_are_found_again(realization: str) -> None:
     first, second = (filter_plan("bandpass", 2, 0.1, realization).trimmed() for _ in range(2))
@@ -349,14 +349,14 @@ def count_fallbacks(monkeypatch: pytest.MonkeyPatch) -> list[Plan]:
     return seen
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.slow
 @pytest.mark.parametrize("realization", CASCADES)
 def test_words_that_fit_need_no_second_way(realization: str, fallbacks: list[Plan]) -> None:
     prove(filter_plan("lowpass", 5, 0.02, realization).trimmed())
     assert fallbacks == []
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("realization", CASCADES)
 def test_an_estimate_that_is_too_low_is_made_up_for(
     realization: str, fallbacks: list[Plan], monkeypatch: pytest.MonkeyPatch
@@ -381,7 +381,7 @@ def unstable(choice: Choice) -> Choice:
     )
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("realization", CASCADES)
 @pytest.mark.parametrize("spoilt", [too_short, unstable])
 def test_a_search_that_finds_no_good_words_is_done_without(

@@ -32,7 +32,7 @@ def error(made: Quantized, codes: np.ndarray) -> float:
     return float(np.abs(datapath.output.decode(datapath.compute(codes)) - exact).max() / float(datapath.output.lsb))
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("realization", SECTIONS)
 @pytest.mark.parametrize("kind", ["lowpass", "highpass", "bandpass", "bandstop"])
 def test_error_and_ranges_of_every_realization(kind: str, realization: str) -> None:
@@ -50,7 +50,7 @@ def test_error_and_ranges_of_every_realization(kind: str, realization: str) -> N
         assert made.datapath.compute_exact(codes) == made.datapath.compute(codes).tolist()
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("inputs", [SIGNED, CURRENT], ids=["signed", "offset"])
 def test_the_worst_inputs_reach_the_ranges_of_all_states(inputs: Port) -> None:
     """After a first sample at one end of the range, the sign pattern of a state's response: no state has spare bits."""
@@ -74,7 +74,7 @@ def test_the_worst_inputs_reach_the_ranges_of_all_states(inputs: Port) -> None:
     assert min(used.values()) > 0.98
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("inputs", [SIGNED, CURRENT], ids=["signed", "offset"])
 def test_a_gain_that_is_not_1_is_rounded_within_a_share_of_the_error(inputs: Port) -> None:
     output = OUT if inputs is SIGNED else replace(CURRENT, name="y")
@@ -139,6 +139,7 @@ def test_no_false_wear_flag_in_ten_thousand_starts_and_a_true_one_at_once() -> N
     assert above["zero"] > 100
 
 
+@pytest.mark.slow
 def test_another_realization_keeps_the_start() -> None:
     made = steady_design("audio_lowpass.toml").quantized
     other = with_realization(made, "df1_ef1")

@@ -182,7 +182,7 @@ def stimuli(quantized: Quantized, seed: int) -> Iterator[np.ndarray]:
     yield np.repeat(heights, min(settle, 200_000))
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.slow
 @pytest.mark.parametrize("numbered", ALL, indirect=True)
 def test_no_input_exceeds_the_certificate(numbered: tuple[int, Quantized]) -> None:
     number, quantized = numbered

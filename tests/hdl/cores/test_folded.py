@@ -296,7 +296,7 @@ def taken_over(model: Model, programs: tuple[Program, Program], samples: list[Sa
     raise AssertionError("a program that was loaded must take over")
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("serial", "count", "protect"),
     [(False, 16, "none"), (False, 17, "none"), (True, 15, "correct"), (False, 18, "detect")],
@@ -329,6 +329,7 @@ def test_another_program_takes_over_between_two_samples(serial: bool, count: int
     simulate(dut, testbench)
 
 
+@pytest.mark.slow
 def test_a_program_that_judges_inputs_takes_over_from_one_that_does_not() -> None:
     datapath = lowpass(5)
     plain = program(datapath, 3, spare_words=8)
@@ -355,7 +356,7 @@ def loading(version: int, words: list[int]) -> list[tuple[Register, int]]:
     return [(VERSION, version), *((DATA, word) for word in words), (CRC, crc_of(version, words))]
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("channels", "count"), [(1, 33), (3, 40)])
 def test_the_scrubber_mends_all_words_while_the_core_waits(channels: int, count: int) -> None:
     """One bit of every word of both memories at a time, also the last instruction and words that are not used."""

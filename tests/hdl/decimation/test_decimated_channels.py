@@ -62,7 +62,7 @@ def expected(made: Architecture, samples: list[tuple[int, list[int]]]) -> list[t
     return results
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "before", "core"),
     [
@@ -84,7 +84,7 @@ def test_results_equal_the_model(name: str, before: str, core: str, hold: bool) 
     assert run_core(made, samples, Pace(idle=0.1, stall=0.9), results=len(wanted)) == wanted
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "before", "core"),
     [

@@ -75,7 +75,7 @@ def test_other_filters(kind: str, order: int) -> None:
     check(made(kind, order), 100, Pace())
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("realization", "bits"), [("df1", 16), ("df1", 24), ("df1_ef2", 16)])
 def test_latency_and_interval_are_as_stated(realization: str, bits: int) -> None:
     architecture = audio(realization, bits=bits)
@@ -157,7 +157,7 @@ def test_what_a_reset_leaves_behind_is_found(monkeypatch: pytest.MonkeyPatch) ->
     assert any(results != datapath.compute_exact(codes) for results in found)
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("bits", [16, 24])
 def test_a_very_low_cutoff_takes_no_more_clocks(bits: int) -> None:
     """By area alone, its sections would get inputs of more fraction bits than outputs: 9 clocks, and fewer units."""

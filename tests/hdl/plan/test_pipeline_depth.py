@@ -40,6 +40,7 @@ def test_what_depends_on_older_states_alone_is_computed_before_the_rest() -> Non
     assert [stages[name] for name in ("product_A1", "product_A2")] == [2, 1]
 
 
+@pytest.mark.slow
 def test_what_a_tap_sum_dropped_is_added_a_stage_before_it_is_a_state() -> None:
     (stage,) = (one for one in plain(butterworth(3, 0.05), "df1_ef2").datapath.stages if one.name == "section1")
     graph, planned = stage.graph, pipeline_stages(stage.graph)

@@ -103,6 +103,7 @@ def test_too_many_outliers_are_refused() -> None:
         fitted(Measurements(clearance, rows.voltage, rows.temperature, "m.csv", rows.days))
 
 
+@pytest.mark.slow
 def test_a_days_curve_that_leaves_the_range_falls_back_to_the_posterior() -> None:
     rows = measured(8, 60, scatter=0.05, systematic=0.2, seed=2)
     made = fitted(rows)
@@ -116,6 +117,7 @@ def test_a_days_curve_that_leaves_the_range_falls_back_to_the_posterior() -> Non
     assert narrow.fit.polynomial == plain
 
 
+@pytest.mark.slow
 def test_a_sensor_that_leaves_the_range_anyway_keeps_its_days_curve() -> None:
     rows = measured(8, 60, scatter=0.05, systematic=0.2, seed=2)
     own = fitted(rows).fit.polynomial
@@ -123,6 +125,7 @@ def test_a_sensor_that_leaves_the_range_anyway_keeps_its_days_curve() -> None:
     assert (made.plain, made.fit.polynomial) == (False, own)
 
 
+@pytest.mark.slow
 def test_a_day_is_followed_by_as_high_an_order_as_it_needs() -> None:
     rows = measured(3, 60, scatter=0.05, systematic=0.2)
     kind = replace(TYPE, order=6)

@@ -552,6 +552,7 @@ def whole_batches(path: Path, size: int) -> int:
         return len(versions)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "statements", [(20, 36, 10_000), pytest.param((1, 8, 14, 18, 22, 26, 36, 10_000), marks=pytest.mark.slow)]
 )

@@ -42,6 +42,7 @@ def ours_of(motion: Motion) -> dict[str, float]:
     return {name: float(one.ours) for name, one in rows_of(motion).items() if one.ours is not None}
 
 
+@pytest.mark.slow
 def test_every_figure_of_the_tables_is_there_once(motion: Motion) -> None:
     tables = comparison(motion, read_paper_figures())
     assert {number: len(rows) for number, rows in tables.items()} == {5: 7, 6: 6, 7: 6, 8: 22}

@@ -61,7 +61,7 @@ def swaying(track: str, time: Values, seed: int) -> Values:
     return np.sin(time + seed) * (1 if track == "paper" else 0.5)
 
 
-@pytest.mark.sweep(4)
+@pytest.mark.slow
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_examples(path: Path) -> None:
     example = load_scenario(path)

@@ -37,7 +37,7 @@ def test_a_curve_shows_and_another_seed_differs() -> None:
     assert np.any(curve != vehicle_clearance("paper", time, 2, model="linear"))
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("samples", "rate"), [(1, 100.0), (2, 6.0), (360, 6.0), (3000, 100.0)])
 def test_any_length(samples: int, rate: float) -> None:
     assert vehicle_clearance("paper", np.arange(samples) / rate, 1, model="linear").shape == (samples,)

@@ -198,6 +198,7 @@ def test_without_truth_the_pass_edge_tells_what_is_wanted() -> None:
         propose([motion], wish, rate)
 
 
+@pytest.mark.slow
 def test_the_smallest_tolerance_named_is_one_that_will_do() -> None:
     generator = np.random.default_rng(1)
     rate = 20.0

@@ -19,6 +19,7 @@ RATE = 50.0
 PLAIN = SpectrumSettings()
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("window", WINDOWS)
 def test_the_density_of_white_noise_is_its_power_over_the_band(window: str) -> None:
     noise = np.random.default_rng(1).normal(0, 0.2, 100_000)
@@ -57,7 +58,7 @@ def test_a_line_is_no_part_of_the_spectrum() -> None:
     assert spectrum(slope, RATE, SpectrumSettings(detrend="constant")).rms > 0.1
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("overlap", "window"), [(0.5, "hann"), (0.75, "hann"), (0.5, "boxcar"), (0.0, "hann")])
 def test_degrees_of_freedom_and_interval_are_those_of_the_estimates(overlap: float, window: str) -> None:
     settings = SpectrumSettings(window=window, overlap=overlap, confidence=0.9)
@@ -107,7 +108,7 @@ def test_refusals(given: dict[str, Any], message: str) -> None:
 # Lines that are called out.
 
 
-@pytest.mark.sweep(3)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("window", WINDOWS)
 def test_a_pure_tone_is_one_line_with_its_amplitude(window: str) -> None:
     """Whatever its frequency and phase: nothing else is called out, as the trend that it resembles in a segment."""
@@ -139,6 +140,7 @@ def test_tones_far_below_another_are_called_out_and_its_leakage_is_not() -> None
     assert [(round(at, 2), round(height, 5)) for at, height in lines] == [(3.03, 1.0), (7.77, 2e-4)]
 
 
+@pytest.mark.slow
 def test_noise_has_no_lines() -> None:
     noise = [np.random.default_rng(k).normal(size=4000) for k in range(100)]
     assert sum(len(peaks(spectrum(one, RATE, PLAIN), 10)) for one in noise) <= 3

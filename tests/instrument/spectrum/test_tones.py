@@ -56,6 +56,7 @@ def drawn(kind: str, number: int) -> Case:
     return Case(values, tuple(tones), step)
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(
     "numbers", [range(6), pytest.param(range(6, 60), marks=pytest.mark.slow)], ids=["a few", "the others"]
@@ -70,7 +71,7 @@ def test_tones_are_the_only_lines_with_their_amplitudes(kind: str, numbers: rang
             assert height == pytest.approx(amplitude, rel=WITHIN), (number, lines, case.tones)
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("cycles", [0.6, 0.8, 1.0, 1.3, 1.6, 2.0])
 def test_a_tone_of_too_few_cycles_is_told_as_such_and_leaves_no_phantom(cycles: float) -> None:
     """Detrending takes much of it for a line, whose rest would be lines that are not in the signal."""

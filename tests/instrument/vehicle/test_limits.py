@@ -25,6 +25,7 @@ def test_a_short_record_has_one_mean() -> None:
     assert sliding_mean(np.array([4.0]), np.zeros(1)) == pytest.approx([4.0])
 
 
+@pytest.mark.slow
 def test_the_sum_of_guiding_forces_and_its_limit() -> None:
     given = built_in()
     track = curved_track(given.track)

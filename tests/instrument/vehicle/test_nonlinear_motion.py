@@ -59,6 +59,7 @@ def test_small_motion_is_the_linear_one() -> None:
     assert parts[1] < 1e-2
 
 
+@pytest.mark.slow
 def test_a_free_wheelset_has_klingels_wavelength() -> None:
     """At walking speed, where creep is as stiff as it gets, one wave of 2 pi sqrt(r l / c) takes 11.5 m."""
     speed, step = 1.0, 5e-3
@@ -71,6 +72,7 @@ def test_a_free_wheelset_has_klingels_wavelength() -> None:
     assert (crossings[1] - crossings[0]) * step * speed == pytest.approx(wave, rel=2e-3)
 
 
+@pytest.mark.slow
 def test_between_its_flanges_a_wheelset_without_friction_keeps_its_energy() -> None:
     tiny = Creep(f11=1e-3, f22=1e-3)
     system = wheelset(20.0, 2e6, creep=tiny)
@@ -112,6 +114,7 @@ def reference(speed: float, spring: float, friction: float, start: Array, end: f
     return found.y[0, -1], found.y[1, -1]
 
 
+@pytest.mark.slow
 def test_a_stiff_integrator_of_others_finds_the_same() -> None:
     """Large motion, sliding and striking the flanges; halving the step quarters the difference."""
     speed, spring, end = 20.0, 5e5, 0.3

@@ -290,6 +290,7 @@ def test_in_the_curve_wheelsets_yaw_in_their_frames(motion: Motion) -> None:
     assert motion.wheelset_yaw_to_frame[k] == pytest.approx(straightened - frame, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_vertical_motion_holds_half_the_cant_and_the_cones_lift_wheels(motion: Motion) -> None:
     assert motion.wheelset_vertical[1500] == pytest.approx([0.045] * 6)
     assert motion.frame_vertical[1500] == pytest.approx([0.045] * 2, abs=1e-4)

@@ -32,6 +32,7 @@ def test_the_papers_track() -> None:
     assert wave == pytest.approx([0, 0, 0.01, 0.02, 0.01, 0, 0], abs=1e-12)
 
 
+@pytest.mark.slow
 def test_heading_and_offset_are_the_integrals_of_the_curvature() -> None:
     track = curved_track(TABLE)
     s = np.linspace(0, track.length, 61_001)
@@ -71,6 +72,7 @@ def test_the_density_is_the_formula_within_its_band() -> None:
     assert bad.density(np.array([1.0])) / level.density(np.array([1.0])) == pytest.approx(1.080e-6 / 4.032e-7)
 
 
+@pytest.mark.slow
 def test_the_spectrum_of_a_profile_is_the_density() -> None:
     """Estimated by Welch's method, which shares nothing with the synthesis, in bands of a third of an octave."""
     spectrum, _ = spectra(WAVES, "low")
@@ -90,6 +92,7 @@ def test_the_spectrum_of_a_profile_is_the_density() -> None:
     assert np.var(profile.height[:-1]) == pytest.approx(power, abs=end)
 
 
+@pytest.mark.slow
 def test_height_between_the_points_is_that_of_the_waves() -> None:
     """The spline against the same waves on a grid five times as fine; slopes against differences."""
     spectrum, _ = spectra(WAVES, "high")

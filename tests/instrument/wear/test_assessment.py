@@ -133,6 +133,7 @@ def test_each_end_of_the_interval_is_widened_by_itself(memory: float, side: int)
     assert abs((high - found.rate) / (found.rate - low) - 1) > 0.05
 
 
+@pytest.mark.slow
 def test_noise_with_memory_within_the_day_does_not_narrow_the_interval() -> None:
     time = np.arange(0, 40, 0.01)
     held = 0

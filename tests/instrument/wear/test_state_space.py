@@ -92,6 +92,7 @@ def test_without_happenings_the_filter_is_least_squares_over_all_days(total: flo
         assert spread == pytest.approx(math.sqrt(covariance[3 * wheel + 1, 3 * wheel + 1]), rel=1e-5)
 
 
+@pytest.mark.slow
 def test_what_all_readings_share_is_not_averaged_away() -> None:
     read = worn(100, 0.05, 1)
     for shared in (0.0, 0.1):

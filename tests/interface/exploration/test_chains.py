@@ -37,6 +37,7 @@ def exploration(tmp_path_factory: pytest.TempPathFactory) -> sosmith.Exploration
     return explored(tmp_path_factory.mktemp("explored"))
 
 
+@pytest.mark.slow
 def test_figures_are_those_of_the_chain(found: sosmith.Exploration) -> None:
     point = found.points[3]
     assert point["changes"] == {"stage.double.architecture": "folded", "output.bits": 10, "output.max_error": 0.005}
@@ -117,6 +118,7 @@ def test_a_core_of_a_chain_is_refused(tmp_path: Path) -> None:
         explored(tmp_path, core="filter")
 
 
+@pytest.mark.slow
 def test_by_default_the_allowed_error_is_swept(tmp_path: Path) -> None:
     found = sosmith.explore(instrument(), folder=tmp_path, samples=300, jobs=1)
     assert {key: len(values) for key, values in found.outcome.parameters.items()} == {"output.max_error": 3}

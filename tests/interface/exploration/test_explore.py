@@ -72,6 +72,7 @@ def test_figures_are_those_of_the_design(found: sosmith.Exploration) -> None:
     assert (point["cycles_per_sample"], point["architecture"], point["passed"]) == (1, "parallel", True)
 
 
+@pytest.mark.slow
 def test_refused_combinations_say_why(found: sosmith.Exploration) -> None:
     refused = [point for point in found.points if point["refused"] is not None]
     assert len(refused) == 2
@@ -154,6 +155,7 @@ def test_a_run_that_failed_goes_on(found: sosmith.Exploration, tmp_path: Path, m
     assert contents(tmp_path) == contents(found.folder)
 
 
+@pytest.mark.slow
 def test_a_design_that_another_sweep_has_made_is_shown_with_the_changes_of_this_one(tmp_path: Path) -> None:
     made = [
         explored(tmp_path, parameters={key: [value]}, samples=100).points
@@ -166,6 +168,7 @@ def test_a_design_that_another_sweep_has_made_is_shown_with_the_changes_of_this_
     ]
 
 
+@pytest.mark.slow
 def test_an_address_that_is_none_leaves_no_client_behind(tmp_path: Path) -> None:
     needed("distributed")
     before = set(threading.enumerate())
@@ -196,6 +199,7 @@ def test_options_that_do_not_fit(options: dict[str, Any], message: str, tmp_path
         explored(tmp_path, **options)
 
 
+@pytest.mark.slow
 def test_a_sound_is_the_trace_of_all_designs(tmp_path: Path) -> None:
     spec, sweep = sosmith.Specification.load(FILTER), {"hardware.realization": ["df1"]}
     sosmith.design(spec, realization="df1").trace("noise", seconds=0.1).write(tmp_path / "noise.wav")
@@ -209,6 +213,7 @@ def test_a_sound_is_the_trace_of_all_designs(tmp_path: Path) -> None:
     assert made[0]["trace_sha256"] == made[1]["trace_sha256"] != made[2]["trace_sha256"]
 
 
+@pytest.mark.slow
 def test_too_few_samples_for_every_design_are_told_before_the_first(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -27,6 +27,7 @@ def with_hardware(**hardware: Any) -> dict[str, Any]:
     return {**FILTER, "hardware": {**FILTER["hardware"], **hardware}}
 
 
+@pytest.mark.slow
 def test_each_number_of_samples_a_clock_has_its_own_front(tmp_path: Path) -> None:
     """The bound is the same, and the cost a multiple: none of them would be on a front beside a slower one."""
     found = sosmith.explore(
@@ -101,6 +102,7 @@ def told(job: Any, tables: dict[str, Any], **more: Any) -> Any:
     return job(lambda *_: None, text=Specification.load(tables).toml(), path="some.toml", **more)
 
 
+@pytest.mark.slow
 def test_the_studio_tells_times_of_results() -> None:
     found = told(jobs.trace, SPARSE, source="noise", seconds=0.1)
     assert found["samples"] == 25

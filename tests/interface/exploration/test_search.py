@@ -90,6 +90,7 @@ def test_no_design_is_made_twice(found: Outcome) -> None:
     assert [task.key for task in found.tasks] == [point["key"] for point in found.points]
 
 
+@pytest.mark.slow
 def test_values_are_within_their_ranges(found: Outcome) -> None:
     for point in found.points:
         bits, allowed = point["changes"]["output.bits"], point["changes"]["output.max_error"]
@@ -107,11 +108,12 @@ def test_the_search_is_drawn_to_the_front(found: Outcome) -> None:
     assert {point["changes"]["hardware.realization"] for point in found.front} == {"df1"}
 
 
+@pytest.mark.slow
 def test_the_order_of_the_results_is_of_no_account(found: Outcome, tmp_path: Path) -> None:
     assert searched(tmp_path, machine=Machine(lambda tasks: reversed(list(tasks)))) == found
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("ends", [24, 53])
 def test_a_search_that_was_killed_goes_on(found: Outcome, tmp_path: Path, ends: int) -> None:
     killed, again = Machine(ends=ends), Machine()

@@ -38,6 +38,7 @@ def test_no_conversion_is_left_to_the_compiler(example: str, tmp_path: Path) -> 
     subprocess.run(["g++", "-std=c++11", *STRICT, "-c", "user.cpp", "-o", "user.o"], cwd=tmp_path, check=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("with_status", [False, True])
 def test_a_block_of_one_input_may_be_filtered_in_place(with_status: bool, tmp_path: Path) -> None:
     datapath = example_design("audio_lowpass.toml").datapath

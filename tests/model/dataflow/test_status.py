@@ -26,6 +26,7 @@ def status(datapath: Datapath, *codes: tuple[int, int]) -> list[int]:
     return datapath.compute_status(np.array(codes)).tolist()
 
 
+@pytest.mark.slow
 def test_rails_of_either_input() -> None:
     datapath = calibration(())
     (low, high), (least, most) = ((port.lowest, port.highest) for port in datapath.inputs)

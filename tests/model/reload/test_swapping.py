@@ -52,6 +52,7 @@ def test_direct_form_i_is_continuous_at_rest(realization: str) -> None:
     assert np.ptp(results[1900:]) <= 1
 
 
+@pytest.mark.slow
 def test_a_state_of_another_filter_may_leave_the_ranges_that_are_proven_from_reset() -> None:
     """The proofs do not cover a swap: with rails as input and twice the cutoff, values come out of their ranges."""
     made = example_design("audio_lowpass.toml", realization="df1_ef2")

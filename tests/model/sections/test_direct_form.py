@@ -63,6 +63,7 @@ def test_error_feedback_removes_the_dead_band() -> None:
     assert settled[0] < 600
 
 
+@pytest.mark.slow
 def test_rounding_error_is_bounded_by_the_shaped_peak_gain() -> None:
     """THEORY section 0: 4.1213 / 2 LSB with second-order feedback at the highest Q of F7."""
     row = signal.butter(7, 2 * 0.002588, output="sos")[-1:]

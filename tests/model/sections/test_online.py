@@ -94,7 +94,7 @@ def run(section: OnlineSection, graph: Graph, samples: Iterable[int], *, disguis
         errors = [error, errors[0]]
 
 
-@pytest.mark.sweep(3)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("made", SECTIONS.values(), ids=SECTIONS)
 def test_the_recurrence_gives_the_result_of_the_graph(made: DirectForm1) -> None:
     section = online_section("section0", made.graph)

@@ -127,6 +127,7 @@ def test_each_result_leaves_two_frames_behind_its_sample(name: str, tmp_path: Pa
     check(job, given, run(tmp_path / "run", job, given))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "frame", "expected"),
     [

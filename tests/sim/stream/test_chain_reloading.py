@@ -37,7 +37,7 @@ def designed(channels: int = 1, **stage: Any) -> tuple[sosmith.Chain, list[sosmi
     return chain, [chain.reload(tree(taps, channels, **stage), version=k) for k, taps in enumerate(others)]
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("stage", "channels", "count", "simulator"),
     [

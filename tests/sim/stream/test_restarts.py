@@ -137,7 +137,7 @@ def false_flags(found: Case, outcome: Outcome) -> int:
     return wrong
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("start", ["steady", pytest.param("zero", marks=pytest.mark.slow)])
 def test_a_few_restarts(start: str, tmp_path: Path) -> None:
     found = case(core("parallel", start), random.Random(1))

@@ -147,6 +147,7 @@ def test_damage_is_mended_and_counted(place: Path) -> None:
     assert counters["overrun"] == 0 or timeouts
 
 
+@pytest.mark.slow
 def test_arbitrary_bytes_do_not_wedge_the_board(place: Path) -> None:
     made = filter_design().core
     codes = codes_for(made, 100)

@@ -40,6 +40,7 @@ def proven(folder: Path, spec: Path | None) -> sosmith.ChainProof:
     return sosmith.ChainCertificate.load(folder / CERTIFICATE).verify(files=folder, spec=spec)
 
 
+@pytest.mark.slow
 def test_what_was_chosen_is_proven_from_either_specification(folder: Path) -> None:
     for spec in (folder / "rx.toml", words(folder, TREE)):
         proof = proven(folder, spec)

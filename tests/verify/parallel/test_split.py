@@ -69,7 +69,7 @@ def test_registers_loaded_in_parts(load: str, sentence: str) -> None:
         netlist(load)
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("spec", "lanes"), [(PLAIN, 1), (PLAIN.replace("bits = 8", "bits = 11"), 2), (STEADY_INSTRUMENT, 4)]
 )

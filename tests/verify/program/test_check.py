@@ -113,7 +113,7 @@ NOTHING = re.sub(
 ).replace('"faithful"', "0.5")
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("start", ["zero", "steady"])
 @pytest.mark.parametrize("realization", ["df1", "df1_ef1"])
 def test_a_section_that_does_nothing(realization: str, start: str) -> None:

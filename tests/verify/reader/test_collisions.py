@@ -38,6 +38,7 @@ def test_a_state_that_is_read_as_it_is_written_must_not_be_marked(memory: str) -
         core.check(marked(core, memory))
 
 
+@pytest.mark.slow
 def test_the_memories_of_many_channels_are_marked_and_right() -> None:
     core = parallel(channels=40)
     assert MARK in core.text

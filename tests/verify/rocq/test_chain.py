@@ -57,6 +57,7 @@ def compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(door, "compile_theories", copied)
 
 
+@pytest.mark.slow
 @needs_coqc
 @pytest.mark.usefixtures("compiled")
 def test_the_bound_of_a_chain_is_accepted(tmp_path: Path) -> None:

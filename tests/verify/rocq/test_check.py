@@ -178,6 +178,7 @@ def test_what_is_wrong_behind_an_input_of_few_bits_is_refused(
         checked(Certificate.model_validate(tree), tmp_path)
 
 
+@pytest.mark.slow
 @needs_coqc
 def test_a_first_section_that_uses_the_first_sample_is_refused(tmp_path: Path) -> None:
     tree = json.loads(certificate_text(small(order=1, steady=True)))
@@ -258,6 +259,7 @@ def test_a_start_from_zero_and_a_decimator(text: str, tmp_path: Path) -> None:
     assert checked(made, tmp_path) <= STANDARD
 
 
+@pytest.mark.slow
 @needs_coqc
 def test_results_of_an_fir_filter_that_decimates(tmp_path: Path) -> None:
     made = designed(DOWNSAMPLED)
@@ -327,6 +329,7 @@ def test_what_is_wrong_before_the_filter_is_refused(
         checked(Certificate.model_validate(tree), tmp_path)
 
 
+@pytest.mark.sweep(1)
 @needs_coqc
 @pytest.mark.parametrize("signed", [False, True])
 def test_the_decimator_in_rocq_computes_what_the_model_computes(signed: bool, tmp_path: Path) -> None:

@@ -31,6 +31,7 @@ def folding(made: Certificate) -> list[Claim]:
     return [replace(first, text="\n".join([*needed, first.text])), *others]
 
 
+@pytest.mark.slow
 @needs_coqc
 def test_what_is_claimed_of_a_decimator(tmp_path: Path) -> None:
     made = designed(DECIMATED)
@@ -105,6 +106,7 @@ def test_what_our_verifier_rejects_is_refused(edit: str, tmp_path: Path) -> None
         checked(made, tmp_path, folding(made))
 
 
+@pytest.mark.slow
 @needs_coqc
 @pytest.mark.parametrize("name", ["passing_gains", "band_gains"])
 def test_a_gain_that_is_exceeded_has_no_proof(name: str, tmp_path: Path) -> None:

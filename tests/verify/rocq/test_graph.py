@@ -59,6 +59,7 @@ def is_graph(made: Certificate) -> bool | None:
     return before[:-1] == entering[1:]
 
 
+@pytest.mark.slow
 @needs_coqc
 @pytest.mark.parametrize("each", [3, pytest.param(1, marks=pytest.mark.slow)])
 def test_rocq_and_our_verifier_take_the_same_for_a_graph(each: int, tmp_path: Path) -> None:
@@ -69,6 +70,7 @@ def test_rocq_and_our_verifier_take_the_same_for_a_graph(each: int, tmp_path: Pa
     assert verdicts([one for one, _ in made], tmp_path) == [said for _, said in made]
 
 
+@pytest.mark.slow
 @needs_coqc
 def test_a_branch_that_only_passes_through_stages_is_handed_on(tmp_path: Path) -> None:
     made = small("lattice_wdf", order=5)
@@ -154,7 +156,7 @@ EDITS: dict[str, tuple[Callable[[Any], None], Callable[[], Certificate], str]] =
 
 
 @needs_coqc
-@pytest.mark.sweep(3)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("edit", EDITS)
 def test_the_kernel_refuses_what_is_not_built_as_it_must_be(edit: str, tmp_path: Path) -> None:
     change, base, claim = EDITS[edit]

@@ -68,7 +68,7 @@ def louder(kind: str, factor: Fraction) -> list[SectionEntry]:
     return [SectionEntry(numerator=numerator, denominator=first.denominator), *others]
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", BANDS)
 def test_a_filter_inside_its_mask_is_accepted(kind: str) -> None:
     made, margin = certified(kind)

@@ -140,7 +140,7 @@ def test_what_is_no_whole_specification_is_rejected(text: str) -> None:
         agreed(AUDIO, text)
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("family", ["butterworth", "chebyshev1", "chebyshev2", "elliptic"])
 @pytest.mark.parametrize(
     ("kind", "passband", "stopband", "other"),

@@ -284,6 +284,7 @@ def test_broken_words_are_a_sentence(words: str, copy: Callable[..., Path]) -> N
         proof(path)
 
 
+@pytest.mark.slow
 def test_a_calibration_is_fitted_again(copy: Callable[..., Path]) -> None:
     folder = copy(MEASURED, "calibration")
     (path,) = folder.glob("*.certificate.json")

@@ -44,6 +44,7 @@ def summary(name: str) -> dict[str, Any]:
     return chain_summary(core, run_of(core, side_by_side([each.codes for each in traces])), traces)
 
 
+@pytest.mark.slow
 def test_chains_stand_beside_each_other(tmp_path: Path) -> None:
     """With the bound by stage, the filter from end to end, clocks and cost; from a file as from memory."""
     for name in ("plain", "up"):
@@ -88,6 +89,7 @@ def test_a_calibration_and_a_filter_are_an_instrument() -> None:
     assert chain_provenance(chain, traces).reference_sha256 == provenance_of(core, traces).reference_sha256
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "filter_"),
     [

@@ -50,7 +50,7 @@ def test_nets_have_names_but_for_some_glue(kind: str) -> None:
     assert len(nameless) <= GLUE < len(names) / 10
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("protect", ["detect", "correct"])
 def test_a_check_bit_is_one_parity(protect: str) -> None:
     """Not a chain of nets, each with a bit more."""

@@ -32,6 +32,7 @@ def refused(sentence: str) -> pytest.RaisesExc[SpecificationError]:
     return pytest.raises(SpecificationError, match=f"^{re.escape(sentence)}$")
 
 
+@pytest.mark.slow
 def test_several_channels_are_refused() -> None:
     made = small("channels = 3\n")
     with refused("slight.toml: not yet available: channels must be 1 with filter.decimate in a package, not 3"):

@@ -108,6 +108,7 @@ def some_words() -> list[int]:
     return [rng.getrandbits(32) for _ in range(core().facts.words)]
 
 
+@pytest.mark.slow
 def test_a_set_is_loaded(library: ctypes.CDLL) -> None:
     made, words = core(pending=4), some_words()
     assert load(library, made, words) == GOOD

@@ -118,7 +118,7 @@ def test_the_bench_passes_with_the_wrapper_around_the_core(maker: str, name: str
     )
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("maker", EVERY_MAKER)
 def test_wrappers_of_a_reloadable_core_have_its_bus(maker: str, tmp_path: Path) -> None:
     folder = unpacked("tunable", tmp_path)

@@ -54,6 +54,7 @@ def test_random_codes_and_constants_stay_within_the_bound() -> None:
     assert worst_error(made, codes) <= float(made.quantized.bound)
 
 
+@pytest.mark.slow
 def test_the_golden_chain_is_the_exact_one() -> None:
     made = whole()
     quantized, datapath = made.quantized, made.datapath
@@ -83,6 +84,7 @@ def test_the_calibration_is_a_row_of_the_budget() -> None:
     assert quantized.bound == sum(quantized.budget.values())
 
 
+@pytest.mark.slow
 def test_nothing_is_limited_before_the_decimator() -> None:
     """The port takes all that the polynomial can give, also where that is far outside the output's range."""
     tree = tomllib.loads(INSTRUMENT.format(extra=""), parse_float=Decimal)
@@ -264,6 +266,7 @@ motion = [[0.25, 1.0], [6.0, 1.0]]
     assert 0 < ours["motion at 6 Hz"] < 1e-5
 
 
+@pytest.mark.slow
 def test_another_calibration_exceeds_the_bound() -> None:
     """A coefficient that is half an LSB wrong is found by the exact reference."""
     made = small()

@@ -190,6 +190,7 @@ def test_no_lattice_behind_a_decimator() -> None:
         design_core(spec, core="filter", realization="lattice_wdf")
 
 
+@pytest.mark.slow
 def test_a_clock_that_is_too_slow() -> None:
     spec = locomotive_spec("16", "folded")
     slow = replace(spec, hardware=replace(spec.hardware, clock=Fraction(500), realization="df2t"))

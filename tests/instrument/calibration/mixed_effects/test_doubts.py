@@ -33,6 +33,7 @@ def test_errors_of_the_type_are_no_reason_to_doubt(seed: int) -> None:
     assert fitted(measured(seed)).doubts == ()
 
 
+@pytest.mark.slow
 def test_errors_over_a_shorter_clearance() -> None:
     assert fitted(measured(1, correlation=0.5)).doubts == (
         "the errors of a day vary over about 0.5 mm, not over 2 mm as those of the type equation_5a: a type with "
@@ -47,6 +48,7 @@ def test_errors_that_are_an_offset() -> None:
     )
 
 
+@pytest.mark.slow
 def test_an_error_that_stays() -> None:
     assert fitted(measured(1, lasting=0.2)).doubts == (
         "the measurements of all days miss the curve alike, which its orders cannot follow: what is booked as the "
@@ -55,6 +57,7 @@ def test_an_error_that_stays() -> None:
     assert fitted(measured(1, lasting=0.2, days=2)).doubts == ()  # too few days
 
 
+@pytest.mark.slow
 def test_too_few_measurements_to_tell_over_which_clearance_a_day_errs() -> None:
     rows = measured(4, scatter=0.3)
     assert fitted(rows).doubts == (
@@ -64,6 +67,7 @@ def test_too_few_measurements_to_tell_over_which_clearance_a_day_errs() -> None:
     assert fitted(rows, max(rows.days) + 1).doubts == ()  # nothing is known of the day's own curve
 
 
+@pytest.mark.slow
 def test_intervals_rest_on_that_where_the_polynomial_leaves_the_curve_of_the_day_out() -> None:
     made = fitted(measured(4, scatter=0.3))
     assert made.doubts

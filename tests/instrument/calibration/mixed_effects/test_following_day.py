@@ -18,6 +18,7 @@ def morning(day: int, off: float) -> Measurements:
     return Measurements(TRUE(V, T) + off, V, T, "t.csv", (day,) * 3, known)
 
 
+@pytest.mark.slow
 def test_a_morning_gives_what_a_fit_of_everything_gives() -> None:
     before = measured(10, 20, systematic=0.1)
     last = max(before.days)
@@ -39,6 +40,7 @@ def test_a_morning_gives_what_a_fit_of_everything_gives() -> None:
     assert so_far.day == last + 2
 
 
+@pytest.mark.slow
 def test_without_targets_the_whole_error_of_a_day_is_open() -> None:
     before = measured(4, 40, systematic=0.1)
     last = max(before.days)

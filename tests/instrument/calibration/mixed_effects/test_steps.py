@@ -44,6 +44,7 @@ def test_a_smaller_step_is_told_after_some_days() -> None:
     assert step.size == pytest.approx(0.4, abs=0.15)
 
 
+@pytest.mark.slow
 def test_where_a_step_is_only_possible_intervals_hold_in_either_case() -> None:
     made = fitted(stepped(0.25), FIRST + DAYS)
     step = made.step
@@ -58,6 +59,7 @@ def test_where_a_step_is_only_possible_intervals_hold_in_either_case() -> None:
     assert np.all(reading_half_width(made, V, T, 0.01) > np.maximum(*each))
 
 
+@pytest.mark.slow
 def test_where_a_step_is_possible_the_curve_is_the_mean_of_both() -> None:
     V, T = np.linspace(2.0, 8.0, 20), np.full(20, 50.0)
     for date in (None, FIRST + DAYS):
@@ -74,6 +76,7 @@ def test_where_a_step_is_possible_the_curve_is_the_mean_of_both() -> None:
         assert np.abs(other - plain).max() > 0.02
 
 
+@pytest.mark.slow
 def test_past_doubt_the_curve_and_intervals_are_those_with_the_step() -> None:
     made = fitted(stepped(-1.0), FIRST + DAYS)
     step = made.step
@@ -86,6 +89,7 @@ def test_past_doubt_the_curve_and_intervals_are_those_with_the_step() -> None:
     assert np.array_equal(reading_half_width(made, V, T), step.posterior.half_width(V, T, centre, 0.95))
 
 
+@pytest.mark.slow
 def test_the_curve_after_a_step_is_that_of_the_days_since() -> None:
     """With a step of -1 V, readings of the same clearance are 1 V lower."""
     made = fitted(stepped(-1.0, on=DAYS - 3))
@@ -105,6 +109,7 @@ def test_two_days_are_too_few() -> None:
     assert fitted(stepped(-1.0, on=1, days=2)).step is None
 
 
+@pytest.mark.slow
 def test_a_step_long_ago_is_left_to_the_charts(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(steps, "RECENT", 3)
     step = fitted(stepped(-1.0, on=2)).step

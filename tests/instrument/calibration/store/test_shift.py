@@ -26,6 +26,7 @@ def test_a_sensor_that_reads_more_or_less() -> None:
     assert "mm more than by" in more.sentence
 
 
+@pytest.mark.slow
 def test_where_nothing_is_calibrated_there_is_no_shift() -> None:
     hot = replace(KNOWN, temperature=KNOWN.temperature + 100)
     assert shift_from(version_of(KNOWN), KNOWN, hot) is None

@@ -34,6 +34,7 @@ def clearance(voltage: float) -> float:
     return float(EQUATION_5A(np.array(voltage), np.array(21.0)))
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("memory", [0.0, 0.5, 0.9])
 def test_the_mean_of_correlated_results_is_known_as_well_as_it_says(memory: float) -> None:
     rng = np.random.default_rng(int(10 * memory))
@@ -110,6 +111,7 @@ def test_each_channel_is_read_by_itself_though_results_were_overwritten() -> Non
         assert steady.read(0.5, 0.002).value == pytest.approx(clearance(voltage), abs=0.002)
 
 
+@pytest.mark.slow
 def test_a_reading_that_moves_is_refused() -> None:
     steady, _ = reader(lambda t: 2 + 0.05 * t, Time())
     message = r"^the result must stand still for 1 s, not be moving by 0\.0\d+ mm after 40 tries$"

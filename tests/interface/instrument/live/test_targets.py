@@ -116,6 +116,7 @@ def test_the_set_that_was_loaded_counts(tmp_path: Path) -> None:
         read(written)
 
 
+@pytest.mark.slow
 def test_what_cannot_be_read_is_refused_and_the_port_given_back(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
