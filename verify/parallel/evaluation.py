@@ -293,7 +293,7 @@ class Evaluation:
         neutral = constant((1 << width) - 1 if value.symbol == "&" else 0)
         if neutral in (a, b):
             return a if b == neutral else b
-        if value.symbol == "&":
+        if value.symbol == "&" and width > 1:
             for word, other in ((a, b), (b, a)):
                 repeated = self._repeated_bit(word, width)
                 if repeated is not None:

@@ -340,6 +340,8 @@ def _findings(
             found.append(f"{name} is left")
         elif name == LINKED and data in wanted.files.values():
             pass  # by a link, it is the output
+        elif name == output and data == before[LINKED]:
+            pass  # the link that was put there
         elif name not in CHANGING and data != before.get(name) and data != wanted.files.get(name):
             found.append(f"{name} is not whole")
     found += [f"{name} is gone" for name in before if name not in after]

@@ -42,6 +42,13 @@ def test_several_channels(realization: str, channels: int) -> None:
     accept(small(ODD if realization == "lattice_wdf" else PLAIN, realization, channels))
 
 
+def test_a_calibration_of_several_channels() -> None:
+    """Nothing holds its samples back, as it has no states."""
+    core = made(design_core(specified(INSTRUMENT), core="calibration"), 3)
+    found = core.check()
+    assert (found.states, found.latency) == (0, latency_cycles(core.design.datapath, 3))
+
+
 def test_an_output_that_saturates_far_from_its_ends() -> None:
     accept(small(UNSIGNED, "df1_ef1", 5))
 
@@ -370,11 +377,8 @@ def test_names_of_registers_do_not_make_a_proof() -> None:
 
 
 @pytest.mark.slow
-def test_a_calibration_of_several_channels() -> None:
-    """Nothing holds its samples back, as it has no states."""
+def test_random_edits_of_a_calibration_of_several_channels() -> None:
     core = made(design_core(specified(INSTRUMENT), core="calibration"), 3)
-    found = core.check()
-    assert (found.states, found.latency) == (0, latency_cycles(core.design.datapath, 3))
     assert sweep(core, 15, seed=8, clocks=200)["rejected"] > 7
 
 
