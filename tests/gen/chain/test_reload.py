@@ -50,12 +50,12 @@ def test_the_bound_holds_with_other_coefficients(cutoff: float, chain: sosmith.C
     loaded = chain.reload(tree, reset=True, version=3)
     assert (loaded.stage, loaded.writes["version"], loaded.writes["name"]) == ("low", 3, "rx_low")
     assert loaded.writes["chain"] == {"name": "rx", "stage": "low", "error_bound": float(loaded.bound)}
-    assert chain.core.stages[1].design.quantized.bound != loaded._swap.swap.new_set.quantized.bound
+    assert chain.core.stages[1].design.quantized.bound != loaded._swap.swaps[0].new_set.quantized.bound
 
     codes = stimulus(chain, 600, 1)
     values: np.ndarray[Any, Any] = codes[:, :, None]
     for k, each in enumerate(chain.core.stages):
-        datapath = each.design.datapath if k != 1 else loaded._swap.swap.new_set.quantized.datapath
+        datapath = each.design.datapath if k != 1 else loaded._swap.swaps[0].new_set.quantized.datapath
         values = datapath.compute(values)[:, :, None]
     base = chain.core.spec.base
     (port,), output = base.inputs, base.output
