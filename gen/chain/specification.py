@@ -48,8 +48,8 @@ _KEYS: dict[str, tuple[str, ...]] = {
     "polynomial": ("coefficients", "data"),
     "gain": ("factor",),
     "iir": ("family", "band", "method", "order", "cutoff", *_EDGES, "freedom", "sos", "sos_file", "decimate"),
-    "fir": ("family", "band", *_EDGES, "taps", "taps_file", "decimate", "interpolate"),
-    "halfband": ("passband_edge", "passband_loss", "stopband_loss", "decimate", "interpolate"),
+    "fir": ("family", "band", *_EDGES, "freedom", "taps", "taps_file", "decimate", "interpolate"),
+    "halfband": ("passband_edge", "passband_loss", "stopband_loss", "freedom", "decimate", "interpolate"),
     "cic": ("order", "decimate", "interpolate"),
     AUTO: ("decimate", *KEYS),
 }

@@ -139,7 +139,10 @@ class Filter:
             taps, rate = count(self.order + 1, "tap"), frequency(self.sample_rate)
             if self.family == FIR:  # its kind is where its gain is largest, which misleads of a pure gain or a comb
                 return f"FIR of {taps} given at {rate}"
-            return f"{self.family} FIR {self.kind}, {taps} at {rate}".replace("_", " ")
+            family = self.family.replace("_", " ")
+            if self.freedom == "mask":
+                return f"FIR {self.kind} inside its mask, {taps}, near {family}, at {rate}"
+            return f"{family} FIR {self.kind}, {taps} at {rate}"
         if self.freedom == "mask":
             near = f"near {self.family.capitalize()}, at {frequency(self.sample_rate)}"
             return f"{self.kind.capitalize()} inside its mask, order {self.order}, {near}"
@@ -302,8 +305,9 @@ def _kind_of(row: tuple[float, ...]) -> str:
 
 def _designed(spec: FilterSpec, fs: Fraction) -> tuple[Fraction, ...]:
     from sosmith.gen.filter.fir_design import designed_taps  # noqa: PLC0415 - slow to load
+    from sosmith.gen.filter.short_taps import short_taps  # noqa: PLC0415 - as that
 
-    return designed_taps(spec.family, _mask(spec, fs))
+    return (short_taps if spec.freedom == "mask" else designed_taps)(spec.family, _mask(spec, fs))
 
 
 def fir_row(taps: Sequence[Fraction]) -> tuple[Fraction, ...]:

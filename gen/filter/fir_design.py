@@ -47,7 +47,7 @@ _POINTS = 1 << 14
 """Frequencies up to half the sample rate at which the largest gain is looked for."""
 
 
-def _ripples(mask: LossMask) -> tuple[float, float]:
+def ripples(mask: LossMask) -> tuple[float, float]:
     """Return the largest deviations from gains of 1 and 0, before the filter is scaled."""
     least = 10 ** (-float(mask.passband_loss) / 20)
     ripple = (1 - least) / (1 + least)
@@ -89,23 +89,35 @@ def designed_taps(family: str, mask: LossMask) -> tuple[Fraction, ...]:
 
 def _estimated(mask: LossMask) -> float:
     """Estimate the number of taps of an equiripple filter by Kaiser's formula."""
-    first, second = _ripples(mask)
+    first, second = ripples(mask)
     return (-10 * math.log10(first * second) - 13) / (14.6 * _transition(mask)) + 1
 
 
-def _kept(family: str, length: int, mask: LossMask) -> tuple[Fraction, ...] | None:
-    """Return a filter with so many taps; None if it does not keep to the losses."""
+def taps_of_length(family: str, length: int, mask: LossMask) -> tuple[float, ...] | None:
+    """Return a family's filter with so many taps, symmetric, of a gain about 1; None if there is none.
+
+    Whether it keeps to the losses is not asked. The last digits depend on the machine's functions.
+    """
+    if length > MAX_TAPS or not _FAMILIES[family].takes(length, mask):
+        return None
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of an exchange that does not converge: the proof decides
             designed = _FAMILIES[family].design(length, mask)
     except (ValueError, np.linalg.LinAlgError):
         return None
-    if not np.isfinite(designed).all():
+    return tuple(((designed + designed[::-1]) / 2).tolist()) if np.isfinite(designed).all() else None
+
+
+def _kept(family: str, length: int, mask: LossMask) -> tuple[Fraction, ...] | None:
+    """Return a filter with so many taps; None if it does not keep to the losses."""
+    found = taps_of_length(family, length, mask)
+    if found is None:
         return None
+    designed = np.array(found)
     gain = np.abs(np.fft.rfft(designed, 2 * _POINTS))
     inside = _points_in(mask.passbands)
-    scaled = (designed + designed[::-1]) / 2 * (1 - _SPARE) / float(np.max(gain[inside]))
+    scaled = designed * (1 - _SPARE) / float(np.max(gain[inside]))
     if not _may_keep(gain / float(np.max(gain[inside])), inside, mask):
         return None
     taps = tuple(Fraction(round(tap * 2.0**_GRID_BITS), 1 << _GRID_BITS) for tap in scaled.tolist())
@@ -129,7 +141,7 @@ def _may_keep(gain: Array, inside: npt.NDArray[np.bool_], mask: LossMask) -> boo
 
 def _edges_and_gains(mask: LossMask) -> tuple[list[float], list[float], list[float]]:
     """Return edges of all bands, and gain and weight of each."""
-    first, second = _ripples(mask)
+    first, second = ripples(mask)
     bands = sorted([(band, 1.0, 1 / first) for band in mask.passbands] + [(b, 0.0, 1 / second) for b in mask.stopbands])
     edges = [float(edge) for band, _, _ in bands for edge in band]
     return edges, [gain for _, gain, _ in bands], [weight for _, _, weight in bands]
@@ -161,7 +173,7 @@ def _least_squares(length: int, mask: LossMask) -> Array:
 def _kaiser(length: int, mask: LossMask) -> Array:
     edges, gains, _ = _edges_and_gains(mask)
     cutoffs = [(edges[k] + edges[k + 1]) / 2 for k in range(1, len(edges) - 1, 2)]
-    beta = signal.kaiser_beta(-20 * math.log10(min(_ripples(mask))))
+    beta = signal.kaiser_beta(-20 * math.log10(min(ripples(mask))))
     taps = signal.firwin(length, cutoffs, window=("kaiser", beta), pass_zero=gains[0] == 1, scale=False, fs=1.0)
     return np.asarray(taps, dtype=np.float64)
 

@@ -167,7 +167,7 @@ def short_rows(cascade: tuple[Nominal, ...], mask: LossMask, at: int | None) -> 
     )
 
 
-def digits(value: Fraction) -> int:
+def digits(value: Fraction | int) -> int:
     """Count the nonzero digits of a dyadic number in the canonical signed form, the fewest of any.
 
     >>> [digits(Fraction(each, 8)) for each in (0, 1, 7, 11)]

@@ -265,15 +265,13 @@ def _check_by_edges(table: FilterTable, given: Sequence[str], sample_rate: Fract
 
 
 def _check_freedom(table: FilterTable, given: Sequence[str]) -> None:
-    """Check that there is a mask, of a filter with poles."""
+    """Check that there is a mask."""
     if _BY_EDGES[0] not in given:
         raise UnfitError(
             f"left out unless the filter is given by {listed(_BY_EDGES)}",
             literal(table.freedom),
             where="filter.freedom",
         )
-    if table.family in FIR_FAMILIES:
-        raise UnfitError(f"left out for {table.family}", literal(table.freedom), where="filter.freedom", later=True)
 
 
 def _check_halfband(

@@ -22,7 +22,7 @@ from tests.verify.small_specifications import PLAIN, STEADY, STEADY_INSTRUMENT
 
 from sosmith.gen.core import design_core
 from sosmith.gen.output.certificate import certificate
-from sosmith.gen.realizations.registry import REALIZATIONS
+from sosmith.gen.realizations.registry import SECTIONS
 from sosmith.gen.specification.specification import from_tree
 from sosmith.model.port import Port
 from sosmith.verify.certificate_file import Certificate, Operation, certificate_text
@@ -38,10 +38,7 @@ from sosmith.verify.verification import verify
 @pytest.mark.parametrize("kind", ["lowpass", "highpass", "bandpass", "bandstop"])
 @pytest.mark.parametrize(
     "realization",
-    [
-        name if name in {"df1_ef2", "lattice_wdf"} else pytest.param(name, marks=pytest.mark.slow)
-        for name in REALIZATIONS
-    ],
+    [name if name in {"df1_ef2", "lattice_wdf"} else pytest.param(name, marks=pytest.mark.slow) for name in SECTIONS],
 )
 def test_designs(kind: str, realization: str) -> None:
     proven(plain(butterworth(3, 0.1, kind), realization, steady=True))

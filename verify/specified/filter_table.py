@@ -121,7 +121,6 @@ def read_filter_table(table: Mapping[str, object], sample_rate: Fraction) -> Fil
         return read
     _require_only(table, (*_LABELS, *_EDGES, *_LOSSES, "freedom"), "with edges and losses")
     freedom = _word({"freedom": _FREEDOMS[0], **table}, "freedom", _FREEDOMS)
-    _require(family not in FIR_FAMILIES or freedom == _FREEDOMS[0], "freedom", f"left out for {family}", freedom)
     _require(method == _METHODS[0], "method", "bilinear with edges and losses", method)
     _require(family != "bessel", "family", "one with a formula for the minimum order", family)
     passband, stopband = (_frequencies(table, key, kind, sample_rate) for key in _EDGES)

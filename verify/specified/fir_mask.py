@@ -2,7 +2,9 @@
 
 Taps that are symmetric about their middle c have the gain ``|A(w)|``, ``A(w) = sum b_k cos((k - c) w)``. Within r of an
 angle w, A differs from its value there by at most ``|A'(w)| r + sum |b_k| (k - c)**2 r**2 / 2``. A band is halved
-until that shows of each part that its gains are allowed, or of one frequency that they are not.
+until that shows of each part that its gains are allowed, or of one frequency that they are not. Where a gain is its
+limit, as one of 1 at 0 often is, no part around it is small enough: then signs of polynomials decide, which can take
+longer.
 """
 
 from __future__ import annotations
@@ -13,8 +15,10 @@ from fractions import Fraction
 from flint import arb, ctx
 
 from sosmith.verify.bounds.l1_response import UndecidedError
+from sosmith.verify.certificate_file import SectionEntry
 from sosmith.verify.specified.balls import ball
 from sosmith.verify.specified.filter_table import FilterTable
+from sosmith.verify.specified.section_mask import bands_of, sections_keep_to_losses
 
 _PRECISION = 192
 _DEEPEST = 40
@@ -40,6 +44,13 @@ def keeps_to_losses(taps: Sequence[Fraction], table: FilterTable) -> bool:
     """
     if list(taps) != list(taps)[::-1]:
         return False
+    try:
+        return _keeps_by_bisection(taps, table)
+    except UndecidedError:
+        return sections_keep_to_losses([SectionEntry(numerator=tuple(taps), denominator=(Fraction(1),))], table)
+
+
+def _keeps_by_bisection(taps: Sequence[Fraction], table: FilterTable) -> bool:
     with ctx.workprec(_PRECISION):
         least, most = (arb(10) ** (-ball(loss) / 20) for loss in table.losses.values())
         passing, stopping = bands_of(table)
@@ -47,19 +58,6 @@ def keeps_to_losses(taps: Sequence[Fraction], table: FilterTable) -> bool:
         return all(amplitude.is_within(band, least, arb(1)) for band in passing) and all(
             amplitude.is_within(band, arb(0), most) for band in stopping
         )
-
-
-def bands_of(table: FilterTable) -> tuple[list[_Band], list[_Band]]:
-    """Return the pass bands and the stop bands, in units of the sample rate."""
-    zero, half = Fraction(0), Fraction(1, 2)
-    passband, stopband = table.passband_edge, table.stopband_edge
-    if table.kind == "lowpass":
-        return [(zero, passband[0])], [(stopband[0], half)]
-    if table.kind == "highpass":
-        return [(passband[0], half)], [(zero, stopband[0])]
-    if table.kind == "bandpass":
-        return [(passband[0], passband[1])], [(zero, stopband[0]), (stopband[1], half)]
-    return [(zero, passband[0]), (passband[1], half)], [(stopband[0], stopband[1])]
 
 
 class _Amplitude:

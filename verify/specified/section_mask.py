@@ -19,8 +19,8 @@ from sosmith.verify.bounds.l1_response import UndecidedError, fraction
 from sosmith.verify.certificate_file import SectionEntry
 from sosmith.verify.specified.balls import ball
 from sosmith.verify.specified.filter_table import FilterTable
-from sosmith.verify.specified.fir_mask import bands_of
 
+_Band = tuple[Fraction, Fraction]
 _PRECISION = 256
 _LIMIT_BITS = 192
 """Fraction bits of limits of squared gains, which are rounded to the safe side."""
@@ -57,6 +57,19 @@ def sections_keep_to_losses(sections: Sequence[SectionEntry], table: FilterTable
         and all(_is_nowhere_positive(exactly(least) * under - over, *interval) for interval in passing)
         and all(_is_nowhere_positive(over - exactly(most) * under, *interval) for interval in stopping)
     )
+
+
+def bands_of(table: FilterTable) -> tuple[list[_Band], list[_Band]]:
+    """Return the pass bands and the stop bands, in units of the sample rate."""
+    zero, half = Fraction(0), Fraction(1, 2)
+    passband, stopband = table.passband_edge, table.stopband_edge
+    if table.kind == "lowpass":
+        return [(zero, passband[0])], [(stopband[0], half)]
+    if table.kind == "highpass":
+        return [(passband[0], half)], [(zero, stopband[0])]
+    if table.kind == "bandpass":
+        return [(passband[0], passband[1])], [(zero, stopband[0]), (stopband[1], half)]
+    return [(zero, passband[0]), (passband[1], half)], [(stopband[0], stopband[1])]
 
 
 def _above(frequency: Fraction) -> Fraction:

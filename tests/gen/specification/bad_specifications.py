@@ -749,12 +749,6 @@ BAD = [
         "stopband_loss, not 'mask'",
     ),
     (
-        "freedom of an FIR filter",
-        f"{FAM}\n{KO}",
-        f'family = "equiripple"\n{KIND}\nfreedom = "mask"\n' + EDGES.format(10.0, 45.0, 0.02, 60.0),
-        "not yet available: filter.freedom must be left out for equiripple, not 'mask'",
-    ),
-    (
         "no such freedom",
         ORD,
         ORD + '\nfreedom = "all"',

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from sosmith.verify.specified.filter_table import FilterTable
-from sosmith.verify.specified.fir_mask import bands_of, keeps_to_losses
+from sosmith.verify.specified.fir_mask import keeps_to_losses
+from sosmith.verify.specified.section_mask import bands_of
 
 EDGES = {
     "lowpass": ((Fraction(1, 10),), (Fraction(1, 5),)),
@@ -48,3 +49,11 @@ def test_a_band_is_not_judged_by_its_middle() -> None:
     edges = (Fraction(15, 256), Fraction(17, 256)), (Fraction(1, 1024), Fraction(1, 4))
     assert not keeps_to_losses(taps, table("bandpass", (3, 20), edges))
     assert keeps_to_losses(taps, table("bandpass", (3, 0.5), edges))
+
+
+def test_a_gain_may_be_its_limit() -> None:
+    taps = [Fraction(1, 4), Fraction(1, 2), Fraction(1, 4)]
+    losses = table("lowpass", (1.0, 2.0), ((Fraction(1, 10),), (Fraction(2, 5),)))
+    assert keeps_to_losses(taps, losses)
+    assert keeps_to_losses([-tap for tap in taps], losses)
+    assert not keeps_to_losses([tap * (1 + Fraction(1, 1 << 60)) for tap in taps], losses)
