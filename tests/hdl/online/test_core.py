@@ -202,5 +202,5 @@ FAULTS = {
 def test_a_fault_is_found(fault: tuple[str, str], monkeypatch: pytest.MonkeyPatch) -> None:
     wrong: ModuleType = broken(cascade, *fault)
     monkeypatch.setattr(online, "OnlineCascade", wrong.OnlineCascade)
-    with pytest.raises(AssertionError, match=r"^assert \["):
+    with pytest.raises(AssertionError):  # without a message, as tests run with plain assertions
         check(audio("df1_ef2"), 60, PACES["slow source"])
