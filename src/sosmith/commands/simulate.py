@@ -181,7 +181,7 @@ def simulate_command(
     With --port, a board runs the core instead of a simulator, and the report is the same.
 
     Compiled simulations are kept for later runs in ~/.cache/sosmith, or in the folder named by XDG_CACHE_HOME, up to
-    512 MB.
+    512 MB, and the figures of the latest reports, for a run that is the same in every sample.
 
     \b
         sosmith simulate my.toml
