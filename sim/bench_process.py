@@ -1,4 +1,4 @@
-"""The bench's own process: builds the simulation and runs the bench in it, with cocotb's runner or in CXXRTL.
+"""The bench's own process: builds the simulation and runs the bench in it, under cocotb or in CXXRTL.
 
 Each simulator loads what it needs itself, since loading takes longer than a short run.
 
