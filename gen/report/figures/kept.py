@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from sosmith.gen.realizations.kept_files import digest_of_sources, folder_in_cache, keep, read_kept
 from sosmith.gen.report.behaviour import Behaviour
@@ -69,16 +70,21 @@ class _Pickler(pickle.Pickler):
     """Writes digests in place of arrays, which may have millions of samples."""
 
     def persistent_id(self, item: Any) -> Any:
-        if isinstance(item, np.ndarray) and not item.dtype.hasobject:
-            return item.dtype.str, item.shape, hashlib.sha256(np.ascontiguousarray(item).data).hexdigest()
+        return _digest(item) if isinstance(item, np.ndarray) and not item.dtype.hasobject else None
+
+
+def _digest(array: npt.NDArray[Any] | None) -> tuple[str, tuple[int, ...], str] | None:
+    if array is None:
         return None
+    return array.dtype.str, array.shape, hashlib.sha256(np.ascontiguousarray(array).data).hexdigest()
 
 
 def key_of(shown: Evidence) -> str | None:
     """Return a digest of what a report shows; None if a part of it has no bytes of its own."""
     run = shown.run
     columns = {each.name: getattr(run, each.name) for each in fields(run)}
-    columns |= {"values": run.hardware, "before": run.unfiltered}  # which may be made where they are asked for
+    columns["values"] = _digest(run.hardware)  # made where it is asked for: one after the other, for their memory
+    columns["before"] = _digest(run.unfiltered)
     parts = {each.name: getattr(shown, each.name) for each in fields(shown) if each.name not in (*_OF_SPEED, "run")}
     sink = _Sink()
     sink.write(digest_of_sources(_SOURCES, np.__version__, version("matplotlib")).encode())
