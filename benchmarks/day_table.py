@@ -30,7 +30,6 @@ from sosmith.gen.calibration.day_room import with_day_room
 from sosmith.gen.core import design_core, polynomial_of
 from sosmith.gen.estimate.estimate import estimated, on_board
 from sosmith.gen.fpga.boards import find_board
-from sosmith.gen.reload.register_writes import bank_size
 from sosmith.gen.reload.reload import check_swap, other_set
 from sosmith.gen.specification.specification import Specification, load
 from sosmith.gen.word_lengths.input_stage import normalised
@@ -107,7 +106,7 @@ def hardware_costs(datapath: Datapath) -> dict[str, Any]:
             "memory": estimate.memory_bits,
             "flip_flops": estimate.flip_flops,
             "blocks": estimate.multiplier_blocks,
-            "words": bank_size(architecture)[0],
+            "words": architecture.bank_size[0],
             "clocks": architecture.cycles_per_result,
         }
     return found

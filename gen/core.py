@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 from sosmith.gen.architectures.architecture import Architecture
 from sosmith.gen.architectures.blocks import blocks_for
 from sosmith.gen.architectures.budget import Budget
 from sosmith.gen.architectures.registry import candidates, fitting, reason_for
 from sosmith.gen.architectures.search import AskedRealization, Response, Search
-from sosmith.gen.calibration.fit import Fit, fit, read_measurements
 from sosmith.gen.filter.design import Filter, design
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.realizations.registry import REALIZATIONS, realizations_for
@@ -25,6 +25,9 @@ from sosmith.model.errors import ShortfallError, SpecificationError
 from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
 from sosmith.model.suggestion import did_you_mean
+
+if TYPE_CHECKING:
+    from sosmith.gen.calibration.fit import Fit
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -333,6 +336,9 @@ def polynomial_of(spec: Specification) -> tuple[Polynomial, Fit | None]:
     """
     assert spec.calibration is not None
     if spec.calibration.data is not None:
+        # Most calibrations are given: only measurements load what reads and fits them.
+        from sosmith.gen.calibration.fit import fit, read_measurements  # noqa: PLC0415
+
         fitted = fit(read_measurements(spec.calibration.data))
         return fitted.polynomial, fitted
     assert spec.calibration.coefficients is not None

@@ -54,6 +54,17 @@ def format_of(path: Path) -> str:
     return file_format
 
 
+def plain_parameters() -> dict[Any, Any]:
+    """Return what a file of the user's has changed of matplotlib's parameters, as it is without: no picture follows it.
+
+    The parameters of what shows pictures in windows stay: here are none.
+    """
+    import matplotlib as mpl
+
+    plain = {name: value for name, value in mpl.rcParamsDefault.items() if not name.startswith("backend")}
+    return {name: value for name, value in plain.items() if mpl.rcParams[name] != value}
+
+
 def picture(
     name: str,
     size: tuple[float, float],
@@ -79,7 +90,7 @@ def picture(
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
-    with mpl.rc_context(_STYLE | {"svg.hashsalt": name} | (style or {})):
+    with mpl.rc_context(plain_parameters() | _STYLE | {"svg.hashsalt": name} | (style or {})):
         figure = Figure(figsize=size, dpi=_DPI, layout="constrained")
         paint(figure)
         if file_format == "svg":

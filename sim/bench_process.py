@@ -1,4 +1,4 @@
-"""The bench's own process: builds the simulation and runs the bench in it, with cocotb's runner or in CXXRTL.
+"""The bench's own process: builds the simulation and runs the bench in it, under cocotb or in CXXRTL.
 
 Each simulator loads what it needs itself, since loading takes longer than a short run.
 
@@ -16,11 +16,14 @@ import subprocess
 import sys
 import threading
 import time
+from importlib.machinery import PathFinder
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from sosmith.model.errors import ToolError
 
+_TESTS = "sosmith.sim.stream.cocotb_pins"
 _LOOK_SECONDS = 0.5
 """How often it looks whether its parent is still there."""
 
@@ -46,8 +49,6 @@ def _end_with(parent: int) -> None:
 
 
 def _run_verilator(job: dict[str, Any]) -> None:
-    from cocotb_tools.runner import Verilator
-
     from sosmith.sim.verilated_model import Builder, Model
 
     build = _build_folder(job)
@@ -58,8 +59,51 @@ def _run_verilator(job: dict[str, Any]) -> None:
         signals=tuple(job["signals"]),
         waves=job["waves"],
     )
-    Builder(job["version"], os.environ, build).build(model, build / job["top"])
-    _test(job, Verilator(), ["+verilator+rand+reset+2", f"+verilator+seed+{job['seed'] % 2**31 or 1}"])
+    program = build / job["top"]
+    Builder(job["version"], os.environ, build).build(model, program)
+    results = Path(job["folder"]) / "results.xml"
+    results.unlink(missing_ok=True)
+    random = ["+verilator+rand+reset+2", f"+verilator+seed+{job['seed'] % 2**31 or 1}"]
+    subprocess.run(
+        [str(program), *(["--trace"] if job["waves"] else []), *random],
+        cwd=job["folder"],
+        env=_cocotb_environment(job, results),
+        check=True,
+    )
+
+
+def _cocotb_environment(job: dict[str, Any], results: Path) -> dict[str, str]:
+    """Return what cocotb's runner sets for a program of Verilator, without the time that it takes to load.
+
+    Raises
+    ------
+    ToolError
+        If this Python has no shared library.
+    """
+    import cocotb_tools.config
+    from find_libpython import find_libpython  # which cocotb requires
+
+    python = find_libpython()
+    if python is None:
+        raise ToolError(f"Python must have a shared library for cocotb, not only the program {sys.executable}")
+    package = find_spec("cocotb")
+    assert package is not None
+    simulator = PathFinder.find_spec("cocotb.simulator", package.submodule_search_locations)  # without loading cocotb
+    assert simulator is not None
+    return {
+        **os.environ,
+        "COCOTB_TEST_MODULES": _TESTS,
+        "COCOTB_TOPLEVEL": job["top"],
+        "COCOTB_RANDOM_SEED": str(job["seed"]),
+        "COCOTB_RESULTS_FILE": str(results),
+        "COCOTB_TRUST_INERTIAL_WRITES": "1",
+        "GPI_USERS": f"{python};{Path(str(simulator.origin)).resolve()},initialize",
+        "PATH": f"{os.environ['PATH']}{os.pathsep}{cocotb_tools.config.libs_dir}",
+        "PYGPI_PYTHON_BIN": sys.executable,
+        "PYTHONPATH": os.pathsep.join(sys.path),
+        "SOSMITH_BENCH": job["folder"],
+        "TOPLEVEL_LANG": "verilog",
+    }
 
 
 def _run_cxxrtl(job: dict[str, Any]) -> None:
@@ -76,9 +120,20 @@ def _run_cxxrtl(job: dict[str, Any]) -> None:
 def _run_icarus(job: dict[str, Any]) -> None:
     from cocotb_tools.runner import Icarus
 
-    runner = Icarus()
+    runner, folder = Icarus(), Path(job["folder"])
     _build_with_icarus(job, runner)
-    _test(job, runner, [])
+    runner.test(
+        test_module=_TESTS,
+        hdl_toplevel=job["top"],
+        hdl_toplevel_lang="verilog",
+        build_dir=folder / "build",
+        test_dir=folder,
+        results_xml=str(folder / "results.xml"),
+        seed=job["seed"],
+        timescale=("1ns", "1ps"),
+        waves=job["waves"],
+        extra_env={"SOSMITH_BENCH": str(folder)},
+    )
 
 
 _RUNS = {"verilator": _run_verilator, "icarus": _run_icarus, "cxxrtl": _run_cxxrtl}
@@ -111,23 +166,6 @@ def _build_with_icarus(job: dict[str, Any], runner: Any) -> None:
 def _fingerprint(job: dict[str, Any]) -> str:
     choices = [job["version"], job["waves"], sys.version, __file__]
     return hashlib.sha256(Path(job["source"]).read_bytes() + json.dumps(choices).encode()).hexdigest()
-
-
-def _test(job: dict[str, Any], runner: Any, plusargs: list[str]) -> None:
-    folder = Path(job["folder"])
-    runner.test(
-        test_module="sosmith.sim.stream.cocotb_pins",
-        hdl_toplevel=job["top"],
-        hdl_toplevel_lang="verilog",
-        build_dir=folder / "build",
-        test_dir=folder,
-        results_xml=str(folder / "results.xml"),
-        seed=job["seed"],
-        timescale=("1ns", "1ps"),
-        waves=job["waves"],
-        plusargs=plusargs,
-        extra_env={"SOSMITH_BENCH": str(folder)},
-    )
 
 
 if __name__ == "__main__":

@@ -112,3 +112,11 @@ def _formats_are_kept(searches_anew: bool, monkeypatch: pytest.MonkeyPatch, _for
     kept = sys.modules.get("sosmith.gen.realizations.kept_formats")
     if kept is not None:
         monkeypatch.setattr(kept, "cache_folder", lambda: None if searches_anew else _formats)
+
+
+@pytest.fixture(autouse=True)
+def _figures_are_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Draw the figures of each report: a test may look at them, or change what draws them."""
+    kept = sys.modules.get("sosmith.gen.report.figures.kept")
+    if kept is not None:
+        monkeypatch.setattr(kept, "cache_folder", lambda: None)

@@ -6,12 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from sosmith.gen.architectures.architecture import Architecture
 from sosmith.gen.architectures.budget import Budget
 from sosmith.gen.architectures.registry import fitting
-from sosmith.gen.calibration.fit import Fit
 from sosmith.gen.filter.design import Filter
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.realizations.registry import LOOK_AHEAD, REALIZATIONS
@@ -30,6 +29,9 @@ from sosmith.model.dataflow.downsampler import Downsampler
 from sosmith.model.errors import ShortfallError
 from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
+
+if TYPE_CHECKING:
+    from sosmith.gen.calibration.fit import Fit
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,7 +10,6 @@ from sosmith.gen.chain.design import ChainDesign, StageDesign
 from sosmith.gen.chain.top import chain_interface, registers_port, top_text
 from sosmith.gen.output.identity import BoardItem
 from sosmith.gen.output.verilog import core_verilog
-from sosmith.gen.reload.register_writes import bank_size
 from sosmith.hdl.boards.chain_core import ChainCore
 from sosmith.hdl.boards.channel_holder import CLOCKS, HeldChannels
 from sosmith.model.dataflow.status import Flag
@@ -63,7 +62,7 @@ def chain_item(design: ChainDesign) -> BoardItem:
         cycles_per_sample=latency if in_turn else _cycles(design),
         latency_cycles=latency,
         fingerprint=fingerprint,
-        words=0 if loaded is None else bank_size(loaded.design.architecture)[0],
+        words=0 if loaded is None else loaded.design.architecture.bank_size[0],
         component=component,
         make_verilog=lambda: top_text(design),
         make_modules=lambda: modules(design),

@@ -21,7 +21,6 @@ from sosmith.gen.output.decimation_facts import (
 from sosmith.gen.proof.limit_cycles import limit_cycles, recursions
 from sosmith.gen.proof.linear_model import linear_model
 from sosmith.gen.proof.settling import SETTLED
-from sosmith.gen.reload.register_writes import bank_size
 from sosmith.gen.word_lengths.cost import Cost
 from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.hdl.plan.streams import Field, dest_width, fields
@@ -519,7 +518,7 @@ def _limit_cycles(name: str, graph: Graph, output: Port) -> LimitCycleFacts:
 def _reload(design: CoreDesign) -> ReloadFacts | None:
     if design.architecture.fingerprint is None:
         return None
-    words, bits = bank_size(design.architecture)
+    words, bits = design.architecture.bank_size
     return ReloadFacts(
         interface=INTERFACE,
         design=design.architecture.fingerprint,

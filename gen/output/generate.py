@@ -12,7 +12,6 @@ from sosmith.gen.output.header import with_comments
 from sosmith.gen.output.manifest import manifest
 from sosmith.gen.output.verilog import core_rtlil, to_verilog
 from sosmith.gen.reload.register_map import c_registers, systemrdl
-from sosmith.gen.reload.register_writes import bank_size
 from sosmith.model.dataflow.c_model import c_header, c_source
 from sosmith.model.text_files import to_json, write_files
 from sosmith.verify.certificate_file import Certificate, certificate_text, sealed
@@ -83,7 +82,7 @@ def _register_files(design: CoreDesign) -> dict[str, str]:
     fingerprint = design.architecture.fingerprint
     if fingerprint is None or not design.architecture.reload_registers:
         return {}
-    name, (words, _) = design.spec.name, bank_size(design.architecture)
+    name, (words, _) = design.spec.name, design.architecture.bank_size
     protected, lock = design.architecture.protect != "none", design.architecture.reload_lock
     return {
         f"{name}_registers.h": c_registers(name, words=words, design=fingerprint, protected=protected, lock=lock),

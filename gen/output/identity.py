@@ -14,7 +14,6 @@ from pydantic import ValidationError
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.output.core_facts import interface_facts
 from sosmith.gen.output.verilog import core_verilog
-from sosmith.gen.reload.register_writes import bank_size
 from sosmith.gen.specification.specification import Specification
 from sosmith.gen.version import __version__
 from sosmith.hdl.boards.channel_holder import CLOCKS, HeldChannels
@@ -115,7 +114,7 @@ def core_item(design: CoreDesign) -> BoardItem:
         cycles_per_sample=latency if in_turn else design.architecture.cycles_per_sample,
         latency_cycles=latency,
         fingerprint=fingerprint,
-        words=0 if fingerprint is None else bank_size(design.architecture)[0],
+        words=0 if fingerprint is None else design.architecture.bank_size[0],
         component=component,
         make_verilog=lambda: core_verilog(design),
     )

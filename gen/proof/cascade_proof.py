@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 
 from sosmith.gen.proof.linear_model import LinearModel, Polynomial
 from sosmith.gen.proof.peak_gain import Drive, Extent, difference, extent
@@ -84,7 +85,7 @@ def prove_cascade(
         output=_limits(drives, steady=steady),
         rounding=extent([drive for key, drive in drives.items() if key != INPUT]),
         coefficients=_deviation(drives[INPUT].response, exact, low, high, steady=steady),
-        gain=_gain(exact),
+        gain=ideal_gain(ideal),
     )
 
 
@@ -162,7 +163,12 @@ def rounding_gains(stages: Sequence[StageModel]) -> list[dict[str, Fraction]]:
 
 def ideal_gain(ideal: Sequence[TransferFunction]) -> Fraction:
     """Worst-case peak gain of the ideal sections."""
-    return _gain(through(ideal))
+    return _gain(tuple((tuple(b), tuple(a)) for b, a in ideal))
+
+
+@lru_cache(maxsize=32)  # the plan of every realization asks for it, and its proof
+def _gain(ideal: tuple[TransferFunction, ...]) -> Fraction:
+    return extent([Drive(through(ideal), Fraction(-1), Fraction(1))]).high
 
 
 def through(sections: Sequence[TransferFunction]) -> Response:
@@ -222,7 +228,3 @@ def _sum(responses: Iterable[Response]) -> Response:
 
 def _input_count(stage: StageModel) -> int:
     return 1 + max(k for model in stage for k in model.entries)
-
-
-def _gain(response: Response) -> Fraction:
-    return extent([Drive(response, Fraction(-1), Fraction(1))]).high

@@ -2,24 +2,20 @@
 
 A file is named by a digest of all that its content depends on: rows, input stages, objective and the allowed error, the
 sources of the search, and the version of numpy. What is read is a proposal like that of the search itself: the proof
-decides whether a design may have it. A file that is not as it was written, or a folder that cannot be used, is as none.
+decides whether a design may have it.
 """
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
-import json
-import os
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
-from itertools import count
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
+from sosmith.gen.realizations.kept_files import digest_of_sources, folder_in_cache, keep, read_kept
 from sosmith.gen.realizations.section_format import SectionFormat
 
 _Kept = TypeVar("_Kept")
@@ -40,16 +36,11 @@ class Choice:
 LIMIT = 16384
 """Files that are kept; beyond, the older half of them goes."""
 
-_LOOKS = 64
-"""Of the files that are written, each of so many is a reason to count them."""
-
 _SOURCES = (
     *("gen/architectures", "gen/filter", "gen/fpga", "gen/proof", "gen/realizations", "gen/word_lengths", "hdl/plan"),
     *("model/arithmetic", "model/dataflow", "model/sections"),
 )
 """What decides on the result, from the folder that holds the rooms."""
-
-_written = count()
 
 
 def kept_or_made(
@@ -71,11 +62,11 @@ def kept_or_made(
     if folder is None:
         return make()
     place = folder / f"{hashlib.sha256(f'{_sources()} {text}'.encode()).hexdigest()}.json"
-    tree = _read(place)
+    tree = read_kept(place)
     if tree is not None:
         return of_tree(tree[0])
     result = make()
-    _write(place, to_tree(result))
+    keep(place, to_tree(result), LIMIT)
     return result
 
 
@@ -98,52 +89,9 @@ def choice_of_tree(tree: dict[str, Any]) -> Choice:
 
 
 def cache_folder() -> Path | None:
-    named = os.environ.get("XDG_CACHE_HOME", "")
-    try:
-        folder = (Path(named) if Path(named).is_absolute() else Path.home() / ".cache") / "sosmith" / "trimmed"
-        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-    except (OSError, RuntimeError):  # no home, or not writable
-        return None
-    return folder
+    return folder_in_cache("trimmed")
 
 
-@cache
 def _sources() -> str:
     """Return a digest of the sources, and of what computes the responses."""
-    digest = hashlib.sha256(np.__version__.encode())
-    room = Path(__file__).resolve().parents[2]
-    for path in sorted(path for part in _SOURCES for path in (room / part).glob("**/*.py")):
-        digest.update(path.read_bytes())
-    return digest.hexdigest()
-
-
-def _read(place: Path) -> list[Any] | None:
-    """Return what is kept, as the only element of a list; None if it is not as it was written."""
-    try:
-        digest, text = place.read_text(encoding="utf-8").split("\n")
-        if digest != hashlib.sha256(text.encode()).hexdigest():
-            return None
-        return [json.loads(text)]
-    except (OSError, ValueError):
-        return None
-
-
-def _write(place: Path, tree: Any) -> None:
-    text = json.dumps(tree)
-    new = place.with_suffix(f".{os.getpid()}.new")
-    try:
-        new.write_text(f"{hashlib.sha256(text.encode()).hexdigest()}\n{text}", encoding="utf-8")
-        new.replace(place)
-        if next(_written) % _LOOKS == 0:
-            _shrink(place.parent)
-    except OSError:  # a full disk, or a folder that has gone: the next command searches again
-        with contextlib.suppress(OSError):
-            new.unlink(missing_ok=True)
-
-
-def _shrink(folder: Path) -> None:
-    """Remove the older half where there are too many."""
-    places = list(folder.iterdir())
-    if len(places) > LIMIT:
-        for place in sorted(places, key=lambda each: each.stat().st_mtime_ns)[: len(places) // 2]:
-            place.unlink(missing_ok=True)
+    return digest_of_sources(_SOURCES, np.__version__)

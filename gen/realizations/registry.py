@@ -1,7 +1,8 @@
 """The registry of realizations: how a section of the ideal filter becomes an integer stage.
 
 Each realization is registered once, here; its terms stand in `sosmith.gen.specification.realizations`. Word lengths,
-proof, C model, hardware, report and test matrix follow.
+proof, C model, hardware, report and test matrix follow. What makes its stages is loaded when a first one is made: most
+designs come to direct forms.
 """
 
 from __future__ import annotations
@@ -9,20 +10,20 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Protocol
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Protocol
 
 from sosmith.gen.realizations.direct_form import direct_form
 from sosmith.gen.realizations.fir import fir_section
-from sosmith.gen.realizations.lattice import Part, lattice_parts, lattice_stage
-from sosmith.gen.realizations.look_ahead import look_ahead, look_ahead_parts
 from sosmith.gen.realizations.section_format import WIDE, SectionFormat
-from sosmith.gen.realizations.state_space import minimum_noise, normal, state_space
-from sosmith.gen.realizations.transposed import transposed_form
 from sosmith.gen.specification import choices
 from sosmith.gen.specification import realizations as terms
 from sosmith.gen.specification.realizations import RealizationTerms
 from sosmith.model.dataflow.structure import Stage
 from sosmith.model.sections.fir import Form
+
+if TYPE_CHECKING:
+    from sosmith.gen.realizations.lattice import Part
 
 Row = Sequence[float]
 """b0, b1, b2, 1, a1, a2 of an ideal section; longer halves of an FIR filter, whose second one is 1, 0, 0, ..."""
@@ -87,6 +88,23 @@ class Realization:
         return self.cascade or self.transfer is not None
 
 
+@dataclass(frozen=True)
+class _Late:
+    """A function of another module of this folder, which is loaded when it is called."""
+
+    module: str
+    function: str
+
+    def __call__(self, *values: Any, **options: Any) -> Any:
+        module = import_module(f"sosmith.gen.realizations.{self.module}")
+        return getattr(module, self.function)(*values, **options)
+
+
+_LATTICE_STAGE = _Late("lattice", "lattice_stage")
+_STATE_SPACE = _Late("state_space", "state_space")
+_TRANSPOSED = _Late("transposed", "transposed_form")
+
+
 def _section(make: Callable[..., Section], **options: Any) -> Callable[[Row, SectionFormat, str], Section]:
     """Return the builder of a section that takes one row, from what makes it and its options."""
 
@@ -106,7 +124,7 @@ def _section(make: Callable[..., Section], **options: Any) -> Callable[[Row, Sec
 
 
 def _lattice(part: Part, form: SectionFormat, name: str) -> Section:
-    return lattice_stage(
+    stage: Section = _LATTICE_STAGE(
         part,
         name=name,
         rounding=form.rounding,
@@ -115,6 +133,7 @@ def _lattice(part: Part, form: SectionFormat, name: str) -> Section:
         ranges=form.ranges,
         wide=(-WIDE, WIDE),
     )
+    return stage
 
 
 SECTIONS: dict[str, Realization] = {
@@ -124,14 +143,20 @@ SECTIONS: dict[str, Realization] = {
             Realization(terms=each, build=_section(direct_form, feedback_order=each.feedback_order))
             for each in (terms.DF1, terms.DF1_EF1, terms.DF1_EF2)
         ),
-        Realization(terms=terms.DF2T, build=_section(transposed_form, delta=False)),
-        Realization(terms=terms.DELTA, build=_section(transposed_form, delta=True)),
-        Realization(terms=terms.STATE_SPACE, build=_section(state_space, design=minimum_noise, truncating=False)),
-        Realization(terms=terms.NORMAL, build=_section(state_space, design=normal, truncating=True)),
+        Realization(terms=terms.DF2T, build=_section(_TRANSPOSED, delta=False)),
+        Realization(terms=terms.DELTA, build=_section(_TRANSPOSED, delta=True)),
+        Realization(
+            terms=terms.STATE_SPACE,
+            build=_section(_STATE_SPACE, design=_Late("state_space", "minimum_noise"), truncating=False),
+        ),
+        Realization(
+            terms=terms.NORMAL,
+            build=_section(_STATE_SPACE, design=_Late("state_space", "normal"), truncating=True),
+        ),
         Realization(
             terms=terms.LATTICE_WDF,
             build=_lattice,
-            parts=lattice_parts,
+            parts=_Late("lattice", "lattice_parts"),
             cascade=False,
             not_decimated="with its droop corrected, the filter is no sum of two allpass filters",
         ),
@@ -165,8 +190,8 @@ LOOK_AHEAD: dict[int, Realization] = {
             f"look_ahead_{samples}",
             f"zeros in one FIR filter, recursions with scattered look-ahead over {samples} samples",
         ),
-        build=look_ahead,
-        parts=partial(look_ahead_parts, distance=samples),
+        build=_Late("look_ahead", "look_ahead"),
+        parts=partial(_Late("look_ahead", "look_ahead_parts"), distance=samples),
         cascade=False,
         transfer=lambda part: part.transfer,
     )

@@ -6,16 +6,10 @@ import zlib
 from collections.abc import Sequence
 from typing import Any
 
-from sosmith.gen.architectures.architecture import Architecture
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.proof.fading import RESIDUE
 from sosmith.gen.reload.reload import OtherSet, Swap
 from sosmith.model.reload.registers import CRC, DATA, VERSION, Register
-
-
-def bank_size(architecture: Architecture) -> tuple[int, int]:
-    """Return the number of words in a bank of a core, and the number of bits used in each."""
-    return architecture.bank_size
 
 
 def register_writes(hardware: CoreDesign, new_set: OtherSet, version: int) -> list[tuple[Register, int]]:
@@ -54,7 +48,7 @@ def reload_json(hardware: CoreDesign, swap: Swap, version: int) -> dict[str, Any
     """
     output, quantized = hardware.datapath.output, swap.new_set.quantized
     polynomial = quantized.polynomial
-    words, _ = bank_size(hardware.architecture)
+    words, _ = hardware.architecture.bank_size
     return {
         "name": hardware.spec.name,
         "design": hardware.architecture.fingerprint,

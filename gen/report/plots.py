@@ -10,7 +10,7 @@ import itertools
 import math
 import re
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -33,11 +33,12 @@ from sosmith.gen.filter.response import (
     stopbands,
     zeros,
 )
-from sosmith.gen.picture import settled, svg_text
+from sosmith.gen.picture import plain_parameters, settled, svg_text
 from sosmith.gen.quantity import count, quantity, scale
 from sosmith.gen.report.evidence import Evidence
+from sosmith.gen.report.largest_error import close_up, error_limits, error_peak
 from sosmith.gen.report.run import Instants
-from sosmith.model.reference.accuracy import error_statistics, peak
+from sosmith.model.reference.accuracy import peak
 
 Array = npt.NDArray[np.float64]
 
@@ -103,7 +104,7 @@ def draw(name: str, title: str, width: int, height: int, paint: Callable[[Figure
 
 
 def _painted(name: str, width: int, height: int, paint: Callable[[Figure], None]) -> str:
-    with mpl.rc_context(STYLE | {"svg.hashsalt": f"{name}-{width}"}):
+    with mpl.rc_context(plain_parameters() | STYLE | {"svg.hashsalt": f"{name}-{width}"}):
         figure = Figure(figsize=(width / 72, height / 72), dpi=72, layout="constrained")
         paint(figure)
         return svg_text(figure)
@@ -253,14 +254,6 @@ def _fills_area(values: Array, width: int) -> bool:
     return travel > width / 10 * float(np.ptp(values))
 
 
-def close_up(evidence: Evidence, samples: int = 60) -> slice:
-    """At most `samples` samples around the first of those with the largest error."""
-    count = len(evidence.run)
-    start = error_statistics(evidence.run.error).worst - samples // 2
-    start = min(max(start, 0), max(count - samples, 0))
-    return slice(start, min(start + samples, count))
-
-
 def close_up_figure(evidence: Evidence, width: int) -> str:
     """Exact calculation and hardware, sample by sample, around the largest error."""
 
@@ -282,32 +275,6 @@ def close_up_figure(evidence: Evidence, width: int) -> str:
     return draw("close-up", "Output around the largest error", width, 250, paint)
 
 
-class Limit(NamedTuple):
-    """Limit of the error, in the output's unit, and how it is drawn."""
-
-    value: float
-    role: str
-    dashes: str
-    words: str
-
-
-def error_limits(evidence: Evidence) -> tuple[list[Limit], list[Limit]]:
-    """Split the limits of the error into those to draw and those too far outside.
-
-    A limit beyond six times the largest error would squeeze the curve to a line.
-    """
-    limits = [Limit(evidence.facts.error_bound, "limit", "--", "limit")]
-    if not np.isclose(evidence.facts.max_error, evidence.facts.error_bound, rtol=1e-3):
-        limits.append(Limit(evidence.facts.max_error, "asked", ":", "allowed by the specification"))
-    reach = 6 * _error_peak(evidence)
-    return [limit for limit in limits if limit.value <= reach], [limit for limit in limits if limit.value > reach]
-
-
-def _error_peak(evidence: Evidence) -> float:
-    """Largest error, at least half a step of the output, so that no axis is empty."""
-    return max(peak(evidence.run.error), evidence.facts.lsb / 2)
-
-
 def error_figure(evidence: Evidence, width: int) -> str:
     """Hardware minus exact calculation against time, with its limits."""
 
@@ -315,7 +282,7 @@ def error_figure(evidence: Evidence, width: int) -> str:
         axes = figure.subplots()
         factor, _ = time_axis(axes, evidence.run.instants)
         inside, _outside = error_limits(evidence)
-        top = 1.25 * max([_error_peak(evidence), *(limit.value for limit in inside)])
+        top = 1.25 * max([error_peak(evidence), *(limit.value for limit in inside)])
         scaling, unit = scale(top, evidence.facts.unit)
         error = evidence.run.error
         error *= scaling
@@ -344,7 +311,7 @@ def histogram_figure(evidence: Evidence) -> str:
         axes = figure.subplots()
         steps = evidence.run.error
         steps /= evidence.facts.lsb
-        reach = 1.2 * _error_peak(evidence) / evidence.facts.lsb
+        reach = 1.2 * error_peak(evidence) / evidence.facts.lsb
         counts, edges = np.histogram(steps, bins=np.linspace(-reach, reach, 52))
         axes.stairs(100 * counts / len(steps), edges, fill=True, color=COLOUR["hardware"])
         for limit in (-0.5, 0.5):

@@ -10,7 +10,8 @@ import numpy.typing as npt
 
 from sosmith.gen.quantity import scale
 from sosmith.gen.report.evidence import Evidence
-from sosmith.gen.report.plots import Array, close_up, error_limits
+from sosmith.gen.report.largest_error import close_up, error_limits
+from sosmith.gen.report.run import Array
 from sosmith.model.reference.accuracy import peak
 
 MAX_POINTS = 16_000

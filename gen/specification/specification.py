@@ -9,10 +9,12 @@ from dataclasses import dataclass, replace
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from sosmith.gen.specification.choices import CALIBRATION_INPUTS, FIR, FIR_FAMILIES
 from sosmith.gen.specification.converters import ConverterSpec, converters, dac
+from sosmith.gen.specification.rules import check
+from sosmith.gen.specification.schema import Document, FilterTable, InputTable, OutputTable, UncertaintyTable, parse
 from sosmith.gen.specification.toml_text import toml_text
 from sosmith.gen.specification.uncertainty import CoefficientsSpec, UncertaintySpec
 from sosmith.gen.specification.values import UnfitError, literal
@@ -22,9 +24,6 @@ from sosmith.model.errors import SpecificationError
 from sosmith.model.foreign_files import read_text
 from sosmith.model.port import Port
 from sosmith.model.tables.toml_file import parse_toml
-
-if TYPE_CHECKING:
-    from sosmith.gen.specification.schema import Document, FilterTable, InputTable, OutputTable, UncertaintyTable
 
 MAX_BYTES = 1 << 16
 """Maximum size of a specification in bytes; typical ones have one or two thousand."""
@@ -282,10 +281,6 @@ def from_tree(tree: dict[str, Any], path: Path) -> Specification:
     SpecificationError
         As `load`.
     """
-    # pydantic is slow to import: a file that is missing or not TOML is refused without it.
-    from sosmith.gen.specification.rules import check
-    from sosmith.gen.specification.schema import parse
-
     try:
         if STAGE in tree:
             raise UnfitError(
@@ -377,13 +372,13 @@ def _calibration(path: Path, document: Document) -> CalibrationSpec | None:
     return CalibrationSpec(
         coefficients=calibration.coefficients,
         data=None if calibration.data is None else path.parent / calibration.data,
-        uncertainty=None if calibration.uncertainty is None else CoefficientsSpec(**dict(calibration.uncertainty)),
+        uncertainty=None if calibration.uncertainty is None else CoefficientsSpec(**vars(calibration.uncertainty)),
     )
 
 
 def _uncertainty(table: UncertaintyTable) -> UncertaintySpec:
     motion = tuple((frequency, amplitude) for frequency, amplitude in table.motion)
-    return UncertaintySpec(**dict(table) | {"motion": motion})
+    return UncertaintySpec(**vars(table) | {"motion": motion})
 
 
 def _filter(path: Path, table: FilterTable) -> FilterSpec:

@@ -24,7 +24,7 @@ from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.folding.fold import columns_of, program
 from sosmith.model.dataflow.folding.values import FoldingError
 from sosmith.model.dataflow.graph import Graph, Op
-from sosmith.model.dataflow.program import serial_clocks
+from sosmith.model.dataflow.program import Program, serial_clocks
 from sosmith.model.dataflow.scheduling import Column
 from sosmith.model.errors import ShortfallError
 
@@ -305,8 +305,14 @@ class ShortProgram:
         return sum(clocks) or 1
 
 
-folded = lru_cache(maxsize=16)(program)
-"""Folds a datapath; its size, its clocks and its hardware ask for the same program."""
+def folded(datapath: Datapath, digit_bits: int, *, spare_words: int = 0, products: int = 1, trials: int = 0) -> Program:
+    """Fold a datapath as `sosmith.model.dataflow.folding.fold.program` does; the same one is folded once."""
+    return _folded(datapath, digit_bits, spare_words, products, trials)
+
+
+@lru_cache(maxsize=16)  # the size of a datapath, its clocks and its hardware ask for the same program
+def _folded(datapath: Datapath, digit_bits: int, spare_words: int, products: int, trials: int) -> Program:
+    return program(datapath, digit_bits, spare_words=spare_words, products=products, trials=trials)
 
 
 def unsuitable(architecture: str, error: FoldingError) -> str:

@@ -401,12 +401,9 @@ def gain_of(ideal: Filter) -> Fraction:
         If a pole lies too close to the unit circle; the message says what would help.
     """
     try:
-        return _ideal_gain(ideal.exact)
+        return ideal_gain(ideal.exact)
     except ShortfallError as error:
         raise ShortfallError(f"{error}{_remedy_of_poles(ideal)}") from None
-
-
-_ideal_gain = lru_cache(maxsize=32)(ideal_gain)  # asked for by every realization
 
 
 def _remedy_of_poles(ideal: Filter) -> str:

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
 from sosmith.gen.quantity import decibels, number, quantity
-from sosmith.gen.report.page import Figure
+from sosmith.gen.report.figures.figure import Figure
 from sosmith.gen.report.plots import COLOUR, NARROW, SERIES, WIDE, decades, draw
 from sosmith.model.templates import render
 from sosmith.sim.exploration.evaluation import Point

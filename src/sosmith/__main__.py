@@ -8,7 +8,7 @@ from importlib import import_module
 
 # What modules make when they load stays, and what a design leaves are few cycles: at Python's own threshold, looking
 # for garbage takes a tenth of a short command.
-gc.set_threshold(50_000)
+gc.set_threshold(200_000)
 
 
 def main() -> None:
@@ -17,6 +17,8 @@ def main() -> None:
         import_module("sosmith.cli").main()
     except KeyboardInterrupt:
         sys.exit(130)
+    finally:
+        gc.freeze()  # the process ends: to look for garbage in all that was loaded would take a tenth of a design
 
 
 if __name__ == "__main__":

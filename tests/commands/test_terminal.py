@@ -314,7 +314,7 @@ def test_tools_that_are_missing(sosmith: Command, monkeypatch: pytest.MonkeyPatc
 def test_the_first_demo_says_how_long_it_takes(first: bool, sosmith: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sosmith.sim.simulator_bench.has_library", lambda: not first)
     outcome = sosmith("demo", "-o", "demo.toml/out")  # which ends it soon
-    said = "the first run takes about 35 s, as Verilator's library is compiled, and later ones about 15 s"
+    said = "the first run takes about 35 s, as Verilator's library is compiled, and later ones about 5 s"
     assert (said in outcome.stderr) == first
     assert "demo.toml/out: the output folder must be a folder" in outcome.stderr
 

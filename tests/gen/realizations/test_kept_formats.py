@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from sosmith.gen.realizations import kept_formats
+from sosmith.gen.realizations import kept_files, kept_formats
 from sosmith.gen.realizations.kept_formats import Choice, choice_of_tree, kept_or_made, tree_of_choice
 from sosmith.gen.realizations.section_format import SectionFormat
 
@@ -34,7 +34,7 @@ class Maker:
 def made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Maker:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.setattr(kept_formats, "cache_folder", CACHE_FOLDER)
-    monkeypatch.setattr(kept_formats, "_written", count())
+    monkeypatch.setattr(kept_files, "_written", count())
     return Maker()
 
 
@@ -111,7 +111,7 @@ def test_what_has_no_representation_of_its_own_is_not_kept(made: Maker, tmp_path
 
 def test_the_older_half_goes(made: Maker, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(kept_formats, "LIMIT", 6)
-    monkeypatch.setattr(kept_formats, "_LOOKS", 3)  # at the first file, the fourth, the seventh
+    monkeypatch.setattr(kept_files, "_LOOKS", 3)  # at the first file, the fourth, the seventh
     for key in range(8):
         made.asked(key)
     assert len(files(tmp_path)) == 5

@@ -18,7 +18,7 @@ from sosmith.gen.filter.design import design
 from sosmith.gen.realizations.registry import REALIZATIONS
 from sosmith.gen.reload import reload
 from sosmith.gen.reload.other_constants import with_constants
-from sosmith.gen.reload.register_writes import bank_size, register_writes, reload_json
+from sosmith.gen.reload.register_writes import register_writes, reload_json
 from sosmith.gen.reload.reload import ADVICE, OtherSet, check_swap, other_set, own_set, room_of, set_for
 from sosmith.gen.specification.specification import load
 from sosmith.gen.word_lengths.quantized import Quantized
@@ -282,7 +282,7 @@ def test_writes_of_a_program() -> None:
     hardware = hardware_in("folded")
     swap = check_swap(hardware, own_set(hardware), other_set(hardware, ideal=moved(hardware, "1.2")))
     version, *data, crc = register_writes(hardware, swap.new_set, 7)
-    words, bits = bank_size(hardware.architecture)
+    words, bits = hardware.architecture.bank_size
     made = swap.new_set.program
     assert made is not None
     assert version == (VERSION, 7)
@@ -302,7 +302,7 @@ def test_writes_of_the_parallel_architecture() -> None:
     hardware = hardware_in("parallel")
     own = own_set(hardware)
     _, *data, _ = register_writes(hardware, own, 0)
-    assert bank_size(hardware.architecture) == (len(data), 32)
+    assert hardware.architecture.bank_size == (len(data), 32)
     loadable = constants(hardware.datapath)
     assert unpacked([word for _, word in data], loadable) == [
         hardware.datapath.stages[c.stage].graph.nodes[c.node].parameter for c in loadable

@@ -20,8 +20,8 @@ from sosmith.gen.filter.step_response import step_response
 from sosmith.gen.output.core_facts import SettlingFacts
 from sosmith.gen.report.behaviour import behaviour
 from sosmith.gen.report.evidence import Evidence
+from sosmith.gen.report.figures.report_figures import histogram_caption
 from sosmith.gen.report.headlines import report_table
-from sosmith.gen.report.page import histogram_caption
 from sosmith.gen.report.report import summarise
 
 FIRST_ORDER = np.array([[0.1, 0.0, 0.0, 1.0, -0.9, 0.0]])

@@ -12,7 +12,7 @@ from tests.gen.designs import example_design
 from tests.gen.report.evidences import Page, evidence, page_of
 
 from sosmith.gen.realizations.registry import SECTIONS
-from sosmith.gen.report.diagram import diagram
+from sosmith.gen.report.figures.diagram import diagram
 from sosmith.gen.report.recursion import Coefficient, Equation, Recursion, Term, recursion_of
 from sosmith.model.dataflow.graph import Graph
 

@@ -44,6 +44,7 @@ from sosmith.gen.output.core_facts import (
 )
 from sosmith.gen.report import plots
 from sosmith.gen.report.evidence import Alternative, Evidence
+from sosmith.gen.report.largest_error import close_up, error_limits
 from sosmith.gen.report.mask import mask_shortfalls
 from sosmith.gen.report.page import render_page
 from sosmith.gen.report.report import summarise, write_report
@@ -670,7 +671,7 @@ def test_a_handful_of_samples_makes_a_page(length: int) -> None:
 @without_pictures
 def test_a_limit_far_outside_is_named_instead_of_drawn() -> None:
     run = evidence(error_bound=0.5, max_error=1.0)
-    assert plots.error_limits(run)[0] == []
+    assert error_limits(run)[0] == []
     assert "Too far out to draw: limit ±500\u00a0µm and allowed by the specification ±1,000\u00a0µm." in page_of(run)
 
 
@@ -695,7 +696,7 @@ def test_close_up_holds_the_largest_error() -> None:
     for worst in (0, 5, 1500, 2999):
         hardware = evidence().run.golden.copy()
         hardware[worst] += 1
-        near = plots.close_up(evidence(hardware=hardware))
+        near = close_up(evidence(hardware=hardware))
         assert near.stop - near.start == 60
         assert near.start <= worst < near.stop
 

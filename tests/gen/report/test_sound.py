@@ -14,10 +14,10 @@ from tests.gen.report.evidences import words_of
 import sosmith
 from sosmith.gen.report.comparison.rows import compare
 from sosmith.gen.report.evidence import Evidence
+from sosmith.gen.report.figures.spectrum_plot import levels
 from sosmith.gen.report.plots import lowest_gain_db, phase, phase_figure
 from sosmith.gen.report.report import summarise
 from sosmith.gen.report.run import run_of
-from sosmith.gen.report.spectrum_plot import levels
 from sosmith.instrument.scenarios.traces import default_scenario, traces_for
 from sosmith.model.full_scale import is_sound, peak_dbfs, rms_dbfs
 from sosmith.model.port import Port

@@ -2,15 +2,19 @@
 
 import math
 import re
+from dataclasses import replace
+from typing import Any
 
 import pytest
 from tests.gen.designs import ALL, example_design, parallel_design
 
 from sosmith.gen.architectures.registry import ARCHITECTURES
 from sosmith.gen.fpga.boards import find_board
+from sosmith.gen.word_lengths import objective
 from sosmith.gen.word_lengths.objective import SMALL_AREA, Objective, ShortProgram
 from sosmith.gen.word_lengths.online_units import OnlineUnits
 from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.dataflow.folding import fold
 from sosmith.model.dataflow.graph import GraphBuilder
 from sosmith.model.dataflow.program import serial_clocks
 from sosmith.model.errors import ShortfallError
@@ -54,6 +58,21 @@ def test_memory_and_accumulator_decide_between_programs_of_the_same_length() -> 
     assert size == length + program.words / 2**16 + program.accumulator_bits / 2**24
     assert program.words / 2**16 > 64 / 2**24  # a word outweighs any accumulator
     assert size < length + 1
+
+
+def test_a_datapath_is_folded_once_for_its_size_and_its_hardware(monkeypatch: pytest.MonkeyPatch) -> None:
+    design, made = example_design("flange_wear_bench.toml"), list[Datapath]()
+
+    def program(datapath: Datapath, *values: Any, **options: Any) -> Any:
+        made.append(datapath)
+        return fold.program(datapath, *values, **options)
+
+    monkeypatch.setattr(objective, "program", program)
+    objective._folded.cache_clear()
+    hardware = replace(design.architecture)  # which knows no program yet
+    assert ShortProgram("folded", hardware.digit_bits).of_datapath(design.datapath) > 0
+    assert hardware.program is not None
+    assert made == [design.datapath]
 
 
 def test_what_cannot_be_folded() -> None:

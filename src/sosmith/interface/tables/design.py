@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from sosmith.gen.architectures.architecture import Architecture
 from sosmith.gen.architectures.folded_fir import FoldedFir
-from sosmith.gen.calibration.fit import Fit, read_measurements
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.estimate.estimate import Estimate
 from sosmith.gen.facts.cost_table import cost_table
@@ -25,6 +24,7 @@ from sosmith.model.dataflow.program import Program
 from sosmith.model.port import Port
 
 if TYPE_CHECKING:
+    from sosmith.gen.calibration.fit import Fit
     from sosmith.instrument.uncertainty.instrument_budget import InstrumentBudget
 
 Rows = list[Sequence[str]]
@@ -168,6 +168,7 @@ def _worth(spec: Specification, fitted: Fit) -> str:
     """Return what a fitted calibration is worth, in the unit of its measurements: the proof covers arithmetic only."""
     assert spec.calibration is not None
     assert spec.calibration.data is not None
+    from sosmith.gen.calibration.fit import read_measurements
     from sosmith.instrument.calibration.uncertainty import of_polynomial  # with scipy.special, which is long in coming
 
     uncertainty = of_polynomial(read_measurements(spec.calibration.data), fitted)

@@ -1,0 +1,1 @@
+"""The figures of a report, and how they are kept for the next one of the same run."""
