@@ -206,7 +206,7 @@ def test_a_cutoff_a_fifth_away_may_be_swapped_to(example: str, ratio: str) -> No
     hardware = hardware_in("folded", example)
     made = other_set(hardware, ideal=moved(hardware, ratio))
     swap = check_swap(hardware, own_set(hardware), made)
-    assert 0 < swap.use < Fraction(1, 100)
+    assert 0 < swap.use < Fraction(1, 10)
     assert 50 < swap.samples < 1000
     assert swap.new_set.quantized is made.quantized
     back = check_swap(hardware, made, own_set(hardware))

@@ -60,7 +60,7 @@ HOLDS = "\n            m.d.sync += later.eq(value)"
 STATUS = 'delayed(m, buffer.advance, inputs, self._depth_of_stages, "status")'
 BROKEN = [
     (PLAIN, "a flag of another sample", hardware, STATUS, "inputs"),
-    (PLAIN, "a flag that gets lost", hardware, "self.s_axis_tuser if self.flags_given else None\n", "NEVER\n"),
+    (PLAIN, "a flag that gets lost", hardware, "self.given_flags if self.flags_given else None\n", "NEVER\n"),
     (HELD, "flags that do not stand still", pipeline, f"with m.If(advance):{HOLDS}", f"with m.If(Const(1, 1)):{HOLDS}"),
     (INSTRUMENT, "flags the wrong way round", shell, "return given\n", "return given[::-1]\n"),
     (INSTRUMENT, "a rail that is not told", shell, "at_rail(self.datapath.inputs, tdata) if", "Const(0, 1) if"),
