@@ -9,7 +9,7 @@ from tests.verify.parallel.rejections import NODE, rejection, sweep
 from tests.verify.small_specifications import INSTRUMENT, PLAIN, STEADY, STEADY_INSTRUMENT, WIDE
 
 from sosmith.gen.core import design_core
-from sosmith.gen.realizations.registry import REALIZATIONS
+from sosmith.gen.realizations.registry import SECTIONS
 from sosmith.hdl.plan.parallel_clocks import block_latency_cycles
 
 HIGH = """
@@ -34,7 +34,7 @@ def accept(core: Made) -> None:
 
 
 @pytest.mark.sweep(1)
-@pytest.mark.parametrize("realization", REALIZATIONS)
+@pytest.mark.parametrize("realization", SECTIONS)
 def test_every_realization(realization: str) -> None:
     accept(small(ODD if realization == "lattice_wdf" else PLAIN, realization, lanes=2))
 
@@ -64,7 +64,7 @@ def test_an_example(lanes: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("realization", REALIZATIONS)
+@pytest.mark.parametrize("realization", SECTIONS)
 @pytest.mark.parametrize("lanes", [8, 16])
 def test_many_lanes(realization: str, lanes: int) -> None:
     accept(small(ODD if realization == "lattice_wdf" else PLAIN, realization, lanes=lanes))
