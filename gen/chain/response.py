@@ -119,9 +119,39 @@ def rise_of(parts: Sequence[Part]) -> int:
     return prod(part.rise for part in parts)
 
 
-def peak_gain(parts: Sequence[Part]) -> Fraction:
-    """How much of an error before parts in series reaches their end at most, rounded up a little."""
-    return prod((_peak_gain(segment) for segment in segments_of(parts)), start=Fraction(1))
+def peak_gain(parts: Sequence[Part], *, steady: bool) -> Fraction:
+    """How much of an error before parts in series reaches their end at most, rounded up a little.
+
+    With `steady`, each part starts as if its first sample had been there for ever, also behind one that interpolates,
+    whose results of a constant differ. The first sample alone knows of that. By how much the results of a constant 1,
+    from such a start on, differ from what they are when it really was there for ever, is added: a part of the gain N
+    makes at most ``N (d + s)`` of d before it, and of the differences s between the first result before it and all
+    others. If the product of all gains is less, that is a bound as well.
+    """
+    of_each = _gain_from_steady if steady else _peak_gain
+    return prod((of_each(segment) for segment in segments_of(parts)), start=Fraction(1))
+
+
+def _gain_from_steady(segment: Segment) -> Fraction:
+    together = _peak_gain(segment)
+    if segment.rise == 1 or len(segment.parts) == 1:
+        return together
+    off, spread, product = Fraction(0), Fraction(0), Fraction(1)
+    for part in segment.parts:
+        gain = _peak_gain(Segment((part,)))
+        off = gain * (off + spread)
+        spread = 2 * gain * spread + product * _unevenness(part)
+        product *= gain
+    return min(product, together + off)
+
+
+def _unevenness(part: Part) -> Fraction:
+    """How far results of a constant 1 are from the first of them at most."""
+    if part.rise == 1:
+        return Fraction(0)
+    ((taps, _),) = part.sections
+    first, *others = (sum(taps[phase :: part.rise], Fraction(0)) for phase in range(part.rise))
+    return max(abs(other - first) for other in others)
 
 
 @lru_cache(maxsize=64)  # while word lengths are searched for, the response stays

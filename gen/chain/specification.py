@@ -238,6 +238,11 @@ class ChainSpec:
         return self.stages[0].kind == AUTO
 
     @property
+    def is_steady(self) -> bool:
+        """Whether each stage starts as if its first sample had been there for ever."""
+        return self.base.hardware.start == "steady"
+
+    @property
     def name(self) -> str:
         """Name of the top module and of the files."""
         return self.base.name

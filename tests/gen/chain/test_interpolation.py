@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 from scipy.signal import upfirdn
-from tests.gen.chain.rising import SHAPES, UP, draw, exact, flags, stimulus
+from tests.gen.chain.rising import SHAPES, UP, draw, exact, filtered, flags, stimulus
 
 import sosmith
 from sosmith.gen.chain.rates import Rate, gathered, results_of
@@ -21,6 +21,9 @@ from sosmith.gen.chain.response import Part, peak_gain, segments_of
 from sosmith.gen.specification.exact_values import exact as exact_values
 from sosmith.gen.specification.toml_text import toml_text
 from sosmith.model.errors import SpecificationError
+from sosmith.verify.certificate_file import SectionEntry
+from sosmith.verify.chain.responses import Part as ProvenPart
+from sosmith.verify.chain.responses import peak_gain as proven_gain
 
 FEW = (0, 3)
 CASES = [pytest.param(seed, marks=[] if seed in FEW else pytest.mark.slow) for seed in range(2 * len(SHAPES))]
@@ -177,7 +180,47 @@ def test_a_gain_is_the_largest_of_the_phases_that_leave(rise: int, factor: int, 
     for n in range(1, len(response)):
         response[n] -= float(pole) * response[n - 1]
     sums = [np.abs(response[p::rise]).sum() for p in range(0, rise, rise // phases)]
-    assert float(peak_gain(parts)) == pytest.approx(max(sums), rel=1e-9)
+    assert float(peak_gain(parts, steady=False)) == pytest.approx(max(sums), rel=1e-9)
+
+
+def started(parts: list[Part], values: list[Fraction]) -> list[Fraction]:
+    """Results of parts that each start as if its first sample had been there for ever."""
+    for part in parts:
+        (taps, under), *_ = part.sections
+        if part.rise == 1:
+            values = filtered(taps, under, values, steady=True)[:: part.factor]
+            continue
+        past = [*values[:1] * len(taps), *values]
+        last = len(taps) + np.arange(len(values))
+        values = [
+            sum((tap * past[m - n] for n, tap in enumerate(taps[phase :: part.rise])), Fraction(0))
+            for m in last
+            for phase in range(part.rise)
+        ]
+    return values
+
+
+LOPSIDED = tuple(Fraction(tap, 4) for tap in (7, 0, 1, 1))
+
+
+@pytest.mark.parametrize(
+    "behind", [Part(((((Fraction(1, 2),) * 2), (Fraction(1),)),)), Part(((LOPSIDED, (Fraction(1),)),), rise=2)]
+)
+@pytest.mark.parametrize("last", [Fraction(0), Fraction(-1, 2)])
+def test_what_a_start_makes_of_an_error_is_in_the_gain(behind: Part, last: Fraction) -> None:
+    """Behind a stage whose results of a constant differ, the first result alone is taken for all before it."""
+    parts = [Part(((LOPSIDED, (Fraction(1),)),), rise=2), behind, Part((((Fraction(1),), (Fraction(1), last)),), 2)]
+    count = 24
+    columns = [started(parts, [Fraction(n == m) for n in range(count)]) for m in range(count)]
+    largest = max(sum(map(abs, row)) for row in zip(*columns, strict=True))
+    gain, proven = peak_gain(parts, steady=True), proven_gain(list(map(entry_of, parts)), steady=True)
+    assert peak_gain(parts, steady=False) < largest <= gain
+    assert abs(proven - gain) < Fraction(1, 1 << 64)
+
+
+def entry_of(part: Part) -> ProvenPart:
+    entries = tuple(SectionEntry(numerator=taps, denominator=under) for taps, under in part.sections)
+    return ProvenPart(entries, part.factor, part.rise)
 
 
 def test_flags_of_samples_between() -> None:
