@@ -20,9 +20,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
-from math import gcd, prod
+from math import gcd, lcm, prod
 
-from flint import arb, ctx, fmpq_poly
+from flint import arb, ctx, fmpq, fmpq_poly
 
 from sosmith.gen.filter.exact_form import Exact
 from sosmith.gen.filter.largest_gain import CLOSE, Factor, Peak, gain_of_sections, largest, smallest
@@ -156,24 +156,37 @@ def _unevenness(part: Part) -> Fraction:
 
 @lru_cache(maxsize=64)  # while word lengths are searched for, the response stays
 def _peak_gain(segment: Segment) -> Fraction:
-    """Largest sum of the magnitudes of a phase of a segment's response, rounded up a little."""
-    rise = segment.rise
-    over, under = fmpq_poly([1]), list[tuple[Fraction, ...]]()
+    """Largest sum of the magnitudes of a phase of a segment's response, rounded up a little.
+
+    All denominators are made polynomials in one power of z, that of the slowest stage with poles. Then the samples that
+    are so many apart are a response of their own, of few poles that are far from each other.
+    """
+    rise, over = segment.rise, fmpq_poly([1])
+    steps = [step for part, step in zip(segment.parts, segment.spreads, strict=True) if _has_poles(part)]
+    apart = lcm(rise, *steps) if steps else rise
+    under = list[tuple[Fraction, ...]]()
     for part, spread in zip(segment.parts, segment.spreads, strict=True):
         for numerator, denominator in part.sections:
             over *= polynomial(_spread(numerator, spread))
             if len(denominator) > 1:
-                times = rise // gcd(rise, spread)
-                longer = _of_powers(denominator, times)
-                # Both have the same zeros; behind it, the denominator is one in z**rise.
-                over *= polynomial(_spread(longer, spread * times)) // polynomial(_spread(denominator, spread))
-                under.append(_spread(longer, spread * times // rise))
-    taps, largest = over.coeffs(), Fraction(0)
-    for phase in range(0, rise, gcd(rise, segment.factor)):
-        response = Response(fmpq_poly(taps[phase::rise]), tuple(under))
-        if response.numerator:
-            largest = max(largest, extent([Drive(response, Fraction(-1), Fraction(1))], _ACCURACY).magnitude)
-    return largest
+                under.append(_of_powers(denominator, apart // spread))
+                # Both have the same zeros.
+                over *= polynomial(_spread(under[-1], apart)) // polynomial(_spread(denominator, spread))
+    taps, poles = over.coeffs(), tuple(under)
+    phases = range(0, rise, gcd(rise, segment.factor))
+    return max(sum((_size(taps[n::apart], poles) for n in range(k, apart, rise)), Fraction(0)) for k in phases)
+
+
+def _has_poles(part: Part) -> bool:
+    return any(len(denominator) > 1 for _, denominator in part.sections)
+
+
+def _size(taps: Sequence[fmpq], poles: tuple[tuple[Fraction, ...], ...]) -> Fraction:
+    """Sum of the magnitudes of a response, rounded up a little."""
+    response = Response(fmpq_poly(list(taps)), poles)
+    return (
+        extent([Drive(response, Fraction(-1), Fraction(1))], _ACCURACY).magnitude if response.numerator else Fraction(0)
+    )
 
 
 def _of_powers(denominator: Sequence[Fraction], times: int) -> tuple[Fraction, ...]:

@@ -183,6 +183,14 @@ def test_a_gain_is_the_largest_of_the_phases_that_leave(rise: int, factor: int, 
     assert float(peak_gain(parts, steady=False)) == pytest.approx(max(sums), rel=1e-9)
 
 
+def test_poles_at_rates_far_apart_are_a_few_of_the_lowest_rate() -> None:
+    """Without that, the response at the highest rate has the poles of a polynomial of a degree of hundreds."""
+    slow = (((Fraction(1, 16),), (Fraction(1), Fraction(-3, 2), Fraction(5, 8))),)
+    parts = [Part(slow), Part((((Fraction(1, 4),) * 3, (Fraction(1),)),), 32), Part(slow)]
+    gain = peak_gain(parts, steady=True)
+    assert gain == pytest.approx(proven_gain(list(map(entry_of, parts)), steady=True), rel=1e-15)
+
+
 def started(parts: list[Part], values: list[Fraction]) -> list[Fraction]:
     """Results of parts that each start as if its first sample had been there for ever."""
     for part in parts:
