@@ -354,15 +354,15 @@ class Forms:
         below = lcm(*(value.denominator for value in form.values())) if form else 1
         if below & (below - 1):
             return form
-        spans = {
-            monomial: self._limits_by_atoms({monomial: 1})[1] - self._limits_by_atoms({monomial: 1})[0]
-            for monomial in form.keys() - {ONE}
-        }
+        spans: dict[Monomial, int | Fraction] = {}
+        for monomial in form.keys() - {ONE}:
+            low, high = self._limits_by_atoms({monomial: 1})
+            spans[monomial] = high - low
         for bits in range(1, below.bit_length() - 1):
             m = 1 << bits
             rounded: Form = {x: Fraction((value * m + Fraction(1, 2)).__floor__(), m) for x, value in form.items()}
-            rest = {x: value - rounded[x] for x, value in form.items() if value != rounded[x]}
-            if sum(abs(rest[x]) * span for x, span in spans.items() if x in rest) * m >= 1:
+            rest: Form = {x: value - rounded[x] for x, value in form.items() if value != rounded[x]}
+            if sum((abs(Fraction(value)) * spans.get(x, 0) for x, value in rest.items()), Fraction(0)) * m >= 1:
                 continue
             low, high = ((end * m).__floor__() for end in self._limits_by_atoms(rest))
             if low == high:
