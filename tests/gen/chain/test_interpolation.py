@@ -16,6 +16,7 @@ from scipy.signal import upfirdn
 from tests.gen.chain.rising import SHAPES, UP, draw, exact, filtered, flags, stimulus
 
 import sosmith
+from sosmith.gen.chain.c_model import chain_source
 from sosmith.gen.chain.rates import Rate, gathered, results_of
 from sosmith.gen.chain.response import Part, peak_gain, segments_of
 from sosmith.gen.specification.exact_values import exact as exact_values
@@ -147,6 +148,13 @@ def test_the_c_model_computes_what_the_design_does(up: sosmith.Chain, tmp_path: 
     assert np.array_equal(results[:, 1], status[:, 0])
     assert (status[: up.core.settling, 0] >> 5 & 1).all()
     assert up.core.settling % 8 == 0
+
+
+def test_no_variable_of_the_c_model_has_the_name_of_a_parameter() -> None:
+    stage = {"name": "at_x_code", "kind": "fir", "interpolate": 2, "taps": [1.0, 0.5]}
+    text = chain_source(sosmith.design_chain(UP | {"stage": [stage], "input": {"count_at_x": UP["input"]["x"]}}).core)
+    assert "int64_t count_at_x_code, int64_t *result" in text
+    assert "int at_x_code_count = 0, total" in text
 
 
 @pytest.mark.slow
