@@ -221,7 +221,7 @@ def gain_into_passband(segment: Segment, edge: Fraction) -> Peak:
 def _largest(segment: Segment, bands: Sequence[tuple[Fraction, Fraction]]) -> Peak:
     with ctx.workprec(_PRECISION):
         gain = _Gain(segment)
-    return largest(gain, bands)
+    return largest(gain.most, bands)
 
 
 def gain_from(segment: Segment, stop: Fraction) -> Peak:
@@ -272,9 +272,9 @@ class _Gain:
         return middle, middle * (-spread).exp() if spread.is_finite() else arb(0)
 
     def most(self, low: Fraction, high: Fraction) -> Factor:
-        """Say what is known of the gain, best where it is far from 0."""
+        """Say what is known of the gain: by its logarithm, unless it may be far less than in the middle."""
         middle, spread = self._logarithm(low, high)
-        return Factor(middle, middle * spread.exp(), arb("inf")) if spread.is_finite() else self(low, high)
+        return Factor(middle, middle * spread.exp(), arb("inf")) if spread < 1 else self(low, high)
 
     def _logarithm(self, low: Fraction, high: Fraction) -> tuple[arb, arb]:
         """Return the gain in the middle, and by how much its logarithm differs from there at most.
