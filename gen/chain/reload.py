@@ -75,10 +75,14 @@ def reload_chain(design: ChainDesign, wanted: ChainSpec, *, reset: bool) -> Chai
     stage, spec, base = design.stages[k], wanted.stages[k], wanted.base
     asked = exact_parts(wanted, spec) if spec.rise > 1 else ()
     specs = specs_of(wanted, spec, stage.design.spec.inputs, stage.output, base.max_error, asked)
-    sets = [set_for(core, each) for core, each in zip(stage.cores, specs, strict=True)]
-    swaps = tuple(
-        check_swap(core, None if reset else own_set(core), each) for core, each in zip(stage.cores, sets, strict=True)
-    )
+    try:
+        sets = [set_for(core, each) for core, each in zip(stage.cores, specs, strict=True)]
+        swaps = tuple(
+            check_swap(core, None if reset else own_set(core), each)
+            for core, each in zip(stage.cores, sets, strict=True)
+        )
+    except ShortfallError as error:
+        raise ShortfallError(f"stage {spec.name}: {error}") from None
     quantized = [swap.new_set.quantized for swap in swaps]
     parts = [each.parts for each in design.stages]
     parts[k] = parts_of(quantized)
