@@ -75,39 +75,42 @@ def most_results(design: ChainDesign) -> list[int]:
 
 
 def _rising(design: ChainDesign) -> list[str]:
-    """Return the body of the function of a chain that interpolates: the results of a stage lie in an array."""
+    """Return the body of the function of a chain that interpolates: the results of a stage lie in an array.
+
+    Names of variables end in another way than the parameters, which are named by the inputs.
+    """
     most, (first, *later) = most_results(design), design.stages
     given = ", ".join(f"{port.name}_code" for port in design.spec.base.inputs)
     names = [stage.spec.name for stage in design.stages]
-    lines = [f"int64_t {', '.join(f'at_{name}[{count}]' for name, count in zip(names, most, strict=True))};"]
-    lines += [f"int {', '.join(f'count_{name} = 0' for name in names)}, total = 0, i{', k' if later else ''};"]
+    lines = [f"int64_t {', '.join(f'{name}_at[{count}]' for name, count in zip(names, most, strict=True))};"]
+    lines += [f"int {', '.join(f'{name}_count = 0' for name in names)}, total = 0, i{', k' if later else ''};"]
     lines += [f"uint8_t first[{most[0]}], last[{most[-1]}], flags;"]
     lines += _appended(first, given, "first")
-    lines += [f"for (i = 0; i < count_{names[0]}; i++) {{"]
+    lines += [f"for (i = 0; i < {names[0]}_count; i++) {{"]
     if not later:
         lines += _indented(["last[i] = first[i];", "flags = 0;", *_handed_out(names[0], "i")])
         return [*lines, "}", "return total;"]
     inner = [f"state->kept |= first[i] & {(1 << design.carried_flags) - 1};"]
     for stage, before in zip(later, names, strict=False):
         told = "last" if stage is later[-1] else ""
-        inner += [f"count_{stage.spec.name} = 0;"]
+        inner += [f"{stage.spec.name}_count = 0;"]
         if before == names[0]:
-            inner += _appended(stage, f"at_{before}[i]", told)
+            inner += _appended(stage, f"{before}_at[i]", told)
         else:
-            loop = _indented(_appended(stage, f"at_{before}[k]", told))
-            inner += [f"for (k = 0; k < count_{before}; k++) {{", *loop, "}"]
-    inner += [f"if (count_{names[-1]} == 0)", "    continue;", "flags = state->kept;", "state->kept = 0;"]
+            loop = _indented(_appended(stage, f"{before}_at[k]", told))
+            inner += [f"for (k = 0; k < {before}_count; k++) {{", *loop, "}"]
+    inner += [f"if ({names[-1]}_count == 0)", "    continue;", "flags = state->kept;", "state->kept = 0;"]
     if design.settling:
         young = _indented(["state->results++;", f"flags |= {1 << Flag.SETTLING};"])
         inner += [f"if (state->results < {design.settling_entries}) {{", *young, "}"]
-    inner += [f"for (k = 0; k < count_{names[-1]}; k++) {{", *_indented(_handed_out(names[-1], "k")), "}"]
+    inner += [f"for (k = 0; k < {names[-1]}_count; k++) {{", *_indented(_handed_out(names[-1], "k")), "}"]
     return [*lines, *_indented(inner), "}", "return total;"]
 
 
 def _appended(stage: StageDesign, code: str, told: str) -> list[str]:
     """Let the cores of a stage take a value, whose results are appended to its array."""
     name, lines = stage.spec.name, list[str]()
-    place, count = f"at_{name}[count_{name}]", f"count_{name}"
+    place, count = f"{name}_at[{name}_count]", f"{name}_count"
     status = f"&{told}[{count}]" if told else "NULL"
     for core, state in zip(stage.cores, _states(stage), strict=True):
         if _steps(stage):
@@ -120,7 +123,7 @@ def _appended(stage: StageDesign, code: str, told: str) -> list[str]:
 def _handed_out(name: str, index: str) -> list[str]:
     """Hand out a result with its flags."""
     flags = ["if (status)", f"    status[total] = last[{index}] | flags;"]
-    return [f"result[total] = at_{name}[{index}];", *flags, "total++;"]
+    return [f"result[total] = {name}_at[{index}];", *flags, "total++;"]
 
 
 def _indented(lines: list[str]) -> list[str]:

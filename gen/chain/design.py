@@ -380,7 +380,7 @@ class _Budget:
         return chain
 
     def _first_shares(self, parts: Sequence[tuple[Part, ...]]) -> _Shares:
-        gains = gains_to_the_end(parts)
+        gains = gains_to_the_end(self.spec, parts)
         early = len(parts) - 1
         spare = (self.allowed - self.last.lsb / 2) * _EARLY_SHARE
         errors = [_rounded(spare / early / gain) for gain in gains[:-1]]
@@ -394,7 +394,7 @@ class _Budget:
 
     def _chain(self, shares: _Shares, parts: Sequence[tuple[Part, ...]]) -> ChainDesign:
         """Design all stages: the last one may make what the others leave of the error allowed."""
-        gains, left = gains_to_the_end(parts), self.allowed
+        gains, left = gains_to_the_end(self.spec, parts), self.allowed
         inputs, error = self.spec.base.inputs, Fraction(0)
         stages: list[StageDesign] = []
         for k, stage in enumerate(self.spec.stages):
@@ -405,7 +405,7 @@ class _Budget:
             if is_last and allowed <= self.last.lsb / 2:
                 raise ShortfallError(f"stage {stage.name}: the stages before it leave no room for its rounding")
             own = parts[k]
-            carried = error * peak_gain(own) if own else Fraction(0)
+            carried = error * peak_gain(own, steady=self.spec.is_steady) if own else Fraction(0)
             output = self.last if is_last else self._port(stage, shares.steps[k], reach + carried + allowed)
             specs = specs_of(self.spec, stage, inputs, output, allowed, own)
             cores = tuple(self._core(spec, stage) for spec in specs)
@@ -456,10 +456,10 @@ class _Budget:
             return None
 
 
-def gains_to_the_end(parts: Sequence[tuple[Part, ...]]) -> list[Fraction]:
+def gains_to_the_end(spec: ChainSpec, parts: Sequence[tuple[Part, ...]]) -> list[Fraction]:
     """Return how much of an error behind each stage reaches the end."""
     behind = [tuple(part for each in parts[k + 1 :] for part in each) for k in range(len(parts))]
-    return [on_grid(peak_gain(each)) if each else Fraction(1) for each in behind]
+    return [on_grid(peak_gain(each, steady=spec.is_steady)) if each else Fraction(1) for each in behind]
 
 
 def reach_behind(spec: ChainSpec, parts: Sequence[tuple[Part, ...]]) -> Fraction:
@@ -470,7 +470,7 @@ def reach_behind(spec: ChainSpec, parts: Sequence[tuple[Part, ...]]) -> Fraction
         polynomial, _ = polynomial_of(base)
         largest = polynomial_reach(polynomial, base.inputs)
     whole = tuple(part for each in parts for part in each)
-    return largest * on_grid(peak_gain(whole)) if whole else largest
+    return largest * on_grid(peak_gain(whole, steady=spec.is_steady)) if whole else largest
 
 
 def parts_of(cores: Sequence[Quantized]) -> tuple[Part, ...]:

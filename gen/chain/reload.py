@@ -75,17 +75,22 @@ def reload_chain(design: ChainDesign, wanted: ChainSpec, *, reset: bool) -> Chai
     stage, spec, base = design.stages[k], wanted.stages[k], wanted.base
     asked = exact_parts(wanted, spec) if spec.rise > 1 else ()
     specs = specs_of(wanted, spec, stage.design.spec.inputs, stage.output, base.max_error, asked)
-    sets = [set_for(core, each) for core, each in zip(stage.cores, specs, strict=True)]
-    swaps = tuple(
-        check_swap(core, None if reset else own_set(core), each) for core, each in zip(stage.cores, sets, strict=True)
-    )
+    try:
+        sets = [set_for(core, each) for core, each in zip(stage.cores, specs, strict=True)]
+        swaps = tuple(
+            check_swap(core, None if reset else own_set(core), each)
+            for core, each in zip(stage.cores, sets, strict=True)
+        )
+    except ShortfallError as error:
+        raise ShortfallError(f"stage {spec.name}: {error}") from None
     quantized = [swap.new_set.quantized for swap in swaps]
     parts = [each.parts for each in design.stages]
     parts[k] = parts_of(quantized)
     errors = [each.bound for each in design.stages]
     errors[k] = max(each.bound for each in quantized) * stage.output.lsb
     _check_ports(design, parts, errors)
-    bound = sum((error * gain for error, gain in zip(errors, gains_to_the_end(parts), strict=True)), Fraction(0))
+    gains = gains_to_the_end(design.spec, parts)
+    bound = sum((error * gain for error, gain in zip(errors, gains, strict=True)), Fraction(0))
     if bound > base.max_error:
         allowed, reached = (quantity(float(value), base.output.unit) for value in (base.max_error, bound))
         raise ShortfallError(
@@ -161,7 +166,8 @@ def _changed(design: ChainDesign, wanted: ChainSpec) -> int:
 def _check_ports(design: ChainDesign, parts: list[tuple[Part, ...]], errors: list[Fraction]) -> None:
     carried = Fraction(0)
     for m, stage in enumerate(design.stages[:-1]):
-        carried = (carried * peak_gain(parts[m]) if parts[m] else Fraction(0)) + errors[m]
+        gain = peak_gain(parts[m], steady=design.spec.is_steady) if parts[m] else Fraction(0)
+        carried = carried * gain + errors[m]
         most, end = reach_behind(design.spec, parts[: m + 1]) + carried, stage.output.highest * stage.output.lsb
         if most >= end:
             raise ShortfallError(

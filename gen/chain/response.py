@@ -20,9 +20,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
-from math import gcd, prod
+from math import gcd, lcm, prod
 
-from flint import arb, ctx, fmpq_poly
+from flint import arb, ctx, fmpq, fmpq_poly
 
 from sosmith.gen.filter.exact_form import Exact
 from sosmith.gen.filter.largest_gain import CLOSE, Factor, Peak, gain_of_sections, largest, smallest
@@ -119,31 +119,74 @@ def rise_of(parts: Sequence[Part]) -> int:
     return prod(part.rise for part in parts)
 
 
-def peak_gain(parts: Sequence[Part]) -> Fraction:
-    """How much of an error before parts in series reaches their end at most, rounded up a little."""
-    return prod((_peak_gain(segment) for segment in segments_of(parts)), start=Fraction(1))
+def peak_gain(parts: Sequence[Part], *, steady: bool) -> Fraction:
+    """How much of an error before parts in series reaches their end at most, rounded up a little.
+
+    With `steady`, each part starts as if its first sample had been there for ever, also behind one that interpolates,
+    whose results of a constant differ. The first sample alone knows of that. By how much the results of a constant 1,
+    from such a start on, differ from what they are when it really was there for ever, is added: a part of the gain N
+    makes at most ``N (d + s)`` of d before it, and of the differences s between the first result before it and all
+    others. If the product of all gains is less, that is a bound as well.
+    """
+    of_each = _gain_from_steady if steady else _peak_gain
+    return prod((of_each(segment) for segment in segments_of(parts)), start=Fraction(1))
+
+
+def _gain_from_steady(segment: Segment) -> Fraction:
+    together = _peak_gain(segment)
+    if segment.rise == 1 or len(segment.parts) == 1:
+        return together
+    off, spread, product = Fraction(0), Fraction(0), Fraction(1)
+    for part in segment.parts:
+        gain = _peak_gain(Segment((part,)))
+        off = gain * (off + spread)
+        spread = 2 * gain * spread + product * _unevenness(part)
+        product *= gain
+    return min(product, together + off)
+
+
+def _unevenness(part: Part) -> Fraction:
+    """How far results of a constant 1 are from the first of them at most."""
+    if part.rise == 1:
+        return Fraction(0)
+    ((taps, _),) = part.sections
+    first, *others = (sum(taps[phase :: part.rise], Fraction(0)) for phase in range(part.rise))
+    return max(abs(other - first) for other in others)
 
 
 @lru_cache(maxsize=64)  # while word lengths are searched for, the response stays
 def _peak_gain(segment: Segment) -> Fraction:
-    """Largest sum of the magnitudes of a phase of a segment's response, rounded up a little."""
-    rise = segment.rise
-    over, under = fmpq_poly([1]), list[tuple[Fraction, ...]]()
+    """Largest sum of the magnitudes of a phase of a segment's response, rounded up a little.
+
+    All denominators are made polynomials in one power of z, that of the slowest stage with poles. Then the samples that
+    are so many apart are a response of their own, of few poles that are far from each other.
+    """
+    rise, over = segment.rise, fmpq_poly([1])
+    steps = [step for part, step in zip(segment.parts, segment.spreads, strict=True) if _has_poles(part)]
+    apart = lcm(rise, *steps) if steps else rise
+    under = list[tuple[Fraction, ...]]()
     for part, spread in zip(segment.parts, segment.spreads, strict=True):
         for numerator, denominator in part.sections:
             over *= polynomial(_spread(numerator, spread))
             if len(denominator) > 1:
-                times = rise // gcd(rise, spread)
-                longer = _of_powers(denominator, times)
-                # Both have the same zeros; behind it, the denominator is one in z**rise.
-                over *= polynomial(_spread(longer, spread * times)) // polynomial(_spread(denominator, spread))
-                under.append(_spread(longer, spread * times // rise))
-    taps, largest = over.coeffs(), Fraction(0)
-    for phase in range(0, rise, gcd(rise, segment.factor)):
-        response = Response(fmpq_poly(taps[phase::rise]), tuple(under))
-        if response.numerator:
-            largest = max(largest, extent([Drive(response, Fraction(-1), Fraction(1))], _ACCURACY).magnitude)
-    return largest
+                under.append(_of_powers(denominator, apart // spread))
+                # Both have the same zeros.
+                over *= polynomial(_spread(under[-1], apart)) // polynomial(_spread(denominator, spread))
+    taps, poles = over.coeffs(), tuple(under)
+    phases = range(0, rise, gcd(rise, segment.factor))
+    return max(sum((_size(taps[n::apart], poles) for n in range(k, apart, rise)), Fraction(0)) for k in phases)
+
+
+def _has_poles(part: Part) -> bool:
+    return any(len(denominator) > 1 for _, denominator in part.sections)
+
+
+def _size(taps: Sequence[fmpq], poles: tuple[tuple[Fraction, ...], ...]) -> Fraction:
+    """Sum of the magnitudes of a response, rounded up a little."""
+    response = Response(fmpq_poly(list(taps)), poles)
+    return (
+        extent([Drive(response, Fraction(-1), Fraction(1))], _ACCURACY).magnitude if response.numerator else Fraction(0)
+    )
 
 
 def _of_powers(denominator: Sequence[Fraction], times: int) -> tuple[Fraction, ...]:
@@ -178,7 +221,7 @@ def gain_into_passband(segment: Segment, edge: Fraction) -> Peak:
 def _largest(segment: Segment, bands: Sequence[tuple[Fraction, Fraction]]) -> Peak:
     with ctx.workprec(_PRECISION):
         gain = _Gain(segment)
-    return largest(gain, bands)
+    return largest(gain.most, bands)
 
 
 def gain_from(segment: Segment, stop: Fraction) -> Peak:
@@ -229,9 +272,9 @@ class _Gain:
         return middle, middle * (-spread).exp() if spread.is_finite() else arb(0)
 
     def most(self, low: Fraction, high: Fraction) -> Factor:
-        """Say what is known of the gain, best where it is far from 0."""
+        """Say what is known of the gain: by its logarithm, unless it may be far less than in the middle."""
         middle, spread = self._logarithm(low, high)
-        return Factor(middle, middle * spread.exp(), arb("inf")) if spread.is_finite() else self(low, high)
+        return Factor(middle, middle * spread.exp(), arb("inf")) if spread < 1 else self(low, high)
 
     def _logarithm(self, low: Fraction, high: Fraction) -> tuple[arb, arb]:
         """Return the gain in the middle, and by how much its logarithm differs from there at most.

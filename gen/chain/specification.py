@@ -238,6 +238,11 @@ class ChainSpec:
         return self.stages[0].kind == AUTO
 
     @property
+    def is_steady(self) -> bool:
+        """Whether each stage starts as if its first sample had been there for ever."""
+        return self.base.hardware.start == "steady"
+
+    @property
     def name(self) -> str:
         """Name of the top module and of the files."""
         return self.base.name
@@ -447,6 +452,10 @@ def _factor(table: Mapping[str, Any], kind: str, where: str) -> int:
         factor = whole(2, most)(table["decimate"])
     except UnfitError as unfit:
         raise unfit.inside(f"{where}.decimate") from None
+    if kind == "iir" and factor & (factor - 1):
+        raise UnfitError(
+            f"a power of two from 2 to {most} for a filter with poles", literal(factor), where=f"{where}.decimate"
+        )
     if kind == AUTO:
         check_factor(factor, f"{where}.decimate")
     return factor
@@ -492,20 +501,18 @@ def _tables(table: Mapping[str, Any], kind: str, where: str, rate: Fraction, fac
     if kind == AUTO:
         return _ANY_DECIMATOR
     if kind == "gain":
-        if "factor" not in table:
-            raise UnfitError("a number other than 0", "missing", where=f"{where}.factor")
-        return {"filter": {"taps": [table["factor"]]}}
+        return {"filter": {"taps": [_gain(table, where)]}}
     if kind == "cic":
         return {"filter": {"taps": _cic(table, where, factor if rise == 1 else rise)} | decimate}
     given = {key: table[key] for key in _KEYS[kind] if key in table and key not in {"band", "decimate", "interpolate"}}
     if kind == "halfband":
-        given |= {"family": "halfband"}
-        if "passband_edge" in given:
-            try:
-                edge = number(given["passband_edge"])
-            except UnfitError as unfit:
-                raise unfit.inside(f"{where}.passband_edge") from None
-            given["stopband_edge"] = decimal(rate / 2 - edge)
+        given |= _halfband(given, where, rate)
+    if kind == "fir" and not {*_EDGES, "taps", "taps_file"} & given.keys():
+        raise UnfitError(
+            f"given by {', '.join(_EDGES[:-1])} and {_EDGES[-1]}, or by one of taps and taps_file",
+            "by none of them",
+            where=where,
+        )
     if "band" in table or kind == "halfband" or _by_bands(given):
         given["kind"] = table.get("band", "lowpass")
     if kind == "fir" and _by_bands(given) and "family" not in given:
@@ -515,6 +522,29 @@ def _tables(table: Mapping[str, Any], kind: str, where: str, rate: Fraction, fac
         families = "an FIR family" if is_fir else "a family with poles"
         raise UnfitError(f"{families} in a stage of the kind {kind}", literal(given["family"]), where=f"{where}.family")
     return {"filter": given | decimate}
+
+
+def _gain(table: Mapping[str, Any], where: str) -> Any:
+    """Return a factor, which is a number other than 0, as it was read."""
+    expected = "a number other than 0"
+    try:
+        if not number(table.get("factor", 0), expected):
+            raise UnfitError(expected, literal(table["factor"]) if "factor" in table else "missing")
+    except UnfitError as unfit:
+        raise unfit.inside(f"{where}.factor") from None
+    return table["factor"]
+
+
+def _halfband(given: Mapping[str, Any], where: str, rate: Fraction) -> dict[str, Any]:
+    """Return what a half-band filter has beside what is given: its stop band follows from its pass band."""
+    for key in ("passband_edge", "passband_loss", "stopband_loss"):
+        if key not in given:
+            raise UnfitError("given for a half-band filter", "missing", where=f"{where}.{key}")
+    try:
+        edge = number(given["passband_edge"])
+    except UnfitError as unfit:
+        raise unfit.inside(f"{where}.passband_edge") from None
+    return {"family": "halfband", "stopband_edge": decimal(rate / 2 - edge)}
 
 
 def _by_bands(given: Mapping[str, Any]) -> bool:

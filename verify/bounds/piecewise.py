@@ -130,7 +130,10 @@ class Pieces:
             vectors.append(numbers << bits - pieces._bits)
             off += left_out + pieces._inverse * residual
         count = max(numbers.shape[1] for numbers in vectors)
-        both = np.concatenate([np.pad(numbers, ((0, 0), (0, count - numbers.shape[1]))) for numbers in vectors])
+        # Those of `np.pad` would be no integers of Python, and a product of one with a long integer overflows.
+        both = np.zeros((sum(map(len, vectors)), count), dtype=np.object_)
+        for row, numbers in zip((0, len(vectors[0])), vectors, strict=True):
+            both[row : row + len(numbers), : numbers.shape[1]] = numbers
         first = sum((abs(a - b) for a, b in zip(*heads, strict=True)), Fraction(0))
         return first + self._summed.beside(other._summed).magnitudes(both) + off
 

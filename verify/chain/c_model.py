@@ -102,37 +102,37 @@ def _calls(chain: ChainCertificate, groups: Groups, flags: FlagsClaim | None) ->
 def _several(chain: ChainCertificate, groups: Groups, flags: FlagsClaim | None) -> Iterator[str]:
     """Yield the statements of a chain with stages that interpolate, whose results lie in arrays."""
     names, most = [entry.name for entry in chain.stages], _most(groups)
-    yield "int64_t " + ", ".join(f"at_{name}[{count}]" for name, count in zip(names, most, strict=True)) + ";"
+    yield "int64_t " + ", ".join(f"{name}_at[{count}]" for name, count in zip(names, most, strict=True)) + ";"
     yield (
-        "int " + "".join(f"count_{name} = 0, " for name in names) + f"total = 0, i{', k' if flags is not None else ''};"
+        "int " + "".join(f"{name}_count = 0, " for name in names) + f"total = 0, i{', k' if flags is not None else ''};"
     )
     yield f"uint8_t first[{most[0]}], last[{most[-1]}], flags;"
     inputs = ", ".join(f"{port.name}_code" for port in chain.inputs)
     yield from _put(chain.stages[0], groups[0], inputs, "first")
-    yield f"for (i = 0; i < count_{names[0]}; i++) {{"
+    yield f"for (i = 0; i < {names[0]}_count; i++) {{"
     if flags is None:
         yield f"last[i] = first[i]; flags = 0; {_leave(names[0], 'i')} }} return total;"
         return
     yield f"state->kept |= first[i] & {(1 << flags.carried) - 1};"
     for n in range(1, len(names)):
         told = "last" if n == len(names) - 1 else ""
-        yield f"count_{names[n]} = 0;"
+        yield f"{names[n]}_count = 0;"
         if n == 1:
-            yield from _put(chain.stages[n], groups[n], f"at_{names[0]}[i]", told)
+            yield from _put(chain.stages[n], groups[n], f"{names[0]}_at[i]", told)
         else:
-            yield f"for (k = 0; k < count_{names[n - 1]}; k++) {{"
-            yield from _put(chain.stages[n], groups[n], f"at_{names[n - 1]}[k]", told)
+            yield f"for (k = 0; k < {names[n - 1]}_count; k++) {{"
+            yield from _put(chain.stages[n], groups[n], f"{names[n - 1]}_at[k]", told)
             yield "}"
-    yield f"if (count_{names[-1]} == 0) continue; flags = state->kept; state->kept = 0;"
+    yield f"if ({names[-1]}_count == 0) continue; flags = state->kept; state->kept = 0;"
     if flags.settling:
         yield f"if (state->results < {flags.settling}) {{ state->results++; flags |= {_SETTLING}; }}"
-    yield f"for (k = 0; k < count_{names[-1]}; k++) {{ {_leave(names[-1], 'k')} }} }} return total;"
+    yield f"for (k = 0; k < {names[-1]}_count; k++) {{ {_leave(names[-1], 'k')} }} }} return total;"
 
 
 def _put(entry: ChainStageEntry, cores: Sequence[Certificate], code: str, told: str) -> Iterator[str]:
     """Yield the calls by which a stage's cores take a code, and put their results into its array."""
-    count = f"count_{entry.name}"
-    place, status = f"at_{entry.name}[{count}]", f"&{told}[{count}]" if told else "NULL"
+    count = f"{entry.name}_count"
+    place, status = f"{entry.name}_at[{count}]", f"&{told}[{count}]" if told else "NULL"
     for core, kept in zip(cores, _kept(entry, cores), strict=True):
         if _decimates(cores):
             yield f"{count} += {core.name}_push(&state->{kept}, {code}, &{place}, {status});"
@@ -143,7 +143,7 @@ def _put(entry: ChainStageEntry, cores: Sequence[Certificate], code: str, told: 
 def _leave(name: str, index: str) -> str:
     """Return the statements that hand out a result with its flags."""
     status = f"if (status) status[total] = last[{index}] | flags;"
-    return f"result[total] = at_{name}[{index}]; {status} total++;"
+    return f"result[total] = {name}_at[{index}]; {status} total++;"
 
 
 def _same(text: str, wanted: Sequence[str], what: str) -> None:

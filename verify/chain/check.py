@@ -139,7 +139,8 @@ def judge_chain(
         progress("chain", 0, 0)
         items = _check_joints(chain, groups)
         flags = _flags(chain, groups, items)
-        budget = _check_bound(chain, groups)
+        steady = any(item.start == "steady" for own in items for item in own)
+        budget = _check_bound(chain, groups, steady=steady)
         progress("folding", 0, 0)
         try:
             check_folding(chain.folding, [part for cores in groups for part in parts_of(cores)])
@@ -321,14 +322,15 @@ def _unnamed(port: PortEntry) -> PortEntry:
     return port.model_copy(update={"name": ""})
 
 
-def _check_bound(chain: ChainCertificate, groups: Groups) -> dict[str, Fraction]:
+def _check_bound(chain: ChainCertificate, groups: Groups, *, steady: bool) -> dict[str, Fraction]:
     """Check the gains, the errors, that no port between stages limits anything, and the sum."""
     parts = list(map(parts_of, groups))
+    gain_of = partial(peak_gain, steady=steady)
     budget: dict[str, Fraction] = {}
     reach, carried = reach_of(groups[0][0]), Fraction(0)
     for k, (entry, cores) in enumerate(zip(chain.stages, groups, strict=True)):
         behind = [part for each in parts[k + 1 :] for part in each]
-        gain = on_grid(peak_gain(behind)) if behind else Fraction(1)
+        gain = on_grid(gain_of(behind)) if behind else Fraction(1)
         require(
             gain <= entry.gain <= gain + 2 * _GRID,
             f"the gain behind stage {entry.name} must be {float(gain):.12g}, not {float(entry.gain):.12g}",
@@ -339,9 +341,9 @@ def _check_bound(chain: ChainCertificate, groups: Groups) -> dict[str, Fraction]
         if k == len(groups) - 1:
             break
         own = list(parts[k])
-        carried = (carried * peak_gain(own) if own else Fraction(0)) + error
+        carried = (carried * gain_of(own) if own else Fraction(0)) + error
         so_far: list[Part] = [part for each in parts[: k + 1] for part in each]
-        largest = (reach * peak_gain(so_far) if so_far else reach) + carried
+        largest = (reach * gain_of(so_far) if so_far else reach) + carried
         require(port.zero == 0 and port.signed, f"the port behind stage {entry.name} must be signed")
         require(
             largest < port.highest * port.lsb,

@@ -138,9 +138,36 @@ def rise_of(parts: Sequence[Part]) -> int:
     return reduce(mul, (part.rise for part in parts), 1)
 
 
-def peak_gain(parts: Sequence[Part]) -> Fraction:
-    """Bound how much of an error before parts one behind the other is in any result: run by run."""
-    return reduce(mul, map(_peak_gain, runs_of(parts)), Fraction(1))
+def peak_gain(parts: Sequence[Part], *, steady: bool) -> Fraction:
+    """Bound how much of an error before parts one behind the other is in any result: run by run.
+
+    With `steady`, parts start as if the first sample of each had been there for ever.
+    """
+    return reduce(mul, map(_from_steady if steady else _peak_gain, runs_of(parts)), Fraction(1))
+
+
+def _from_steady(run: Run) -> Fraction:
+    """Bound the gain of a run whose parts start from their own first samples.
+
+    A constant x is the only input for which it matters how the parts start, as none of the other samples is known at
+    the start. If it had been there for ever, results of a part that puts in zeros would take turns, and the part behind
+    would know of all of them; it takes the first one, w, for all. Let v and u be the results with either start of the
+    parts up to one of them, x being 1, with abs(v - u) <= e from the start on, and abs(u - w) <= d before it, where w
+    is the first u. The part behind, of the gain N, had v(start) before it, at most e + d from u, so that its results
+    differ by at most N (e + d). What it makes of w alone has one value for each zero put in, and of u - w at most N d.
+    """
+    whole = _peak_gain(run)
+    if run.rise == 1:
+        return whole
+    gains = [_peak_gain(Run((part,), Fraction(1))) for part in run.parts]
+    e = d = Fraction(0)
+    largest = Fraction(1)
+    for part, gain in zip(run.parts, gains, strict=True):
+        values = [sum(part.sections[0].numerator[k :: part.rise], Fraction(0)) for k in range(part.rise)]
+        apart = max(abs(value - values[0]) for value in values) if part.rise > 1 else Fraction(0)
+        e, d = gain * (e + d), gain * d * 2 + largest * apart
+        largest *= gain
+    return min(whole + e, largest)
 
 
 def _peak_gain(run: Run) -> Fraction:

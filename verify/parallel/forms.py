@@ -240,7 +240,7 @@ class Forms:
                 whole[monomial] = nearest
             if coefficient != nearest:
                 rest[monomial] = coefficient - nearest
-        outer, rest = rest, dict(self._unnested(rest))
+        outer, rest = rest, dict(self._coarse(dict(self._unnested(rest))))
         for inside in (outer, rest):
             low, high = (end.__floor__() for end in self.limits(inside))
             if low == high:
@@ -344,6 +344,30 @@ class Forms:
         assert inside is not None
         others = {monomial: value for monomial, value in form.items() if monomial != finest}
         return plus(others, inside, unit)
+
+    def _coarse(self, form: Form) -> Form:
+        """Leave out what never reaches a step of 1 / m: ``floor((i + r) / m) = floor(i / m)`` where 0 <= r < 1.
+
+        So a value whose lower bits are known to round off has the same upper bits as one that was rounded before. Of
+        all powers of two m, the smallest is taken.
+        """
+        below = lcm(*(value.denominator for value in form.values())) if form else 1
+        if below & (below - 1):
+            return form
+        spans: dict[Monomial, int | Fraction] = {}
+        for monomial in form.keys() - {ONE}:
+            low, high = self._limits_by_atoms({monomial: 1})
+            spans[monomial] = high - low
+        for bits in range(1, below.bit_length() - 1):
+            m = 1 << bits
+            rounded: Form = {x: Fraction((value * m + Fraction(1, 2)).__floor__(), m) for x, value in form.items()}
+            rest: Form = {x: value - rounded[x] for x, value in form.items() if value != rounded[x]}
+            if sum((abs(Fraction(value)) * spans.get(x, 0) for x, value in rest.items()), Fraction(0)) * m >= 1:
+                continue
+            low, high = ((end * m).__floor__() for end in self._limits_by_atoms(rest))
+            if low == high:
+                return plus({x: value for x, value in rounded.items() if value}, constant(Fraction(low, m)))
+        return form
 
     def _sign(self, rest: Form) -> int:
         """Return the atom of ``floor(rest)``, which is -1 or 0: the same for all multiples of what is inside."""

@@ -1,8 +1,8 @@
 """Counts the operators of a certificate's graphs, each by itself: multipliers, bits of adders, bits of registers.
 
-The bits of a sum that count are those that are asked for: where a range says that the upper ones repeat the sign, or
-only the lower ones are taken, the others are not computed, there and in the sums before. What is added where the other
-operand has no bits takes no adder.
+A product with a single bit is made of gates, and counts like a sum. The bits of a sum that count are those that are
+asked for: where a range says that the upper ones repeat the sign, or only the lower ones are taken, the others are not
+computed, there and in the sums before. What is added where the other operand has no bits takes no adder.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ def operators(stages: Sequence[StageEntry]) -> dict[str, Any]:
         asked = _asked(stage)
         for index, node in enumerate(stage.nodes):
             operands = [stage.nodes[i] for i in node.operands]
-            if node.op in _SUMS:
+            if node.op in _SUMS or (node.op is Operation.MULTIPLY and any(map(_is_bit, operands))):
                 adders += 0 if node.op is Operation.ADD and _are_joined(operands) else asked[index]
             elif node.op is Operation.TRUNCATE:
                 adders += bits(operands[0])
@@ -31,8 +31,6 @@ def operators(stages: Sequence[StageEntry]) -> dict[str, Any]:
                 registers += bits(node)
             elif node.op is Operation.SCALE:
                 products.append([bits(operands[0]), abs(node.parameter).bit_length() + (node.parameter < 0)])
-            elif node.op is Operation.MULTIPLY and any(map(_is_bit, operands)):
-                adders += bits(node)
             elif node.op is Operation.MULTIPLY:
                 products.append([bits(each) for each in operands])
         registers += sum(bits(stage.nodes[index]) for index in stage.outputs)

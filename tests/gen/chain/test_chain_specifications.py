@@ -116,6 +116,22 @@ REFUSED: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
         stage(0, decimate=None),
         "stage[0].decimate must be given for a CIC filter, or interpolate, not missing",
     ),
+    "by 3 before poles": (
+        stage(2, decimate=3),
+        "stage[2].decimate must be a power of two from 2 to 1024 for a filter with poles, not 3",
+    ),
+    "no factor": (stage(3, factor=None), "stage[3].factor must be a number other than 0, not missing"),
+    "a factor of 0": (stage(3, factor=0.0), "stage[3].factor must be a number other than 0, not 0.0"),
+    "no number": (stage(3, factor="x"), "stage[3].factor must be a number other than 0, not 'x'"),
+    "no edge": (
+        stage(1, passband_edge=None),
+        "stage[1].passband_edge must be given for a half-band filter, not missing",
+    ),
+    "no filter": (
+        lambda tree: tree["stage"].append({"name": "last", "kind": "fir"}),
+        "stage[4] must be given by passband_edge, stopband_edge, passband_loss and stopband_loss, or by one of taps "
+        "and taps_file, not by none of them",
+    ),
     "no kind": (
         stage(0, kind=None),
         "stage[0].kind must be one of polynomial, gain, iir, fir, halfband, cic, auto, not missing",

@@ -13,14 +13,20 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 from scipy.signal import upfirdn
-from tests.gen.chain.rising import SHAPES, UP, draw, exact, flags, stimulus
+from tests.gen.chain.rising import SHAPES, UP, draw, exact, filtered, flags, stimulus
 
 import sosmith
+from sosmith.gen.chain import response
+from sosmith.gen.chain.c_model import chain_source
+from sosmith.gen.chain.ideal import ideal_chain
 from sosmith.gen.chain.rates import Rate, gathered, results_of
 from sosmith.gen.chain.response import Part, peak_gain, segments_of
 from sosmith.gen.specification.exact_values import exact as exact_values
 from sosmith.gen.specification.toml_text import toml_text
 from sosmith.model.errors import SpecificationError
+from sosmith.verify.certificate_file import SectionEntry
+from sosmith.verify.chain.responses import Part as ProvenPart
+from sosmith.verify.chain.responses import peak_gain as proven_gain
 
 FEW = (0, 3)
 CASES = [pytest.param(seed, marks=[] if seed in FEW else pytest.mark.slow) for seed in range(2 * len(SHAPES))]
@@ -146,6 +152,28 @@ def test_the_c_model_computes_what_the_design_does(up: sosmith.Chain, tmp_path: 
     assert up.core.settling % 8 == 0
 
 
+def test_a_narrow_filter_behind_one_that_decimates_is_soon_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Slopes of its sections cancel each other; product by product, tens of thousands of intervals were looked at."""
+    stages = [
+        {"name": "half", "kind": "fir", "taps": [-0.7, -1.5], "decimate": 2},
+        {"name": "low", "kind": "iir", "family": "chebyshev1", "order": 5, "cutoff": 16.0, "passband_loss": 0.5},
+    ]
+    chain = ideal_chain(sosmith.ChainSpecification.load(UP | {"stage": stages}).checked)
+    (segment,) = segments_of([part for stage in chain.stages for part in stage.parts])
+    looked = []
+    monkeypatch.setattr(response.Tangents, "on", lambda *args, on=response.Tangents.on: looked.append(0) or on(*args))
+    peak = response.gain_into_passband(segment, Fraction(16, 8000))
+    assert 0.8 <= peak.gain <= 0.801
+    assert len(looked) < 500
+
+
+def test_no_variable_of_the_c_model_has_the_name_of_a_parameter() -> None:
+    stage = {"name": "at_x_code", "kind": "fir", "interpolate": 2, "taps": [1.0, 0.5]}
+    text = chain_source(sosmith.design_chain(UP | {"stage": [stage], "input": {"count_at_x": UP["input"]["x"]}}).core)
+    assert "int64_t count_at_x_code, int64_t *result" in text
+    assert "int at_x_code_count = 0, total" in text
+
+
 @pytest.mark.slow
 def test_what_is_shown_of_a_chain_that_interpolates(up: sosmith.Chain, tmp_path: Path) -> None:
     tables = {table.title: table for table in up.tables()}
@@ -177,7 +205,55 @@ def test_a_gain_is_the_largest_of_the_phases_that_leave(rise: int, factor: int, 
     for n in range(1, len(response)):
         response[n] -= float(pole) * response[n - 1]
     sums = [np.abs(response[p::rise]).sum() for p in range(0, rise, rise // phases)]
-    assert float(peak_gain(parts)) == pytest.approx(max(sums), rel=1e-9)
+    assert float(peak_gain(parts, steady=False)) == pytest.approx(max(sums), rel=1e-9)
+
+
+def test_poles_at_rates_far_apart_are_a_few_of_the_lowest_rate() -> None:
+    """Without that, the response at the highest rate has the poles of a polynomial of a degree of hundreds."""
+    slow = (((Fraction(1, 16),), (Fraction(1), Fraction(-3, 2), Fraction(5, 8))),)
+    parts = [Part(slow), Part((((Fraction(1, 4),) * 3, (Fraction(1),)),), 32), Part(slow)]
+    gain = peak_gain(parts, steady=True)
+    assert gain == pytest.approx(proven_gain(list(map(entry_of, parts)), steady=True), rel=1e-15)
+
+
+def started(parts: list[Part], values: list[Fraction]) -> list[Fraction]:
+    """Results of parts that each start as if its first sample had been there for ever."""
+    for part in parts:
+        (taps, under), *_ = part.sections
+        if part.rise == 1:
+            values = filtered(taps, under, values, steady=True)[:: part.factor]
+            continue
+        past = [*values[:1] * len(taps), *values]
+        last = len(taps) + np.arange(len(values))
+        values = [
+            sum((tap * past[m - n] for n, tap in enumerate(taps[phase :: part.rise])), Fraction(0))
+            for m in last
+            for phase in range(part.rise)
+        ]
+    return values
+
+
+LOPSIDED = tuple(Fraction(tap, 4) for tap in (7, 0, 1, 1))
+
+
+@pytest.mark.parametrize(
+    "behind", [Part(((((Fraction(1, 2),) * 2), (Fraction(1),)),)), Part(((LOPSIDED, (Fraction(1),)),), rise=2)]
+)
+@pytest.mark.parametrize("last", [Fraction(0), Fraction(-1, 2)])
+def test_what_a_start_makes_of_an_error_is_in_the_gain(behind: Part, last: Fraction) -> None:
+    """Behind a stage whose results of a constant differ, the first result alone is taken for all before it."""
+    parts = [Part(((LOPSIDED, (Fraction(1),)),), rise=2), behind, Part((((Fraction(1),), (Fraction(1), last)),), 2)]
+    count = 24
+    columns = [started(parts, [Fraction(n == m) for n in range(count)]) for m in range(count)]
+    largest = max(sum(map(abs, row)) for row in zip(*columns, strict=True))
+    gain, proven = peak_gain(parts, steady=True), proven_gain(list(map(entry_of, parts)), steady=True)
+    assert peak_gain(parts, steady=False) < largest <= gain
+    assert abs(proven - gain) < Fraction(1, 1 << 64)
+
+
+def entry_of(part: Part) -> ProvenPart:
+    entries = tuple(SectionEntry(numerator=taps, denominator=under) for taps, under in part.sections)
+    return ProvenPart(entries, part.factor, part.rise)
 
 
 def test_flags_of_samples_between() -> None:

@@ -103,6 +103,11 @@ def test_a_swap_without_a_reset_fades(chain: sosmith.Chain) -> None:
             r"specification: the chain must keep its error within .* with the set, and is proven to .* only: nothing",
         ),
         (
+            stage(2, taps=[0.25, 0.5, 0.5, 0.5]),
+            ShortfallError,
+            r"^specification: stage mix: the filter's sections must have the coefficients ",
+        ),
+        (
             stage(2, taps=[0.25, 0.5, 1.25]),
             ShortfallError,
             r"the set must keep results behind stage mix below 1\.99805, where its port ends, not reach 2\.19",

@@ -1,9 +1,23 @@
 """Counts of operators, and multiplier blocks as Yosys makes them."""
 
+from pathlib import Path
+
 import pytest
 
-from sosmith.gen.word_lengths.cost import LUTS_OF_A_BLOCK, Cost, Multiplication, Operand, area_of, cost_of_graphs
+from sosmith.gen.core import design_core
+from sosmith.gen.output.certificate import certificate
+from sosmith.gen.specification.specification import from_text
+from sosmith.gen.word_lengths.cost import (
+    LUTS_OF_A_BLOCK,
+    Cost,
+    Multiplication,
+    Operand,
+    area_of,
+    cost_of,
+    cost_of_graphs,
+)
 from sosmith.model.dataflow.graph import Graph, GraphBuilder
+from sosmith.verify.verdict.operators import operators
 
 BLOCKS = [
     # signed data, positive constant: the constant takes a sign bit
@@ -93,3 +107,17 @@ def test_sizes_for_people() -> None:
     cost = Cost(multiplications=made, adder_bits=0, register_bits=0)
     assert cost.multipliers == sizes
     assert cost.multiplier_sizes == "2 of 23 x 18, 1 of 16 x 19"
+
+
+def test_gates_whose_upper_bits_nobody_needs_count_like_sums() -> None:
+    """Far from 0, a sample and the first one differ in their lower bits alone; the verifier counts by itself."""
+    text = """
+name = "far"
+sample_rate = 100.0
+input.x = { bits = 8, range = [100.0, 101.0] }
+filter.taps = [0.5, 0.5]
+output = { bits = 6, range = [0.0, 128.0] }
+"""
+    core = design_core(from_text(text, Path("far.toml")))
+    counted = operators(certificate(core.quantized, core.spec.max_error).stages)
+    assert counted["adder_bits"] == cost_of(core.datapath).adder_bits

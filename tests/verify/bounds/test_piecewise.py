@@ -108,6 +108,15 @@ def test_the_difference_of_two_responses_from_pieces_side_by_side(name: str) -> 
         assert exact - error <= found < exact + error + max(exact, 1) / 2**80
 
 
+def test_one_response_may_last_for_more_pieces_than_the_other() -> None:
+    wanted = DENOMINATORS["slow and fast"]
+    ideal = Pieces(wanted)
+    found = Pieces(wanted + fmpq_poly([0, fmpq(1, 8)]), ideal).distance(fmpq_poly([1]), ideal, fmpq_poly([1]))
+    one, other = (response(fmpq_poly([1]), inverse(each)) for each in (wanted + fmpq_poly([0, fmpq(1, 8)]), wanted))
+    exact = sum(abs(a - b) for a, b in zip_longest(one.samples, other.samples, fillvalue=0))
+    assert found == pytest.approx(exact / 2**BITS)
+
+
 def test_pieces_of_different_lengths_have_no_difference() -> None:
     fast, slow = Pieces(DENOMINATORS["one pole"]), Pieces(fmpq_poly([1, -1 + fmpq(1, 2**12)]))
     assert slow.distance(fmpq_poly([1]), fast, fmpq_poly([1])) is None

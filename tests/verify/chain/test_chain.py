@@ -334,7 +334,7 @@ def test_a_port_between_stages_that_limits_is_refused(tmp_path: Path, monkeypatc
 def test_a_response_too_long_to_compute_is_refused_before_it_is_computed() -> None:
     moving = SectionEntry(numerator=(Fraction(1, 64),) * 64, denominator=(Fraction(1),))
     with pytest.raises(ShortfallError, match=r"^the response of a chain must have at most 4194304 samples$"):
-        peak_gain([Part((moving,), 64)] * 5)
+        peak_gain([Part((moving,), 64)] * 5, steady=True)
 
 
 def test_a_certificate_without_a_file_has_no_stages_beside_it() -> None:

@@ -194,3 +194,13 @@ def test_of_several_floors_in_one_that_of_the_finest_argument_is_left_out() -> N
         inside = forms.atom(monomial[0]).inside
         assert inside is not None
         assert forms.floor(shifted(plus(coarse, last), -3)) == forms.floor(shifted(plus(coarse, inside), -3))
+
+
+def test_upper_bits_are_those_of_what_was_rounded_where_the_lower_ones_round_off() -> None:
+    forms = Forms()
+    total = plus({}, forms.variable("change", -510, 510), 2)
+    total = plus(plus(total, forms.variable("first", -128, 127), Fraction(4095, 1024)), constant(Fraction(1, 2)))
+    rounded = forms.floor(total)
+    assert not forms.keys(rounded) - {"change", "first"}
+    for bits in (1, 9, 10, 11):
+        assert forms.floor(shifted(total, -bits)) == forms.floor(shifted(rounded, -bits))
