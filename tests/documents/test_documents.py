@@ -38,7 +38,7 @@ from sosmith.interface.specification import Specification
 README = ROOT / "README.md"
 ARCHITECTURE = ROOT / "docs" / "architecture.md"
 CALIBRATION = ROOT / "docs" / "calibration.md"
-PRINTING = [CALIBRATION, *(ROOT / "docs" / f"{name}.md" for name in ("spectrum", "wear", "vehicle", "sensors"))]
+PRINTING = [*(ROOT / "docs" / f"{name}.md" for name in ("spectrum", "wear", "vehicle", "sensors")), CALIBRATION]
 """Documents whose shell blocks stand above what they print."""
 IMAGES = ROOT / "docs" / "images"
 DRAWN = ("vehicle.svg", "calibration.svg")

@@ -66,6 +66,7 @@ def test_the_golden_chain_is_the_exact_one() -> None:
     assert len(entering_filter(codes[:0], datapath, quantized.polynomial)) == 0
 
 
+@pytest.mark.slow
 def test_a_constant_is_there_from_the_first_result_on() -> None:
     datapath = whole().datapath
     assert len(set(datapath.compute(np.tile([12345, 23456], (100, 1))).tolist())) == 1
@@ -284,6 +285,7 @@ def test_another_calibration_exceeds_the_bound() -> None:
     assert worst_error(replace(made, quantized=changed), codes) > float(quantized.bound)
 
 
+@pytest.mark.slow
 def test_a_fitted_calibration_says_what_is_outside_of_it() -> None:
     """The codes that its measurements covered are judged before the decimator, of every sample."""
     text = re.sub(r"calibration\.coefficients = .*", 'calibration.data = "april.csv"', INSTRUMENT.format(extra=""))
