@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import re
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -66,3 +68,12 @@ def test_a_design_is_drawn_in_a_notebook() -> None:
     assert drawing.svg.startswith("<?xml")
     assert "Group delay" in drawing.svg
     assert repr(drawing) == "Drawing()"
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_what_a_notebook_names_is_there(path: Path) -> None:
+    text = "".join("".join(cell["source"]) for cell in cells(path))
+    named = set(re.findall(r"\bsosmith((?:\.\w+)+)", text))
+    assert named
+    for name in named:
+        attrgetter(name.removeprefix("."))(sosmith)
