@@ -66,10 +66,8 @@ class Core:
     multipliers : int
         Multiplier blocks that the specification names; 0 for "auto".
     freedom : str
-        "none" or "mask" for the filter of a recipe inside a mask in place of the example's, as that of the family or as
-        any; empty for the example's.
-    fir : bool
-        Whether that is the recipe with an FIR filter.
+        "none" or "mask" for the filter of the recipe inside a mask in place of the example's, as that of the family or
+        as any; empty for the example's.
     """
 
     example: str
@@ -82,7 +80,6 @@ class Core:
     clock: int = 0
     multipliers: int = 0
     freedom: str = ""
-    fir: bool = False
 
     @property
     def key(self) -> str:
@@ -110,8 +107,7 @@ class Core:
 
     @property
     def _free(self) -> str:
-        free = {"": "", "none": ", by a mask", "mask": ", any inside a mask"}[self.freedom]
-        return f", FIR{free}" if self.fir else free
+        return {"": "", "none": ", by a mask", "mask": ", any inside a mask"}[self.freedom]
 
     @property
     def targets(self) -> list[str]:
@@ -172,9 +168,7 @@ FAST = (
 TWO_PRODUCTS = tuple(Core(example, "folded", multipliers=2) for example in EXAMPLES)
 """Folded cores with two products a clock."""
 
-MASKED = tuple(
-    Core("audio_lowpass", "parallel", freedom=freedom, fir=fir) for fir in (False, True) for freedom in ("none", "mask")
-)
+MASKED = tuple(Core("audio_lowpass", "parallel", freedom=freedom) for freedom in ("none", "mask"))
 """The family's filter for a mask, and any inside it."""
 
 OF_THEIR_OWN = frozenset({*PROTECTED, *ONLINE, *REALIZED, *FAST, *TWO_PRODUCTS, *MASKED})
@@ -220,8 +214,7 @@ def design(core: Core, objective: Objective, target: str = "") -> CoreDesign:
     if bits:
         spec = from_text(spec.text.replace("bits = 16", f"bits = {bits}"), path)
     if core.freedom:
-        recipe = "short_taps" if core.fir else "inside_a_mask"
-        mask = load(ROOT / "examples" / "recipes" / f"{recipe}.toml").filter
+        mask = load(ROOT / "examples" / "recipes" / "inside_a_mask.toml").filter
         spec = replace(spec, filter=replace(mask, freedom=core.freedom))
     hardware = replace(spec.hardware, architecture=architecture, samples_per_clock=core.lanes, pipeline="plain")
     if core.multipliers:

@@ -169,7 +169,7 @@ def masked_table(record: Figures) -> str:
         for key, figures in targets_in(record, core).items():
             area = figures["area"]
             row = [
-                f"{'FIR' if core.fir else 'sections'}, {'any inside' if core.freedom == 'mask' else 'by'} the mask",
+                "any inside the mask" if core.freedom == "mask" else "of the family",
                 title(TARGETS[key]),
                 figures["realization"],
                 str(area["multipliers"]),
@@ -424,9 +424,8 @@ On the ECP5 the registers at the multipliers and at the output of the program me
 
 ## Any filter inside a mask
 
-The ports, the allowed error and the parallel architecture of audio_lowpass with the masks of two recipes, that of
-[sections](recipes/inside_a_mask.md), which order 5 meets, and that of [an FIR filter](recipes/short_taps.md), which 25
-taps do: the Butterworth or equiripple filter itself, and with `freedom = "mask"`:
+The ports, the allowed error and the parallel architecture of audio_lowpass with the mask of
+[a recipe](recipes/inside_a_mask.md), which order 5 meets: the Butterworth filter itself, and with `freedom = "mask"`:
 
 {masked_table(record)}
 
