@@ -86,7 +86,7 @@ def test_the_polynomial_in_front_of_the_filter(tmp_path: Path) -> None:
     made = design_core(replace(spec, hardware=replace(spec.hardware, architecture="online", realization="df1_ef1")))
     (trace,) = traces_for(made, "worst_case", seed=3)
     trace = replace(trace, codes=trace.codes[:100], truth=None, reading=None)
-    assert simulate(made, [trace], tmp_path, seed=3).mismatches == 0
+    assert simulate(made, [trace], tmp_path, seed=3).run.mismatches == 0
 
 
 def designed(number: int) -> CoreDesign:
