@@ -33,6 +33,7 @@ def test_the_numerics_show_a_refusal_as_such(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(numerics, "others", lambda _: [])
     *_, head, _, row = numerics.table("audio_lowpass").splitlines()
     advice = 'hardware.realization = "df1_ef2" meets the specification as it is'
-    assert row.startswith(f"| df1 | refused: it must fit, and does not; {advice} |")
+    assert row.startswith("| df1 | refused: ")
+    assert f"; {advice} |" in row
     assert row.count("|") == head.count("|")
     assert numerics.noise_curve("df1") == "refused: it must fit, and does not"
