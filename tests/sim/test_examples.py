@@ -235,7 +235,7 @@ WRONG: dict[str, tuple[str, Callable[[str], str]]] = {
         "audio_lowpass.toml",
         flip(r"\? (?P<constant>(?P<width>1[67])'h(?P<value>0[0-9a-f]+)) :", 0),
     ),
-    "a delay too short": ("audio_lowpass.toml", replaced("x2 <= x1;", "x2 <= i0;")),
+    "a delay too short": ("audio_lowpass.toml", replaced("x2 <= x1;", "x2 <= x;")),
 }
 
 
