@@ -301,7 +301,7 @@ class Specification(View):
         >>> import sosmith
         >>> one = sosmith.Specification.combinations()[0]
         >>> one.row, one.option, one.verdict
-        ('parallel', 'channels', 'ok')
+        ('parallel', 'FIR', 'ok')
         """
         return combinations()
 
