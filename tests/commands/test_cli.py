@@ -298,7 +298,7 @@ def test_the_example_workflow(sosmith: Command) -> None:
     assert summary == '"$GITHUB_STEP_SUMMARY"'
     quick = ("--trace", "noise", "--seconds", "0.2", "--simulator", "icarus")
     parallel = '[hardware]\narchitecture = "parallel"\n'
-    designs = {"accuracy": ("df1", '"faithful"'), "broken": ("df1", "0.01"), "better": ("df1_ef1", "0.0004")}
+    designs = {"accuracy": ("df1_ef1", '"faithful"'), "broken": ("df1", "0.01"), "better": ("df1", "0.0004")}
     outcomes: dict[str, Outcome] = {}
     for name, (realization, max_error) in designs.items():
         Path("filter.toml").write_text(FILTER.replace('"faithful"', max_error) + parallel, encoding="utf-8")
@@ -308,10 +308,10 @@ def test_the_example_workflow(sosmith: Command) -> None:
             outcomes[name] = sosmith(*command.split())
     assert (outcomes["broken"].status, outcomes["better"].status) == (1, 0)
     assert outcomes["broken"].messages[-1] == (
-        "sosmith: error: no report must be worse than the baseline, or impossible to judge, not plain"
+        "sosmith: error: no report must be worse than the baseline, or impossible to judge, not filter"
     )
-    assert outcomes["broken"].stdout.startswith("## ❌ plain falls short beside the baseline\n\n- largest error: ")
-    assert outcomes["better"].stdout.startswith("## ✅ plain is not worse than the baseline")
+    assert outcomes["broken"].stdout.startswith("## ❌ filter falls short beside the baseline\n\n- largest error: ")
+    assert outcomes["better"].stdout.startswith("## ✅ filter is not worse than the baseline")
     assert Path("build/comparison.html").exists()
 
 
