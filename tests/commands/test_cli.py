@@ -240,7 +240,6 @@ PASSING = ("scenario", "notes", "wall_seconds", "cycles_per_second")
 
 
 @pytest.mark.slow
-@pytest.mark.sweep(2)
 @pytest.mark.parametrize(
     ("spec", "scenario"), [("demo", "wear_ramp"), pytest.param("plain", "noise", marks=pytest.mark.slow)]
 )

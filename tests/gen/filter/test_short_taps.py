@@ -86,8 +86,8 @@ def test_a_half_band_filter_keeps_its_zeros() -> None:
 def test_the_last_digits_of_the_start_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     wanted, generator = designed(SMALL), np.random.default_rng(1)
 
-    def nearly(*given: object) -> tuple[float, ...] | None:
-        taps = taps_of_length(*given)  # type: ignore[arg-type]
+    def nearly(family: str, length: int, asked: LossMask) -> tuple[float, ...] | None:
+        taps = taps_of_length(family, length, asked)
         return taps and tuple(tap * (1 + 1e-13 * generator.standard_normal()) for tap in taps)
 
     monkeypatch.setattr(module, "taps_of_length", nearly)

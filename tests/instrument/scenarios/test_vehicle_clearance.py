@@ -13,7 +13,6 @@ from sosmith.instrument.vehicle.track import curved_track, tangent_track
 
 
 @pytest.mark.slow
-@pytest.mark.sweep(1)
 @pytest.mark.parametrize(("name", "make"), [("paper", curved_track), ("tangent", tangent_track)])
 @pytest.mark.parametrize("model", MODELS)
 def test_it_is_the_models_own_motion(name: str, make: object, model: str) -> None:

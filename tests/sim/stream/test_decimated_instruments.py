@@ -58,7 +58,6 @@ def samples_of(made: CoreDesign, count: int) -> Trace:
 
 
 @pytest.mark.slow
-@pytest.mark.sweep(1)
 @without_pictures
 @pytest.mark.parametrize(
     ("architecture", "simulator"), [("folded", "icarus"), ("parallel", "verilator"), ("serial", "cxxrtl")]
@@ -107,7 +106,6 @@ def test_wear_held_and_judged(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.sweep(1)
 @without_pictures
 @pytest.mark.parametrize(
     ("architecture", "core", "simulator"),
@@ -154,7 +152,6 @@ def test_results_come_at_the_rate_that_is_stated(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.sweep(1)
 @pytest.mark.parametrize("architecture", ["folded", "parallel"])
 def test_tools_read_the_text_without_a_warning(architecture: str, tmp_path: Path) -> None:
     made = whole(architecture)

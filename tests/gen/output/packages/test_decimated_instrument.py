@@ -14,7 +14,6 @@ from sosmith.model.errors import SpecificationError
 
 
 @pytest.mark.slow
-@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     "design", [small, pytest.param(lambda: locomotive(core="instrument"), id="locomotive", marks=pytest.mark.slow)]
 )
