@@ -109,7 +109,7 @@ def measure(processes: int, only: str = "") -> None:
     # What is measured with a program that the record does not know is not in it.
     unchanged = set(old["tools"]) <= set(record["tools"]) and old["seeds"] == record["seeds"]
     for core in CORES:
-        kept = targets_in(old, core) if unchanged else {}
+        kept = {key: of for key, of in targets_in(old, core).items() if key in core.targets} if unchanged else {}
         for key, figures in kept.items():
             figures["earlier"] = figures["earlier"] if only else figures["source"] != source(core, key)
         record["cores"][core.key] = {"targets": kept}

@@ -25,7 +25,6 @@ ROOT = Path(__file__).resolve().parent.parent
 RECORD = ROOT / "benchmarks" / "cost.json"
 EXAMPLES = {"audio_lowpass": "filter", "flange_wear_bench": "instrument", "flange_wear_locomotive": "instrument"}
 ARCHITECTURES = tuple(terms.name for terms in (combinations.PARALLEL, combinations.FOLDED, combinations.SERIAL))
-CHANNELS = (1, 12, 64)
 SEEDS = (1, 2, 3, 4, 5)
 GROWTH = 1.05
 """Largest allowed ratio of a figure to the recorded one."""
@@ -65,6 +64,10 @@ class Core:
         Clock in MHz that it looks ahead for; 0 without look-ahead.
     multipliers : int
         Multiplier blocks that the specification names; 0 for "auto".
+    order : int
+        Order of the filter; 0 for that of the example.
+    start : str
+        What the filter starts from; empty for the example's.
     freedom : str
         "none" or "mask" for the filter of the recipe inside a mask in place of the example's, as that of the family or
         as any; empty for the example's.
@@ -79,6 +82,8 @@ class Core:
     lanes: int = 1
     clock: int = 0
     multipliers: int = 0
+    order: int = 0
+    start: str = ""
     freedom: str = ""
 
     @property
@@ -90,7 +95,7 @@ class Core:
         several = f" {self.lanes} a clock" if self.lanes > 1 else ""
         ahead = f" look-ahead {self.clock} MHz" if self.clock else ""
         blocks = f" multipliers {self.multipliers}" if self.multipliers else ""
-        special = f"{guarded}{wide}{chosen}{several}{ahead}{blocks}{self._free}"
+        special = f"{guarded}{wide}{self._varied}{chosen}{several}{ahead}{blocks}{self._free}"
         return f"{self.example} {self.architecture} {self.channels}{special}"
 
     @property
@@ -103,7 +108,13 @@ class Core:
         lanes = f", {self.lanes} samples a clock" if self.lanes > 1 else ""
         ahead = f", look-ahead for {self.clock} MHz" if self.clock else ""
         blocks = f", multipliers = {self.multipliers}" if self.multipliers else ""
-        return f"{self.example} {self.architecture}{several}{guarded}{wide}{chosen}{lanes}{ahead}{blocks}{self._free}"
+        special = f"{guarded}{wide}{self._varied}{chosen}{lanes}{ahead}{blocks}{self._free}"
+        return f"{self.example} {self.architecture}{several}{special}"
+
+    @property
+    def _varied(self) -> str:
+        order = f", order {self.order}" if self.order else ""
+        return f"{order}, start = {self.start}" if self.start else order
 
     @property
     def _free(self) -> str:
@@ -112,14 +123,18 @@ class Core:
     @property
     def targets(self) -> list[str]:
         """Targets on which it is measured."""
+        if self in SEVERAL:
+            return list(SEVERAL[self])
         if self.lanes > 2:
             return ["ecp5_85"]
-        if self.multipliers:
+        if self.multipliers and not self.order:
             return [key for key in ("up5k", "ecp5") if TARGETS[key].device.multipliers >= self.multipliers]
-        if self.realization or self.lanes > 1 or self.clock:
+        if self.realization or self.lanes > 1 or self.clock or self.order or self.start:
             return ["ecp5"]
         if self.bits or self.freedom or self.architecture == combinations.ONLINE.name:
             return ["hx8k", "ecp5"]
+        if (self.architecture, EXAMPLES[self.example]) == (combinations.PARALLEL.name, "instrument"):
+            return ["ecp5"]  # no iCE40 has enough multipliers for the polynomial
         wanted = [key for key in _ORDINARY if key != _SMALLEST or self.architecture == combinations.SERIAL.name]
         if self.protect == "none":
             alone = (self.example, self.channels) == (_ALONE, 1) and self.architecture != combinations.SERIAL.name
@@ -130,11 +145,16 @@ class Core:
             if key == "ecp5" or (key == "up5k" and self.architecture != combinations.PARALLEL.name)
         ]
 
-    @property
-    def extra_channels(self) -> tuple[int, ...]:
-        """Numbers of channels in addition to `CHANNELS`."""
-        return (8,) if (self.example, self.architecture) == ("audio_lowpass", combinations.PARALLEL.name) else ()
 
+SEVERAL = {
+    **{Core("audio_lowpass", "parallel", channels): ("ecp5",) for channels in (8, 12, 64)},
+    Core("audio_lowpass", "folded", 64): ("up5k", "ecp5"),
+    Core("flange_wear_locomotive", "parallel", 12): ("ecp5",),
+    **{Core("flange_wear_locomotive", "folded", channels): ("up5k", "ecp5") for channels in (12, 64)},
+    Core("flange_wear_locomotive", "serial", 12): ("hx1k",),
+    Core("flange_wear_locomotive", "serial", 64): ("hx8k",),
+}
+"""Cores for several channels, and their targets: few, as what channels cost is the same for all filters."""
 
 PROTECTED = tuple(
     Core(example, architecture, channels, protect)
@@ -168,17 +188,31 @@ FAST = (
 TWO_PRODUCTS = tuple(Core(example, "folded", multipliers=2) for example in EXAMPLES)
 """Folded cores with two products a clock."""
 
+FROM_ZERO = Core("audio_lowpass", "parallel", start="zero")
+"""Without the logic of a steady start."""
+
+ORDER_SIX = (
+    Core("audio_lowpass", "parallel", bits=18, order=6),
+    Core("audio_lowpass", "folded", bits=18, order=6, multipliers=2),
+    Core("audio_lowpass", "folded", bits=18, order=6),
+)
+"""Three sections of second order, for which others publish a core with a multiplier each."""
+
 MASKED = tuple(Core("audio_lowpass", "parallel", freedom=freedom) for freedom in ("none", "mask"))
 """The family's filter for a mask, and any inside it."""
 
-OF_THEIR_OWN = frozenset({*PROTECTED, *ONLINE, *REALIZED, *FAST, *TWO_PRODUCTS, *MASKED})
+OF_THEIR_OWN = frozenset({*PROTECTED, *ONLINE, *REALIZED, *FAST, *TWO_PRODUCTS, *MASKED, *ORDER_SIX, FROM_ZERO})
 """Cores that have tables of their own."""
 
 CORES = (
     *(
-        replace(core, channels=channels)
-        for core in (Core(example, architecture) for example in EXAMPLES for architecture in ARCHITECTURES)
-        for channels in sorted({*CHANNELS, *core.extra_channels})
+        core
+        for example in EXAMPLES
+        for architecture in ARCHITECTURES
+        for core in (
+            Core(example, architecture),
+            *(other for other in SEVERAL if (other.example, other.architecture) == (example, architecture)),
+        )
     ),
     *PROTECTED,
     *ONLINE,
@@ -186,6 +220,8 @@ CORES = (
     *FAST,
     *TWO_PRODUCTS,
     *MASKED,
+    *ORDER_SIX,
+    FROM_ZERO,
 )
 Job = tuple[Core, str]
 """A core and its target."""
@@ -211,8 +247,10 @@ def design(core: Core, objective: Objective, target: str = "") -> CoreDesign:
     example, architecture, bits = core.example, core.architecture, core.bits
     path = ROOT / "examples" / f"{example}.toml"
     spec = load(path)
-    if bits:
-        spec = from_text(spec.text.replace("bits = 16", f"bits = {bits}"), path)
+    varied = spec.text.replace("bits = 16", f"bits = {bits}") if bits else spec.text
+    varied = varied.replace("order = 5", f"order = {core.order}") if core.order else varied
+    varied = varied.replace("[filter]", f'[filter]\nstart = "{core.start}"') if core.start else varied
+    spec = from_text(varied, path)
     if core.freedom:
         mask = load(ROOT / "examples" / "recipes" / "inside_a_mask.toml").filter
         spec = replace(spec, filter=replace(mask, freedom=core.freedom))

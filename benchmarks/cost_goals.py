@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 from benchmarks.cost_cores import (
     ARCHITECTURES,
-    CHANNELS,
+    FROM_ZERO,
+    ORDER_SIX,
     Core,
     Figures,
     fmax,
@@ -82,7 +83,7 @@ AUDIO = {name: Core("audio_lowpass", name) for name in ARCHITECTURES}
 EIGHT = Core("audio_lowpass", "parallel", 8)
 _AHEAD = Core("audio_lowpass", "parallel", clock=120)
 _TWO = Core("audio_lowpass", "folded", multipliers=2)
-_LOCOMOTIVE = {(name, n): Core("flange_wear_locomotive", name, n) for name in ARCHITECTURES for n in CHANNELS}
+_LOCOMOTIVE = {(name, n): Core("flange_wear_locomotive", name, n) for name in ARCHITECTURES for n in (1, 12, 64)}
 _FOLDED = {
     ("audio_lowpass", "up5k"): (85, {"LC": 342}),
     ("audio_lowpass", "hx8k"): (85, {"LC": 1110}),
@@ -106,20 +107,19 @@ def _folded_goals() -> Iterable[Goal]:
 
 
 GOALS = (
-    Goal(AUDIO["parallel"], "ecp5", "MULT18X18D", 16, _area("multipliers")),
-    Goal(AUDIO["parallel"], "ecp5", "MULT18X18D, to beat", 8, _area("multipliers")),
-    Goal(AUDIO["parallel"], "ecp5", "LUT4 alone", 800, _area("luts")),
-    Goal(AUDIO["parallel"], "ecp5", "all LUT4", 800, _area("all_luts")),
-    Goal(AUDIO["parallel"], "ecp5", "LUT4 alone, to beat", 500, _area("luts")),
+    Goal(AUDIO["parallel"], "ecp5", "MULT18X18D", 5, _area("multipliers")),
+    Goal(AUDIO["parallel"], "ecp5", "all LUT4", 640, _area("all_luts")),
     Goal(AUDIO["parallel"], "ecp5", "all LUT4, to beat", 500, _area("all_luts")),
-    Goal(AUDIO["parallel"], "ecp5", "fmax, MHz", 70, fmax),
+    Goal(AUDIO["parallel"], "ecp5", "FF", 540, _area("flip_flops")),
+    Goal(AUDIO["parallel"], "ecp5", "fmax, MHz", 82, fmax),
+    Goal(FROM_ZERO, "ecp5", "all LUT4", 600, _area("all_luts")),
     Goal(EIGHT, "ecp5", "fmax, MHz", 175, fmax),
     Goal(_AHEAD, "ecp5", "all LUT4, half of 3,662 without multipliers", 1831, _area("all_luts")),
     Goal(_AHEAD, "ecp5", "fmax, MHz", 135, fmax),
     Goal(Core("audio_lowpass", "parallel", lanes=2, clock=100), "ecp5", "fmax, MHz", 100, fmax),
     Goal(Core("audio_lowpass", "parallel", lanes=4, clock=100), "ecp5_85", "all LUT4", 9000, _area("all_luts")),
     Goal(Core("audio_lowpass", "parallel", lanes=4, clock=100), "ecp5_85", "fmax, MHz", 100, fmax),
-    Goal(AUDIO["parallel"], "hx8k", "LC, no multipliers", 2000, _cells),
+    Goal(AUDIO["parallel"], "hx8k", "LC, no multipliers", 1600, _cells),
     Goal(AUDIO["parallel"], "hx8k", "fmax, MHz, no less than with multipliers of LUT4", 49, fmax),
     Goal(AUDIO["folded"], "ecp5", "MULT18X18D", 1, _area("multipliers")),
     Goal(AUDIO["folded"], "ecp5", "LUT4 alone", 400, _area("luts")),
@@ -129,6 +129,16 @@ GOALS = (
     Goal(_TWO, "ecp5", "clocks per sample", 50, _clocks),
     Goal(_TWO, "ecp5", "all LUT4", 400, _area("all_luts")),
     Goal(_TWO, "ecp5", "fmax, MHz", 150, fmax),
+    *(
+        goal
+        for core in ORDER_SIX[:2]
+        for goal in (
+            Goal(core, "ecp5", "clocks per sample", 8, _clocks),
+            Goal(core, "ecp5", "all LUT4", 400, _area("all_luts")),
+            Goal(core, "ecp5", "MULT18X18D", 3, _area("multipliers")),
+            Goal(core, "ecp5", "fmax, MHz", 100, fmax),
+        )
+    ),
     Goal(Core("audio_lowpass", "parallel", freedom="mask"), "hx8k", "LC, no multipliers", 1200, _cells),
     Goal(AUDIO["serial"], "up5k", "MAC16", 0, _area("multipliers")),
     Goal(AUDIO["serial"], "up5k", "LC", 500, _cells),

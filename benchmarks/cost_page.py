@@ -8,14 +8,15 @@ from dataclasses import replace
 import matplotlib
 from benchmarks.cost_cores import (
     ARCHITECTURES,
-    CHANNELS,
     EXAMPLES,
     FAST,
     GROWTH,
     MASKED,
     ONLINE,
+    ORDER_SIX,
     PROTECTED,
     REALIZED,
+    SEVERAL,
     TWO_PRODUCTS,
     Core,
     Figures,
@@ -32,7 +33,6 @@ from benchmarks.cost_estimate_record import recorded as estimated
 from benchmarks.cost_estimate_record import section
 from benchmarks.cost_goals import (
     AUDIO,
-    EIGHT,
     goal_table,
     tries,
 )
@@ -136,21 +136,36 @@ def two_products_table(record: Figures) -> str:
     for two in TWO_PRODUCTS:
         for key, both in targets_in(record, two).items():
             one = targets_in(record, replace(two, multipliers=0)).get(key)
-            for figures in (one, both) if one is not None else (both,):
-                area = figures["area"]
-                row = [
-                    two.example,
-                    str(area["multipliers"]),
-                    title(TARGETS[key]),
-                    f"{logic_of(key, figures):,}",
-                    f"{area['flip_flops']:,}",
-                    str(area["rams"]),
-                    f"{fmax(figures):.1f} ({min(figures['fmax']):.1f} to {max(figures['fmax']):.1f})",
-                    f"{figures['cycles']:,}",
-                    f"{rate(two, figures):,.0f}",
-                ]
-                lines.append(f"| {' | '.join(row)} |")
+            lines += [_row(two.example, two, key, each) for each in (one, both) if each is not None]
     return "\n".join(lines)
+
+
+def order_six_table(record: Figures) -> str:
+    """Return a Markdown table of a filter of order six in all architectures that are measured for it."""
+    columns = (
+        *("architecture", "multipliers", "target", "all LUT4", "FF", "RAM", "fmax, MHz (lowest to highest)"),
+        *("clocks per sample", "samples per second"),
+    )
+    lines = [f"| {' | '.join(columns)} |", "|---" * len(columns) + "|"]
+    for core in ORDER_SIX:
+        lines += [_row(core.architecture, core, key, each) for key, each in targets_in(record, core).items()]
+    return "\n".join(lines)
+
+
+def _row(name: str, core: Core, key: str, figures: Figures) -> str:
+    area = figures["area"]
+    row = [
+        name,
+        str(area["multipliers"]),
+        title(TARGETS[key]),
+        f"{logic_of(key, figures):,}",
+        f"{area['flip_flops']:,}",
+        str(area["rams"]),
+        f"{fmax(figures):.1f} ({min(figures['fmax']):.1f} to {max(figures['fmax']):.1f})",
+        f"{figures['cycles']:,}",
+        f"{rate(core, figures):,.0f}",
+    ]
+    return f"| {' | '.join(row)} |"
 
 
 def masked_table(record: Figures) -> str:
@@ -312,6 +327,7 @@ def plot(record: Figures) -> str:
     colours = dict(zip(EXAMPLES, ("C0", "C1", "C2"), strict=True))
     marks = dict(zip(ARCHITECTURES, ("o", "s", "^"), strict=True))
     panels = ("hx8k", "up5k", "ecp5")
+    counts = sorted({1, *(core.channels for core in SEVERAL)})
     with matplotlib.rc_context({"svg.hashsalt": "sosmith", "svg.fonttype": "none"}):
         figure = Figure(figsize=(12, 8), layout="constrained")
         FigureCanvasSVG(figure)
@@ -331,7 +347,7 @@ def plot(record: Figures) -> str:
             rates.set_title(title(TARGETS[key]))
             rates.set_xlabel("samples per second at fmax, one channel")
             channels.set_xlabel("channels")
-            channels.set_xticks(CHANNELS, [str(count) for count in CHANNELS])
+            channels.set_xticks(counts, list(map(str, counts)))
             channels.xaxis.minorticks_off()
             for axes in (rates, channels):
                 axes.set_ylabel("all LUT4" if key == "ecp5" else "logic cells")
@@ -364,8 +380,8 @@ changed cores again and fails if a figure of synthesis has grown by more than {1
 ![logic against sample rate](images/cost.svg)
 
 Measured are the filter core of audio_lowpass, and the whole instrument (calibration and filter) of the two other
-examples, each in all three architectures, for {", ".join(map(str, CHANNELS))} channels;
-audio_lowpass parallel for {EIGHT.channels} as well. Everything else is as specified, including the proven bound.
+examples, each in all three architectures, and some of them for several channels. Everything else is as specified,
+including the proven bound.
 The folded architecture has digits of 17 bits on the ECP5, whose multipliers have 18 bits, and of 15 elsewhere.
 Not every core reaches the sample rate of its example with that many channels: the tables give the highest rate in
 samples per second, of all channels together.
@@ -421,6 +437,16 @@ specification and with the same proven bound:
 
 On the ECP5 the registers at the multipliers and at the output of the program memory are inside the blocks
 ([hardware.md](hardware.md#registers-inside-blocks)).
+
+## Three sections of second order
+
+audio_lowpass with order 6 and 18 bits in and out, one channel, proven to one LSB:
+
+{order_six_table(record)}
+
+A core with a multiplier for each section and 8 clocks a sample would lie between the first two. There is none: the
+filter's poles take products of 18 by 18 bits and sums of some 40 bits for an error of one LSB, and what chooses
+the operands of a shared sum takes about as many LUT4 as the sums that it saves.
 
 ## Any filter inside a mask
 

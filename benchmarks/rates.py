@@ -201,7 +201,8 @@ class Point:
 
 def curve_of(core: Core) -> tuple[str, str]:
     """Return the curve that a core of audio_lowpass lies on, and its mark there; empty if it is on none."""
-    if core.example != "audio_lowpass" or core.protect != "none" or core.realization or core.freedom:
+    varied = core.protect != "none" or core.realization or core.freedom or core.order or core.start
+    if core.example != "audio_lowpass" or varied:
         return "", ""
     if core.channels > 1:
         several = sorted(other.channels for other in CORES if replace(other, channels=core.channels) == core)[1:]
