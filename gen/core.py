@@ -18,6 +18,7 @@ from sosmith.gen.specification.choices import AUTO, CORES, ERROR_FEEDBACK
 from sosmith.gen.specification.combinations import asked_by
 from sosmith.gen.specification.specification import Specification
 from sosmith.gen.word_lengths.decimation.decimator import PreStage, pre_stage_of
+from sosmith.gen.word_lengths.input_stage import needs_scaling
 from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.gen.word_lengths.selection import Progress
 from sosmith.model.dataflow.datapath import Datapath
@@ -117,7 +118,7 @@ def design_core(
         progress=progress,
     )
     wanted = spec.hardware.architecture
-    kinds = candidates(wanted, budget.blocks, asked_by(spec))
+    kinds = candidates(wanted, budget.blocks, asked_by(spec), rings=_fits_rings(spec, response, asked))
     (quantized, reason, architecture), refused = search.first_that_keeps_up(kinds)
     why = reason_for(architecture, budget, asked=wanted != AUTO, board=board, refused=refused)
     whole = quantized if response.pre_stage is None else response.pre_stage.counted(quantized)
@@ -176,6 +177,22 @@ def response_of(
         factor=_own_factor(spec, kind),
     )
     return response, decimates
+
+
+def _fits_rings(spec: Specification, response: Response, asked: AskedRealization) -> bool:
+    """Say whether a core is an FIR filter of samples as they come, which a ring of memory can hold for one multiplier.
+
+    A set of coefficients that is loaded at pins, or restarts the filter, goes to a program.
+    """
+    hardware = spec.hardware
+    return (
+        response.ideal is not None
+        and response.ideal.is_fir
+        and response.polynomial is None
+        and not needs_scaling(response.inputs[0], spec.output)
+        and not (hardware.reload and (spec.wear is not None or not hardware.reload_registers))
+        and asked.name != "fir_transposed"
+    )
 
 
 def _own_factor(spec: Specification, core: str) -> int:

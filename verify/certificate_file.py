@@ -206,12 +206,12 @@ class DecimationEntry(Entry):
 
 
 class DownsamplingEntry(Entry):
-    """An FIR filter of which every `factor`-th result leaves, the first one that of the first sample.
+    """An FIR filter of which every `factor`-th result leaves, the first one that of the first sample; with 1, all do.
 
     That sample goes in `filled` times before it counts.
     """
 
-    factor: Annotated[int, Field(strict=True, ge=2, le=1 << 10)]
+    factor: Annotated[int, Field(strict=True, ge=1, le=1 << 10)]
     filled: Annotated[int, Field(strict=True, ge=0, le=1 << 10)]
 
 

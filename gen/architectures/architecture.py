@@ -43,6 +43,9 @@ class Architecture(ABC):
         Of the class: its name, and which specifications it takes.
     checked : str
         Of the class: what `sosmith verify --files` proves of a core with fixed constants and no protection, a sentence.
+    is_filled : bool
+        Of the class: whether what it remembers is filled with the first sample of a steady start, or with zeros,
+        instead of a start beside the sections.
     datapath : Datapath
         The datapath.
     channels : int
@@ -73,6 +76,7 @@ class Architecture(ABC):
 
     terms: ClassVar[Terms]
     checked: ClassVar[str]
+    is_filled: ClassVar[bool] = False
 
     datapath: Datapath
     channels: int = 1

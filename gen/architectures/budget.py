@@ -85,6 +85,18 @@ class Budget:
             f"{_in_full(self.clock, 12)} Hz{many} the sample rate must be at most {most} Hz, not {wanted} Hz"
         )
 
+    def check_blocks(self, architecture: Architecture) -> None:
+        """Check that `architecture` takes no more multiplier blocks than the specification names.
+
+        Raises
+        ------
+        ShortfallError
+            If it takes more.
+        """
+        asked, needed = self.blocks.asked, architecture.multiplier_blocks
+        if asked is not None and needed > asked:
+            raise ShortfallError(f"hardware.multipliers must be at least {needed} for its products, not {asked}")
+
 
 def _distinct_texts(most: Fraction, wanted: Fraction) -> tuple[str, str]:
     """Texts of two rates with enough digits to tell them apart; `most` is rounded down, so that it is achievable."""

@@ -1,4 +1,4 @@
-"""The folded architecture of an FIR filter that decimates: one multiplier, and samples in a ring of memory."""
+"""The folded architecture of an FIR filter: one multiplier, and samples in a ring of memory."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from sosmith.gen.architectures.blocks import NO_LIMIT, Blocks
 from sosmith.gen.architectures.fir_steps import FewSteps
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.specification.combinations import FOLDED
+from sosmith.gen.word_lengths.cost import Multiplication, Operand
 from sosmith.gen.word_lengths.objective import Objective
 from sosmith.hdl.plan.tap_steps import TapSteps, tap_steps
 from sosmith.model.dataflow.datapath import Datapath
@@ -24,14 +25,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class FoldedFir(Architecture):
-    """One multiplier takes the steps of every N-th result alone, a step at each clock."""
+    """One multiplier takes the steps of each result, or of every N-th one alone, a step at each clock."""
 
     terms = FOLDED
+    is_filled = True
     checked = "each result is the one of the datapath's graphs, for all samples, stalls and resets"
 
     @classmethod
     def is_tried(cls, blocks: Blocks) -> bool:
-        """Return True: it is the only one."""
+        """Return True: if there is no multiplier block, synthesis makes one of LUT4."""
         del blocks
         return True
 
@@ -59,8 +61,10 @@ class FoldedFir(Architecture):
 
     @property
     def multiplier_blocks(self) -> int:
-        """Multiplier blocks that it takes."""
-        return 1
+        """Multiplier blocks that it takes: several where a sum of two samples or a coefficient is too wide for one."""
+        plan, (port,) = self.plan, self.datapath.inputs
+        data = Operand(plan.pair_bits(port), signed=True)
+        return Multiplication(data, Operand(plan.factor_bits, signed=True)).blocks_of(self.blocks.bits)
 
     @property
     def memory_bits(self) -> int:
@@ -126,6 +130,6 @@ class FoldedFir(Architecture):
     def reason(self, why: str, available: int) -> str:
         """Say in a sentence that it was chosen and `why`, with `available` clocks for each result."""
         return (
-            f"{self.name}: {why}; takes {self.cycles_per_result:,} of {available:,} clocks for "
-            f"{self._down.factor} samples"
+            f"{self.name}: {why}; takes {self.cycles_per_result:,} of {available:,} clocks "
+            f"{'a sample' if self._down.factor == 1 else f'for {self._down.factor} samples'}"
         )

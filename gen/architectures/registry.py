@@ -26,13 +26,24 @@ ARCHITECTURES: dict[str, type[Architecture]] = {each.terms.name: each for each i
 """All architectures that a specification can name, by name, the smallest first."""
 
 
-def candidates(wanted: str, blocks: Blocks, options: tuple[Option, ...] = ()) -> tuple[type[Architecture], ...]:
-    """Architectures to try for the one that the specification asks for beside `options`, the smallest first."""
+def candidates(
+    wanted: str, blocks: Blocks, options: tuple[Option, ...] = (), *, rings: bool = False
+) -> tuple[type[Architecture], ...]:
+    """Architectures to try for the one that the specification asks for beside `options`, the smallest first.
+
+    `rings` says that the core is an FIR filter whose samples a ring of memory can hold. That takes fewer clocks than a
+    program in the folded architecture, but its products may need more multiplier blocks than the specification names.
+    """
     if FIR_DECIMATE in options:  # the terms leave no other
         return (FoldedFir,)
     if wanted != AUTO:
-        return (ARCHITECTURES[wanted],)
-    return tuple(each for each in SMALLEST_FIRST if each.is_tried(blocks) and each.terms.takes(options))
+        kinds: tuple[type[Architecture], ...] = (ARCHITECTURES[wanted],)
+    else:
+        kinds = tuple(each for each in SMALLEST_FIRST if each.is_tried(blocks) and each.terms.takes(options))
+    if not rings:
+        return kinds
+    folded = (FoldedFir,) if blocks.asked is None else (FoldedFir, Folded)
+    return tuple(each for kind in kinds for each in (folded if kind is Folded else (kind,)))
 
 
 def fitting(
@@ -68,6 +79,8 @@ def fitting(
         budget.reload_registers,
     )
     budget.check(architecture)
+    if isinstance(architecture, FoldedFir) and datapath.samples_per_result == 1:
+        budget.check_blocks(architecture)
     if budget.reload:
         architecture.check_registers()
     return architecture

@@ -120,7 +120,7 @@ class Search:
     calibration: Architecture | None
     board: Board | None
     progress: Progress
-    _plans: dict[str, Plan] = field(default_factory=dict)
+    _plans: dict[tuple[str, bool], Plan] = field(default_factory=dict)
 
     def first_that_keeps_up(self, kinds: Sequence[type[Architecture]]) -> tuple[Candidate, str]:
         """Return the first design that keeps up, and why the one before did not, if there was one.
@@ -154,11 +154,11 @@ class Search:
         """Choose the realization and its word lengths for an architecture, and say why it is that one."""
         ideal, asked = self.response.ideal, self.asked
         if ideal is None:
-            return prove(self._plan_of(next(iter(REALIZATIONS)))), "none: a calibration has no filter sections"
+            return prove(self._plan_of(next(iter(REALIZATIONS)), kind)), "none: a calibration has no filter sections"
         adders = self.budget.adders or self._looks_ahead
         objective = kind.objective(self.board, adders=adders, blocks=self.budget.blocks)
         selection = Selection(
-            lambda name: self._plan_of(name).under(objective),
+            lambda name: self._plan_of(name, kind).under(objective),
             lambda name: least_size(ideal, name, objective),
             objective,
             self.progress,
@@ -180,7 +180,7 @@ class Search:
         """Return all that it depends on whether an architecture takes a datapath, but for the datapath's formats."""
         response, spec = self.response, replace(self.spec, path=Path())
         rows = None if response.ideal is None else response.ideal.rows
-        return kind.terms.name, self.budget, self.board, spec, response.polynomial, response.codes, rows
+        return kind.__name__, self.budget, self.board, spec, response.polynomial, response.codes, rows
 
     def _other_that_does(self, selection: Selection) -> str:
         """Say which realization meets the specification as it is, if one does."""
@@ -190,13 +190,14 @@ class Search:
             return ""
         return f'; hardware.realization = "{other.realization}" meets the specification as it is'
 
-    def _plan_of(self, realization: str) -> Plan:
-        """Plan a realization, once for all architectures that are tried."""
-        if realization not in self._plans:
+    def _plan_of(self, realization: str, kind: type[Architecture]) -> Plan:
+        """Plan a realization, once for all architectures that start alike."""
+        steady = self.spec.hardware.start == "steady" and not kind.is_filled
+        if (realization, steady) not in self._plans:
             spec, response = self.spec, self.response
             pre_stage, ideal = response.pre_stage, response.ideal
             self.progress(f"word lengths, {realization}" if ideal is not None else "word lengths")
-            self._plans[realization] = plan(
+            self._plans[realization, steady] = plan(
                 name=spec.name,
                 inputs=response.inputs,
                 output=spec.output,
@@ -204,11 +205,10 @@ class Search:
                 ideal=ideal,
                 polynomial=response.polynomial if pre_stage is None else None,
                 realization=realization,
-                # A filter that decimates is filled with its first sample.
-                steady=spec.hardware.start == "steady" and response.factor == 1,
+                steady=steady,
                 loads=spec.hardware.reload,
             )
-        return self._plans[realization]
+        return self._plans[realization, steady]
 
     def _in_hardware(self, kind: type[Architecture], datapath: Datapath, *, look_ahead: bool) -> Architecture:
         """Return the hardware of a datapath with its flags, for which a program has instructions.
@@ -224,11 +224,11 @@ class Search:
         wear = () if spec.wear is None else spec.wear.codes(spec.output)
         # Constants that are loaded may make the filter slower, and the count is not among them.
         spare = 3 if spec.hardware.reload else 1
-        filled = self.response.factor > 1 and spec.hardware.start == "steady"
+        filled = kind.is_filled and spec.hardware.start == "steady"
         settles = 0 if filled else spare * samples_to_settle(datapath)
         settles += 0 if pre_stage is None or not settles else pre_stage.decimator.remembered
         flagged = replace(with_settling(datapath, settles), wear=wear)
-        if self.response.factor > 1:
+        if kind.is_filled:
             flagged = replace(flagged, downsampler=self._downsampler(datapath, filled=filled))
         if pre_stage is None:
             whole = replace(flagged, calibrated=codes)
@@ -236,7 +236,7 @@ class Search:
         return fitting(kind, self.budget, pre_stage.before(flagged, codes), self.board, calibration=self.calibration)
 
     def _downsampler(self, datapath: Datapath, *, filled: bool) -> Downsampler:
-        """Return what hands on some results of a filter alone, which remembers so many samples."""
+        """Return what hands on the results of a filter alone, or some of them, which remembers so many samples."""
         remembered = sum(len(stage.graph.delays) for stage in datapath.stages)
         return Downsampler(factor=self.response.factor, filled=max(1, remembered) if filled else 0)
 
@@ -285,7 +285,7 @@ class Search:
         for samples, realization in LOOK_AHEAD.items():
             if samples <= self.budget.samples_per_clock or samples % self.budget.samples_per_clock:
                 continue  # a loop would go back to other lanes of a beat
-            planned = self._plan_of(realization.name).under(objective)
+            planned = self._plan_of(realization.name, kind).under(objective)
             if planned.is_long and not patient:
                 continue
             try:

@@ -182,7 +182,7 @@ class DownsamplingFacts:
 def downsampling_facts(core: CoreDesign) -> DownsamplingFacts | None:
     """Collect the facts about a filter that decimates by itself; None for any other core."""
     down, filter_ = core.datapath.downsampler, core.quantized.filter
-    if down is None or filter_ is None:
+    if down is None or down.factor == 1 or filter_ is None:
         return None
     ((taps, _),) = filter_.exact
     symmetric = taps in {taps[::-1], tuple(-tap for tap in taps[::-1])}

@@ -102,7 +102,7 @@ def _filter(design: CoreDesign) -> dict[str, Any]:
 
 def _decimation(design: CoreDesign) -> dict[str, Any]:
     decimator = design.datapath.decimator
-    if design.datapath.downsampler is not None:
+    if design.datapath.downsampler is not None and design.datapath.samples_per_result > 1:
         return {"decimation": [design.datapath.downsampler.factor]}
     return {} if decimator is None else {"decimation": [decimator.factor, decimator.stages]}
 

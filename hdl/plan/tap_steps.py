@@ -98,10 +98,9 @@ class TapSteps:
         sizes = ((-c - 1 if c < 0 else c).bit_length() for c in (step.coefficient for step in self.steps))
         return 1 + max(sizes) + (SPARE_BITS if self.loadable else 0)
 
-    @staticmethod
-    def pair_bits(port: Port) -> int:
-        """Bits of a sum or a difference of two samples, with its sign."""
-        return port.bits + 1 + (not port.signed)
+    def pair_bits(self, port: Port) -> int:
+        """Bits of a sum or a difference of two samples, or of one sample if no step adds two, with its sign."""
+        return port.bits + self.pairs + (not port.signed)
 
     @property
     def words(self) -> int:

@@ -27,12 +27,12 @@ def c_header(datapath: Structure) -> str:
         calibrated_ports=[] if whole.calibration is None else list(map(_description, whole.calibration.inputs)),
         taken=_parameters(whole),
         flags=[(f"{1 << flag:#04x}", flag.meaning) for flag in Flag],
-        states=_states(_text(datapath)),
+        states=[*_states(_text(datapath)), *([("int32_t", "started")] if whole.fill else [])],
         parameters=_parameters(datapath),
         wear=datapath.wear,
         channels=len(datapath.wear) if _takes_channel(datapath) else 0,
         decimator=whole.decimator,
-        downsampler=whole.downsampler,
+        downsampler=whole.downsampler if whole.samples_per_result > 1 else None,
     )
 
 
@@ -81,7 +81,9 @@ def c_source(datapath: Structure) -> str:
         limits=", ".join(f"{{{warning}, {critical}}}" for warning, critical in datapath.wear),
         wear_flags=" | ".join(f"(code >= limit[{k}]) << {flag.value}" for k, flag in judged),
         decimator=whole.decimator,
-        downsampler=whole.downsampler,
+        fill=whole.fill,
+        channel_of_block="c, " if _takes_channel(datapath) else "",
+        downsampler=whole.downsampler if whole.samples_per_result > 1 else None,
         rails=" || ".join(
             f"{name} == {end}"
             for name, port in zip(names, datapath.inputs, strict=True)
@@ -144,6 +146,7 @@ def _states(text: ModelText) -> list[tuple[str, str]]:
 def state_bytes(datapath: Structure) -> int:
     """Size of one channel's state in the compiled model, in bytes."""
     widths = [width // 8 for width in _text(datapath).states] or [4]
+    widths += [4] if datapath.fill else []
     return -(-sum(widths) // max(widths)) * max(widths)
 
 

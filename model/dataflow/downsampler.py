@@ -1,4 +1,4 @@
-"""Every N-th result alone: the node DOWN behind a filter without recursion.
+"""Every N-th result alone, or all of them: the node DOWN behind a filter without recursion.
 
 ::
 
@@ -29,7 +29,7 @@ class Downsampler:
     Attributes
     ----------
     factor : int
-        N, from 2 on; result n belongs to sample ``n N``.
+        N; result n belongs to sample ``n N``. 1 for a filter all of whose results leave.
     filled : int
         Times that the first sample goes in before it counts; 0 for a start from zero.
 
@@ -43,8 +43,8 @@ class Downsampler:
     filled: int
 
     def __post_init__(self) -> None:
-        if self.factor < 2:
-            raise ValueError(f"factor must be at least 2, not {self.factor}")
+        if self.factor < 1:
+            raise ValueError(f"factor must be at least 1, not {self.factor}")
         if self.filled < 0:
             raise ValueError(f"filled must not be negative, not {self.filled}")
 

@@ -146,6 +146,12 @@ class Structure:
         lowers = self.decimator or self.downsampler
         return 1 if lowers is None else lowers.factor
 
+    @property
+    def fill(self) -> int:
+        """Times that the first sample goes in before it counts, where all results leave; 0 for none."""
+        down = self.downsampler
+        return down.filled if down is not None and down.factor == 1 else 0
+
     def results(self, samples: int) -> int:
         """Count the results of so many samples of a channel."""
         return -(-samples // self.samples_per_result)

@@ -21,6 +21,7 @@ from sosmith.verify.c_model.frame import (
     DOWNSAMPLED,
     DOWNSAMPLER,
     FILL,
+    FIRST_FILLS,
     HEADER,
     RESET,
     STEP,
@@ -80,6 +81,12 @@ class _Model:
         self._name = certificate.name
         self._channel = "channel, " if len(item.wear) > 1 else ""
 
+    @property
+    def _fill(self) -> int:
+        """How often the first sample goes in before it counts, where all results leave."""
+        entry = self._certificate.downsampling
+        return entry.filled if entry is not None and entry.factor == 1 else 0
+
     def check(self, source: str, header: str) -> ModelVerdict:
         """Read both files."""
         for name in (port.name for port in (*self._certificate.inputs, *self._behind.inputs)):
@@ -132,6 +139,8 @@ class _Model:
             require(name not in states, f"{name} of the C model must be a state once")
             states[name] = kind
             cursor.expect(";")
+        if self._fill:
+            require(states.pop("started", "") == "int32_t", "the states of the C model must have started, of 32 bits")
         words = 0 if set(states) == {"none"} else len(states)
         wanted = {f"s{k}" for k in range(words)} or {"none"}
         require(set(states) == wanted, f"the states of the C model must be s0 and so on, or none, not {sorted(states)}")
@@ -173,11 +182,15 @@ class _Model:
         codes = [f"in[(n * channels + c) * {count} + {index}]" for index in range(count)]
         arguments = ", ".join(f"{port.name}_code" for port in stages.inputs)
         given = zip(self._members(stages), codes, strict=True)
+        words = {"NAME": self._name, "PARAMETERS": self._parameters(self._behind.inputs, self._channel)}
+        words |= {"ARGUMENTS": self._channel + arguments, "FILLED": str(self._fill)}
         return filled(
             BLOCK,
-            NAME=self._name,
-            PARAMETERS=self._parameters(self._behind.inputs, self._channel),
-            ARGUMENTS=self._channel + arguments,
+            FIRST_FILLS=filled(FIRST_FILLS, **words) if self._fill else "",
+            IN_STEP=f"fill(state, {self._channel}{arguments});" if self._fill else "",
+            OPENS=f"{{ fill(&states[c], {'c, ' if self._channel else ''}in[at + c]);" if self._fill else "",
+            ENDS="}" if self._fill else "",
+            **words,
             CODES=("c, " if self._channel else "") + ", ".join(codes),
             BEHIND=last,
             INPUTS=count,
@@ -219,8 +232,7 @@ class _Model:
     def _read_decimator(self, cursor: Cursor) -> int:
         """Read what stands before a decimator, and that; return the number of nodes."""
         entry = self._certificate.decimation
-        if self._certificate.downsampling is not None:
-            cursor.expect(self._downsampler_words(DOWNSAMPLED))
+        cursor.expect(self._downsampler_words(DOWNSAMPLED))
         if entry is None:
             return 0
         nodes = 0
@@ -240,7 +252,7 @@ class _Model:
     def _downsampler_words(self, text: str) -> str:
         """Return a text about results that are left out with its words; an empty one where all leave."""
         entry = self._certificate.downsampling
-        if entry is None:
+        if entry is None or entry.factor == 1:
             return ""
         inputs = self._certificate.inputs
         arguments = self._channel + ", ".join(f"{port.name}_code" for port in inputs)

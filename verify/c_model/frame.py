@@ -11,7 +11,8 @@ what stage k takes was stored by stage k - 1 at the tick before, with sample n -
 + behind - 1 in their order, those with all stages four at a time; so each stage works on each sample once, in order,
 and its states, which no other stage has, are those of `step`. A decimator adds modulo 2**64, without a sign; its
 differences are the moving sums, which fit 64 bits with a sign. Where one result out of several leaves, all are
-computed; the first sample goes in as often as it must, and results then are counted from 0.
+computed; the first sample goes in as often as it must, and results then are counted from 0. Where all leave, `fill`
+does that before the first `step` after a reset, and changes nothing later.
 """
 
 from __future__ import annotations
@@ -67,7 +68,9 @@ static ALWAYS_INLINE int64_t PREFIXstep(NAME_state *state, PARAMETERS, uint8_t *
 """
 
 BLOCK = """
+FIRST_FILLS
 int64_t NAME_step(NAME_state *state, PARAMETERS, uint8_t *status) {
+    IN_STEP
     return step(state, ARGUMENTS, status);
 }
 
@@ -119,12 +122,23 @@ void NAME_block(NAME_state *states, size_t samples, size_t channels, const int64
     for (size_t done = 0; done < samples; done += turn) {
         const size_t now = samples - done < turn ? samples - done : turn;
         const size_t at = done * channels;
-        for (size_t c = 0; c < channels; c++)
+        for (size_t c = 0; c < channels; c++) OPENS
             if (status)
                 with_status(&states[c], now, channels, c, &in[at * INPUTS], &out[at], &status[at]);
             else
                 without_status(&states[c], now, channels, c, &in[at * INPUTS], &out[at]);
+        ENDS
     }
+}
+"""
+
+FIRST_FILLS = """
+static void fill(NAME_state *state, PARAMETERS) {
+    if (state->started)
+        return;
+    for (size_t k = 0; k < FILLED; k++)
+        step(state, ARGUMENTS, NULL);
+    state->started = 1;
 }
 """
 

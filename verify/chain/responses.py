@@ -104,7 +104,7 @@ def taps_in_turn(cores: Sequence[Certificate]) -> tuple[Fraction, ...]:
         sections = core.ideal.sections
         plain = len(sections) == 1 and list(sections[0].denominator) == [Fraction(1)]
         require(
-            plain and core.decimation is None and core.downsampling is None,
+            plain and core.decimation is None and (core.downsampling is None or core.downsampling.factor == 1),
             f"the core {core.name}, one of several, must be a filter of taps",
         )
         phases.append(sections[0].numerator)

@@ -124,7 +124,8 @@ def bound_claims(
         yield Claim("settled", words, _settled(task, entry, counter))
     if certificate.downsampling is not None:
         every = certificate.downsampling.factor
-        words = f"so is each result that leaves, one for {every} samples, of the exact filter from its first sample on"
+        some = f"result that leaves, one for {every} samples" if every > 1 else "result"
+        words = f"so is each {some}, of the exact filter from its first sample on"
         yield Claim("results_are_bounded", words, _results(task, entry, certificate.downsampling))
     error, unit = certificate.max_error, f" {certificate.output.unit}".rstrip()
     yield Claim("error_is_allowed", f"the bound is at most {float(error):.9g}{unit}", _allowed(certificate))

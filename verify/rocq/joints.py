@@ -91,7 +91,7 @@ class Stage:
 
     def at(self, n: str) -> str:
         """Write which of the graph's results is number `n`."""
-        if self.every == 1:
+        if self.certificate.downsampling is None:
             return n
         return f"({self._filled} + {self.every} * {n})%nat" if self._filled else f"({self.every} * {n})%nat"
 
@@ -105,8 +105,9 @@ class Stage:
 
     def bounded(self) -> str:
         """Write tactics that prove the error of its result `n` for a signal Y of its exact filter, known by E."""
-        k, name = self.index, "error_is_bounded" if self.every == 1 else "results_are_bounded"
-        where = "Z.of_nat n" if self.every == 1 else f"Z.of_nat ({self.every} * n)"
+        k, all_leave = self.index, self.certificate.downsampling is None
+        name = "error_is_bounded" if all_leave else "results_are_bounded"
+        where = "Z.of_nat n" if all_leave else f"Z.of_nat ({self.every} * n)"
         return (
             f"unfold one_in; replace (Z.of_nat n * Z.of_nat {self.every}) with ({where}) by lia; "
             f"exact ({self.file}.{name} (codes_{k} x) (codes_{k}_within x X) Y E n)"

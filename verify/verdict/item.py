@@ -64,7 +64,8 @@ def check_item(certificate: Certificate, item: ItemEntry) -> None:
     _same("start", item.start, start_of(certificate))
     _same("architecture", item.architecture == "online", certificate.claims.online is not None, "online")
     _same("ahead", item.ahead is not None, entry is not None and entry.calibration is not None, "there")
-    lowers = entry is not None or certificate.downsampling is not None
+    down = certificate.downsampling
+    lowers = entry is not None or (down is not None and down.factor > 1)
     require(lowers or not item.hold, "hold of the item must not be stated without a decimator")
     require(item.channels == 1 or item.samples == 1, "several samples a clock must be those of one channel")
     _same("flags", [*item.flags.items()], [*_STATUS.items()])

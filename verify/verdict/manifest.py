@@ -66,7 +66,7 @@ class Manifest:
             clocks = verdict.progress.cleared + verdict.pace.opening, verdict.pace.latency, verdict.pace.interval
         else:
             clocks = verdict.clearing, verdict.latency, verdict.interval
-        if isinstance(verdict, RingVerdict):
+        if isinstance(verdict, RingVerdict) and verdict.factor > 1:
             self._held_clocks(verdict)
         for key, value in zip(_CLOCKS, clocks, strict=True):
             _compare(key, self.tree[key], value)
@@ -232,7 +232,7 @@ def _check_realization(tree: Mapping[str, Any], sections: Sequence[Sequence[Recu
 
 def _check_decimation(manifest: Manifest, certificate: Certificate, item: ItemEntry) -> None:
     facts, entry = manifest.tree["decimation"], certificate.decimation
-    if certificate.downsampling is not None:
+    if certificate.downsampling is not None and certificate.downsampling.factor > 1:
         _check_downsampling(manifest, certificate, item, certificate.downsampling)
         return
     require(

@@ -1,4 +1,4 @@
-"""Proves that a core which keeps its samples in rings computes every N-th result of a certificate's graphs.
+"""Proves that a core which keeps its samples in rings computes every N-th result of a certificate's graphs, or all.
 
 The graphs are those of an FIR filter: all that they remember is samples, and how many there were since the start. The
 core is read from its SystemVerilog, and its clocks are followed one by one (`sosmith.verify.multirate.ring.machine`)::
@@ -208,7 +208,7 @@ class _Check:
         fills = self._check_first()
         ways = [self._check_sample(phase) for phase in self._phases]
         self._check_waiting()
-        clocks = ways[0].clocks + (self._entry.factor - 1) * max(way.clocks for way in ways[1:])
+        clocks = ways[0].clocks + (self._entry.factor - 1) * max((way.clocks for way in ways[1:]), default=0)
         latency = max(fills.latency, ways[0].latency)
         taken = max(fills.clocks, *(way.clocks for way in ways)) + self._hold
         return RingVerdict(
@@ -227,6 +227,8 @@ class _Check:
     def _phases(self) -> list[Form]:
         """Phases of a sample: 0, the last, and all that are between."""
         last = self._entry.factor - 1
+        if last == 0:
+            return [{}]
         return [{}, constant(last), *([self.forms.variable("phase", 1, last - 1)] if last > 1 else [])]
 
     @property
@@ -293,7 +295,9 @@ class _Check:
     @property
     def _names(self) -> tuple[str, ...]:
         """Registers of one channel that `_Fields` says all of."""
-        return _Fields._fields if self._counter is not None else _Fields._fields[:-1]
+        left_out = {"counted"} if self._counter is None else set()
+        left_out |= {"phase", "rail"} if self._entry.factor == 1 else set()  # every sample brings a result
+        return tuple(name for name in _Fields._fields if name not in left_out)
 
     def _check_fields(self, state: State, wanted: _Fields) -> None:
         """Check what is kept for the next sample."""
@@ -484,7 +488,8 @@ class _Check:
 
     def _fields(self, phase: Form) -> _Fields:
         pointer = self.forms.variable("pointer", 0, self._words - 1)
-        return _Fields(pointer, phase, self.forms.variable("rail", 0, 1), self._counted)
+        rail = {} if self._entry.factor == 1 else self.forms.variable("rail", 0, 1)
+        return _Fields(pointer, phase, rail, self._counted)
 
     def _check_waiting(self) -> None:
         """Check that nothing happens while the core waits for a sample, or is offered one of no channel."""
