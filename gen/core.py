@@ -75,6 +75,7 @@ def design_core(
     widths_of: str | None = None,
     board: Board | None = None,
     progress: Progress = lambda step: None,
+    kinds: Sequence[type[Architecture]] = (),
 ) -> CoreDesign:
     """Design a core for a specification.
 
@@ -94,6 +95,8 @@ def design_core(
         digits as wide as they take, and the parallel one makes products of adders where they are too few.
     progress : callable
         Called with the name of each step.
+    kinds : sequence of type of Architecture
+        Architectures to try in this order; those that the specification leaves open if empty.
 
     Raises
     ------
@@ -118,7 +121,8 @@ def design_core(
         progress=progress,
     )
     wanted = spec.hardware.architecture
-    kinds = candidates(wanted, budget.blocks, asked_by(spec), rings=_fits_rings(spec, response, asked))
+    if not kinds:
+        kinds = candidates(wanted, budget.blocks, asked_by(spec), rings=_fits_rings(spec, response, asked))
     (quantized, reason, architecture), refused = search.first_that_keeps_up(kinds)
     why = reason_for(architecture, budget, asked=wanted != AUTO, board=board, refused=refused)
     whole = quantized if response.pre_stage is None else response.pre_stage.counted(quantized)

@@ -83,5 +83,5 @@ def simulate_chain(
 
 def whole_text(design: ChainDesign, directory: Path) -> str:
     """Return the SystemVerilog of a chain in one text: the cores' and the top's, as they were written."""
-    names = [*(core.datapath.name for stage in design.stages for core in stage.cores), design.name]
+    names = [*(module for stage in design.stages for module in stage.modules), design.name]
     return "\n".join((directory / f"{name}.sv").read_text(encoding="utf-8") for name in names)

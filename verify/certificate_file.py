@@ -311,7 +311,8 @@ class ItemEntry(Entry):
     `ahead` is the architecture of the calibration before a decimator, `samples` the number of samples of a beat, `hold`
     whether a result of a decimator leaves as often as samples enter, `reload` whether constants can be loaded, and
     `reload_lock` whether that can be locked until a reset, and `reload_registers` whether it has registers for that: a
-    core without has pins for registers elsewhere.
+    core without has pins for registers elsewhere. `shared` says that its hardware is a module of a chain, which
+    computes several results of each sample.
     `keep` says whether the nets that have names stay through synthesis. `flags` are the bits of ``tuser`` by their
     names. `calibrated` is the lowest and the highest code of each input that is not outside the calibration, empty if
     none is; `wear` the lowest codes of the output at which the wear is a warning and critical, one pair for all
@@ -330,6 +331,7 @@ class ItemEntry(Entry):
     keep: Annotated[bool, Field(strict=True)] = False
     reload_lock: Annotated[bool, Field(strict=True)] = False
     reload_registers: Annotated[bool, Field(strict=True)] = True
+    shared: Annotated[bool, Field(strict=True)] = False
     flags: dict[Text, Annotated[int, Field(strict=True, ge=0, lt=64)]]
     calibrated: Annotated[tuple[_Codes, ...], Field(max_length=2)] = ()
     wear: Annotated[tuple[_Codes, ...], Field(max_length=1 << 12)] = ()

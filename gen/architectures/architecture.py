@@ -123,6 +123,11 @@ class Architecture(ABC):
         return self.terms.name
 
     @property
+    def has_module(self) -> bool:
+        """Whether its files have hardware: that of a result of several may stand with the others'."""
+        return True
+
+    @property
     def program(self) -> Program | None:
         """Program of a shared unit; None without one.
 

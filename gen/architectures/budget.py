@@ -86,16 +86,16 @@ class Budget:
         )
 
     def check_blocks(self, architecture: Architecture) -> None:
-        """Check that `architecture` takes no more multiplier blocks than the specification names.
+        """Check that `architecture` takes no more multiplier blocks than the specification names, or than one.
 
         Raises
         ------
         ShortfallError
             If it takes more.
         """
-        asked, needed = self.blocks.asked, architecture.multiplier_blocks
-        if asked is not None and needed > asked:
-            raise ShortfallError(f"hardware.multipliers must be at least {needed} for its products, not {asked}")
+        most, needed = self.blocks.asked or 1, architecture.multiplier_blocks
+        if needed > most:
+            raise ShortfallError(f"hardware.multipliers must be at least {needed} for its products, not {most}")
 
 
 def _distinct_texts(most: Fraction, wanted: Fraction) -> tuple[str, str]:

@@ -13,7 +13,7 @@ from sosmith.gen.fpga.boards import Board
 from sosmith.gen.specification.combinations import FOLDED
 from sosmith.gen.word_lengths.cost import Multiplication, Operand
 from sosmith.gen.word_lengths.objective import Objective
-from sosmith.hdl.plan.tap_steps import TapSteps, tap_steps
+from sosmith.hdl.plan.tap_steps import StepsInTurn, TapSteps, tap_steps
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.downsampler import Downsampler
 from sosmith.model.dataflow.program import Program
@@ -62,7 +62,11 @@ class FoldedFir(Architecture):
     @property
     def multiplier_blocks(self) -> int:
         """Multiplier blocks that it takes: several where a sum of two samples or a coefficient is too wide for one."""
-        plan, (port,) = self.plan, self.datapath.inputs
+        return self.blocks_of(self.plan)
+
+    def blocks_of(self, plan: TapSteps | StepsInTurn) -> int:
+        """Count the multiplier blocks of steps."""
+        (port,) = self.datapath.inputs
         data = Operand(plan.pair_bits(port), signed=True)
         return Multiplication(data, Operand(plan.factor_bits, signed=True)).blocks_of(self.blocks.bits)
 
@@ -133,3 +137,8 @@ class FoldedFir(Architecture):
             f"{self.name}: {why}; takes {self.cycles_per_result:,} of {available:,} clocks "
             f"{'a sample' if self._down.factor == 1 else f'for {self._down.factor} samples'}"
         )
+
+
+@dataclass(frozen=True)
+class NarrowFir(FoldedFir):
+    """The same where each product fits one multiplier block, or as many as the specification names."""

@@ -10,7 +10,7 @@ from sosmith.gen.architectures.architecture import Architecture
 from sosmith.gen.architectures.blocks import Blocks
 from sosmith.gen.architectures.budget import Budget
 from sosmith.gen.architectures.folded import Folded
-from sosmith.gen.architectures.folded_fir import FoldedFir
+from sosmith.gen.architectures.folded_fir import FoldedFir, NarrowFir
 from sosmith.gen.architectures.online import Online
 from sosmith.gen.architectures.parallel import Parallel
 from sosmith.gen.architectures.serial import Serial
@@ -32,7 +32,7 @@ def candidates(
     """Architectures to try for the one that the specification asks for beside `options`, the smallest first.
 
     `rings` says that the core is an FIR filter whose samples a ring of memory can hold. That takes fewer clocks than a
-    program in the folded architecture, but its products may need more multiplier blocks than the specification names.
+    program in the folded architecture, but its products may need several multiplier blocks, where a program has digits.
     """
     if FIR_DECIMATE in options:  # the terms leave no other
         return (FoldedFir,)
@@ -42,7 +42,7 @@ def candidates(
         kinds = tuple(each for each in SMALLEST_FIRST if each.is_tried(blocks) and each.terms.takes(options))
     if not rings:
         return kinds
-    folded = (FoldedFir,) if blocks.asked is None else (FoldedFir, Folded)
+    folded = (NarrowFir, Folded, FoldedFir) if blocks.asked is None else (NarrowFir, Folded)
     return tuple(each for kind in kinds for each in (folded if kind is Folded else (kind,)))
 
 
@@ -79,7 +79,7 @@ def fitting(
         budget.reload_registers,
     )
     budget.check(architecture)
-    if isinstance(architecture, FoldedFir) and datapath.samples_per_result == 1:
+    if isinstance(architecture, NarrowFir):
         budget.check_blocks(architecture)
     if budget.reload:
         architecture.check_registers()

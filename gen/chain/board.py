@@ -7,6 +7,7 @@ import math
 from amaranth.lib.wiring import Component
 
 from sosmith.gen.chain.design import ChainDesign, StageDesign
+from sosmith.gen.chain.shared_hardware import shared_hardware
 from sosmith.gen.chain.top import chain_interface, registers_port, top_text
 from sosmith.gen.output.identity import BoardItem
 from sosmith.gen.output.verilog import core_verilog
@@ -71,7 +72,13 @@ def chain_item(design: ChainDesign) -> BoardItem:
 
 def modules(design: ChainDesign) -> str:
     """SystemVerilog of the chain: its cores and its top, as `generate_chain` writes them."""
-    return "\n".join([*(core_verilog(core) for stage in design.stages for core in stage.cores), top_text(design)])
+    return "\n".join([*(text for stage in design.stages for text in _texts(stage)), top_text(design)])
+
+
+def _texts(stage: StageDesign) -> list[str]:
+    if stage.shared is not None:
+        return [text for name, text in shared_hardware(stage).items() if name.endswith(".sv")]
+    return [core_verilog(core) for core in stage.cores]
 
 
 def _loaded(design: ChainDesign) -> StageDesign | None:

@@ -16,6 +16,9 @@ from math import prod
 import numpy as np
 import numpy.typing as npt
 
+from sosmith.gen.architectures.architecture import Architecture
+from sosmith.gen.architectures.folded_fir import FoldedFir
+from sosmith.gen.architectures.shared_fir import SharedFir, shared
 from sosmith.gen.chain.automatic.limits import Limits
 from sosmith.gen.chain.automatic.losses import why_not
 from sosmith.gen.chain.ideal import ideal_chain
@@ -38,6 +41,8 @@ from sosmith.gen.filter.design import Filter
 from sosmith.gen.filter.exact_form import Exact
 from sosmith.gen.filter.largest_gain import Peak
 from sosmith.gen.fpga.boards import Board
+from sosmith.gen.specification.choices import AUTO
+from sosmith.gen.specification.combinations import FOLDED
 from sosmith.gen.specification.specification import Specification
 from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.gen.word_lengths.selection import Progress
@@ -56,6 +61,9 @@ _DIGITS = 12
 
 _EARLY_SHARE = Fraction(1, 2)
 """Share that all stages but the last one take at first of what the rounding of the output leaves."""
+
+_SHARING = (AUTO, FOLDED.name)
+"""Architectures with which the cores of a stage that interpolates may share a multiplier."""
 
 _LEAST = Fraction(9, 16)
 """Least error that a stage is allowed, in LSBs of its output."""
@@ -89,6 +97,18 @@ class StageDesign:
     def design(self) -> CoreDesign:
         """Its core, or that of its first results: all have the same streams."""
         return self.cores[0]
+
+    @property
+    def shared(self) -> SharedFir | None:
+        """Hardware with one multiplier for all its results; None if each core has its own."""
+        architecture = self.design.architecture
+        return architecture if isinstance(architecture, SharedFir) else None
+
+    @property
+    def modules(self) -> tuple[str, ...]:
+        """Names of the modules of its hardware: of each core, or the one that all share."""
+        names = tuple(core.datapath.name for core in self.cores)
+        return names if self.shared is None else (names[0].removesuffix("_p0"),)
 
     @property
     def rate(self) -> Rate:
@@ -408,7 +428,7 @@ class _Budget:
             carried = error * peak_gain(own, steady=self.spec.is_steady) if own else Fraction(0)
             output = self.last if is_last else self._port(stage, shares.steps[k], reach + carried + allowed)
             specs = specs_of(self.spec, stage, inputs, output, allowed, own)
-            cores = tuple(self._core(spec, stage) for spec in specs)
+            cores = self._sharing(specs, stage) or tuple(self._core(spec, stage) for spec in specs)
             stages.append(StageDesign(spec=stage, cores=cores, parts=own, gain=gains[k], reach=reach))
             inputs, error = (replace(output, name=ANY_INPUT.name),), carried + stages[-1].bound
             left -= stages[-1].share
@@ -425,13 +445,31 @@ class _Budget:
             )
         return Port(name=ANY_OUTPUT.name, bits=bits, signed=True, lsb=step, zero=Fraction(0), unit=self.last.unit)
 
-    def _core(self, spec: Specification, stage: StageSpec) -> CoreDesign:
+    def _sharing(self, specs: Sequence[Specification], stage: StageSpec) -> tuple[CoreDesign, ...]:
+        """Design the cores of a stage that interpolates for one multiplier; none if that cannot be, or is too slow."""
+        hardware = specs[0].hardware
+        if len(specs) == 1 or hardware.keep or hardware.multipliers == 0 or hardware.architecture not in _SHARING:
+            return ()
+        available = int(hardware.clock / (specs[0].sample_rate * specs[0].channels))
+        try:
+            cores = [self._core(spec, stage, (FoldedFir,)) for spec in specs]
+            architectures = shared([core.architecture for core in cores], available)
+        except ShortfallError:
+            return ()
+        why = architectures[0].reason(f"one multiplier for all {len(specs)} results", available)
+        return tuple(
+            replace(core, architecture=architecture, reasons={**core.reasons, "architecture": why})
+            for core, architecture in zip(cores, architectures, strict=True)
+        )
+
+    def _core(self, spec: Specification, stage: StageSpec, kinds: Sequence[type[Architecture]] = ()) -> CoreDesign:
         try:
             return design_core(
                 spec,
                 core="calibration" if stage.core == "calibration" else None,
                 board=self.board,
                 progress=lambda step: self.progress(f"stage {stage.name}: {step}"),
+                kinds=kinds,
             )
         except ShortfallError as error:
             raise ShortfallError(f"stage {stage.name}: {error}") from None

@@ -11,6 +11,7 @@ from typing import Any
 from sosmith.gen.chain.c_model import chain_header, chain_source
 from sosmith.gen.chain.design import ChainDesign, Folding, Kept
 from sosmith.gen.chain.joints.registers import registers_unit
+from sosmith.gen.chain.shared_hardware import shared_hardware
 from sosmith.gen.chain.top import chain_interface, top_text
 from sosmith.gen.filter.largest_gain import Peak
 from sosmith.gen.output.certificate import certificate, port_entry
@@ -61,6 +62,8 @@ def chain_texts(design: ChainDesign, progress: Progress = lambda step: None) -> 
         f"{name}.c": chain_source(design),
         f"{name}.h": chain_header(design),
     }
+    for stage in design.stages:
+        own |= shared_hardware(stage)
     for stage in design.stages:
         registers = registers_unit(design, stage)
         own |= {} if registers is None else registers.files()

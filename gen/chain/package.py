@@ -60,7 +60,7 @@ def packed_chain(
     named = vlnv or Vlnv.default(design.name)
     texts = chain_texts(design, progress)
     progress("bench")
-    modules = [*(core.datapath.name for stage in design.stages for core in stage.cores), design.name]
+    modules = [*(module for stage in design.stages for module in stage.modules), design.name]
     period, pins = round(float(10**9 / design.spec.base.hardware.clock), 3), top_ports(design)
     unit = design.spec.base.output.unit
     description = (
@@ -76,9 +76,7 @@ def packed_chain(
         description=description,
         version=__version__,
         vlnv=named,
-        stages=[
-            (stage.spec.name, [core.datapath.name for core in stage.cores], stage.spec.kind) for stage in design.stages
-        ],
+        stages=[(stage.spec.name, stage.modules, stage.spec.kind) for stage in design.stages],
         pins=pins,
         factor=design.factor,
         rise=design.rise,

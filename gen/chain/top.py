@@ -97,7 +97,7 @@ def top_text(design: ChainDesign) -> str:
             given["m_axis_tuser"] = "last_tuser"
         turns = turns_unit(design, stage)
         loads = registers_unit(design, stage)
-        lines += _cores(stage, name, given, face) if turns is None else _in_turn(turns, loads, stage, name, given)
+        lines += _core(stage, name, given) if turns is None else _in_turn(turns, loads, stage, name, given)
     if unit is not None:
         lines += _instance(unit.name, "flags", _joined(unit, names[0]))
     loads_of = (registers_unit(design, stage) for stage in design.stages)
@@ -110,10 +110,10 @@ def top_text(design: ChainDesign) -> str:
     return _header(design, chain_interface(design)) + before + "\n".join([*lines, "endmodule", ""])
 
 
-def _cores(stage: StageDesign, name: str, given: Mapping[str, str], face: InterfaceFacts) -> list[str]:
+def _core(stage: StageDesign, name: str, given: Mapping[str, str]) -> list[str]:
     pins = {"aclk": "aclk", "aresetn": "aresetn", **given}
     pins |= {f"s_axil_{signal}": f"{registers_port(stage)}_{signal}" for _, signal, _ in _registers(stage)}
-    return _instance(face.name, name, pins)
+    return _instance(stage.modules[0], name, pins)
 
 
 def _in_turn(
@@ -231,4 +231,4 @@ def _header(design: ChainDesign, interface: InterfaceFacts) -> str:
 
 
 def _sources(design: ChainDesign) -> Sequence[str]:
-    return [f"{core.datapath.name}.sv" for stage in design.stages for core in stage.cores]
+    return [f"{module}.sv" for stage in design.stages for module in stage.modules]

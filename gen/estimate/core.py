@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from sosmith.gen.architectures.architecture import Architecture
 from sosmith.gen.architectures.folded_fir import FoldedFir
+from sosmith.gen.architectures.shared_fir import SharedFir
 from sosmith.gen.estimate.graphs import of_pipelined, of_start
 from sosmith.gen.estimate.memories import of_memory
 from sosmith.gen.estimate.online import of_units
@@ -35,6 +36,8 @@ from sosmith.model.sections.start import PassingStage, StartStage
 
 def quantities_of(architecture: Architecture, device: Device) -> Quantities:
     """Count what a core is made of on a device, with its decimator and what stands before that."""
+    if isinstance(architecture, SharedFir) and architecture.turn:
+        return Counter()  # the first result has the hardware of all
     if architecture.online is not None:
         made = of_units(architecture, device)
     elif isinstance(architecture, FoldedFir):

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from sosmith.gen.architectures.folded_fir import FoldedFir
+from sosmith.gen.architectures.shared_fir import SharedFir
 from sosmith.gen.estimate.graphs import clamp
 from sosmith.gen.estimate.memories import of_memory, of_rom
 from sosmith.gen.estimate.products import Product, of_product
@@ -22,6 +23,7 @@ from sosmith.gen.estimate.quantities import (
 from sosmith.gen.fpga.boards import Device
 from sosmith.gen.word_lengths.cost import Multiplication, Operand
 from sosmith.hdl.plan.streams import channel_bits
+from sosmith.hdl.plan.tap_steps import StepsInTurn
 from sosmith.model.dataflow.graph import Op
 
 _CONTROL, _STATES = 75, 19
@@ -66,7 +68,8 @@ class Rings(NamedTuple):
 
 def of_rings(architecture: FoldedFir, device: Device) -> Quantities:
     """Count the rings, the table of steps, the multiplier, the sum, and what moves samples."""
-    plan, datapath = architecture.plan, architecture.datapath
+    datapath = architecture.datapath
+    plan = architecture.in_turn if isinstance(architecture, SharedFir) else StepsInTurn((architecture.plan,))
     (port,), graph = datapath.inputs, datapath.stages[-1].graph
     place, factor = (plan.words - 1).bit_length(), plan.factor_bits
     rings = Rings(
@@ -79,8 +82,8 @@ def of_rings(architecture: FoldedFir, device: Device) -> Quantities:
         output_bits=datapath.output.bits,
         flags=flags_of(datapath),
         channels=architecture.channels,
-        last_step=plan.last_step,
-        codes=[(step.coefficient & ((1 << factor) - 1)) << place | step.first for step in plan.steps],
+        last_step=sum(last + 1 for last in plan.last_steps) - 1,
+        codes=[(step.coefficient & ((1 << factor) - 1)) << place | step.first for own in plan.rounds for step in own],
         protect=architecture.protect,
     )
     made = of_size(rings, device)

@@ -188,6 +188,7 @@ def _item(design: CoreDesign) -> ItemEntry:
         keep=design.spec.hardware.keep,
         reload_lock=architecture.reload_lock,
         reload_registers=architecture.reload_registers,
+        shared=not architecture.has_module,
         flags=dict(interface.outputs.flags),
         calibrated=() if datapath.calibrated == everything else datapath.calibrated,
         wear=datapath.wear,

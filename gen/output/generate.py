@@ -62,20 +62,24 @@ def generated(
 ) -> dict[str, str]:
     """Return the texts that `generate` writes, by the names of the files; parameters and errors as there."""
     name, datapath = design.spec.name, design.datapath
-    progress("RTLIL")
-    rtlil_text = core_rtlil(design)
-    progress("SystemVerilog")
     known = facts or core_facts(design)
-    first = {
-        f"{name}.sv": with_comments(to_verilog(rtlil_text), design, known),
-        f"{name}.il": rtlil_text,
-        f"{name}.json": to_json(manifest(known)),
-    }
+    first = _hardware(design, known, progress) | {f"{name}.json": to_json(manifest(known))}
     rest = {f"{name}.c": c_source(datapath), f"{name}.h": c_header(datapath), **_register_files(design)}
     progress("certificate")
     proven = claims or certificate(design.quantized, design.spec.max_error, online=design.architecture.online)
     named = sealed(proven.model_copy(update={"about": about(design, {**first, **rest})}))
     return {**first, f"{name}.certificate.json": certificate_text(named), **rest}
+
+
+def _hardware(design: CoreDesign, known: CoreFacts, progress: Callable[[str], None]) -> dict[str, str]:
+    """Return SystemVerilog and RTLIL of a core; nothing if its hardware stands with that of others."""
+    if not design.architecture.has_module:
+        return {}
+    progress("RTLIL")
+    rtlil_text = core_rtlil(design)
+    progress("SystemVerilog")
+    name = design.spec.name
+    return {f"{name}.sv": with_comments(to_verilog(rtlil_text), design, known), f"{name}.il": rtlil_text}
 
 
 def _register_files(design: CoreDesign) -> dict[str, str]:

@@ -42,6 +42,7 @@ filled, `pointer`, `phase`, `rail` and `counted`. After a reset all control word
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, signed
@@ -53,7 +54,7 @@ from sosmith.hdl.check_bits import CheckBits, Read
 from sosmith.hdl.memory_ports import read_port, write_port
 from sosmith.hdl.pipelined_logic import limits
 from sosmith.hdl.plan.streams import channel_bits
-from sosmith.hdl.plan.tap_steps import PIPELINE, tap_steps
+from sosmith.hdl.plan.tap_steps import PIPELINE, StepsInTurn, tap_steps
 from sosmith.hdl.reload import ReloadPort
 from sosmith.hdl.shell.fault_guard import FaultGuard
 from sosmith.hdl.shell.kept import Kept
@@ -61,7 +62,7 @@ from sosmith.hdl.shell.shell import Shell
 from sosmith.hdl.status import NEVER, ResultStatus, at_rail, status_of_result, with_fault
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.downsampler import Downsampler
-from sosmith.model.dataflow.graph import Op
+from sosmith.model.dataflow.graph import Node, Op
 from sosmith.model.reload.constants import with_room
 
 _NO_COLLISIONS = {"no_rw_check": 1}
@@ -103,6 +104,9 @@ class RingCore(Shell):
         What it computes: one FIR section that keeps samples, the output stage, and a downsampler.
     channels : int
         Number of channels.
+    others : sequence of Datapath
+        What it computes of each sample after that, one result after the other: filters alike but for their taps, with
+        fixed coefficients and without settling.
     copies : int
         Times that each result leaves.
     fingerprint : int or None
@@ -123,6 +127,7 @@ class RingCore(Shell):
         datapath: Datapath,
         channels: int = 1,
         *,
+        others: Sequence[Datapath] = (),
         copies: int = 1,
         fingerprint: int | None = None,
         lock: bool = False,
@@ -131,15 +136,19 @@ class RingCore(Shell):
         if datapath.downsampler is None:
             raise ValueError("datapath must have a downsampler")
         self._down: Downsampler = datapath.downsampler
-        self._steps = tap_steps(datapath, loadable=fingerprint is not None)
+        self._filters = (datapath, *others)
+        self._steps = StepsInTurn(tuple(tap_steps(each, loadable=fingerprint is not None) for each in self._filters))
         self._copies = copies
-        super().__init__(datapath, channels, fingerprint, lock=lock, protect=protect)
+        # Flags are those of a result that can be limited, if any can.
+        limited = [each for each in self._filters if _last_node(each).op is Op.CLAMP]
+        super().__init__((*limited, datapath)[0], channels, fingerprint, lock=lock, protect=protect)
 
     def fill(self, m: Module) -> None:
         """Build control, rings and the multiplier."""
         (port,) = self.datapath.inputs
         self._idle, self._running = Signal(name="idle"), Signal(name="running")
-        self._step = Signal(range(self._steps.last_step + 1), name="step", reset_less=True)
+        self._step = Signal(range(max(self._steps.last_steps) + 1), name="step", reset_less=True)
+        self._turn = Signal(range(len(self._filters)), name="turn")
         self._kept = Kept(m, self._sizes(), guarded=self.is_guarded) if self.channels == 1 else None
         self._pointer = (
             Signal(range(self._steps.words), name="pointer") if self._kept is None else self._kept.values["pointer"]
@@ -157,14 +166,33 @@ class RingCore(Shell):
         with m.If(taken.taken & taken.completes):
             m.d.sync += [self._running.eq(1), self._step.eq(0)]
         ends = Signal(name="ends")
-        m.d.comb += ends.eq(self._running & (self._step == self._steps.last_step))
+        m.d.comb += ends.eq(self._running & (self._step == self._last_step))
         with m.If(self._running & ~ends):
             m.d.sync += self._step.eq(self._step + 1)
         with m.If(ends & ready):
-            m.d.sync += self._running.eq(0)
+            self._goes_on(m)
         reload = self._reload(m, taken.taken & taken.completes)
         total = self._multiply(m, write, reload)
         self._give(m, total, ends, ready, (rail, counted), None if reload is None else reload[0])
+
+    @property
+    def _last_step(self) -> Value:
+        """Number of the clock at which the sum of the result in work is complete."""
+        first, *others = self._steps.last_steps
+        last: Value = Const(first)
+        for turn, each in enumerate(others, start=1):
+            last = last if each == first else Mux(self._turn == turn, each, last)
+        return last
+
+    def _goes_on(self, m: Module) -> None:
+        """Begin the next result of the sample; behind the last one, wait for the next sample."""
+        if len(self._filters) == 1:
+            m.d.sync += self._running.eq(0)
+            return
+        last = self._turn == len(self._filters) - 1
+        m.d.sync += [self._step.eq(0), self._turn.eq(Mux(last, 0, self._turn + 1))]
+        with m.If(last):
+            m.d.sync += self._running.eq(0)
 
     def _in_steps(self, first: int, last: int) -> Value:
         """Whether a word that has been read is needed: at the clocks from one step to another."""
@@ -310,7 +338,7 @@ class RingCore(Shell):
             return None
         plan = self._steps
         port = ReloadPort(
-            len(plan.steps),
+            len(plan.rounds[0]),
             bits=plan.factor_bits,
             design=self.fingerprint,
             protected=self.is_guarded,
@@ -343,7 +371,7 @@ class RingCore(Shell):
             writer.data.eq(check.written(port.write_data)),
             writer.en.eq(port.write_enable),
         ]
-        needed = self._in_steps(_LATER + 1, _LATER + len(self._steps.steps))
+        needed = self._in_steps(_LATER + 1, _LATER + len(self._steps.rounds[0]))
         coefficient = self._checked(m, check, reader.data, "coefficients", needed)
         return coefficient.as_signed() if self.is_guarded else coefficient
 
@@ -352,11 +380,10 @@ class RingCore(Shell):
     ) -> Signal:
         """Build the table of steps, the rings, and the multiplier; return the sum."""
         plan = self._steps
-        graph = (self.datapath if reload is None else with_room(self.datapath)).stages[-1].graph
         (port,) = self.datapath.inputs
         pairs = plan.pairs
-        alone = pairs and any(step.second is None for step in plan.steps)
-        differs = any(step.sign < 0 for step in plan.steps)
+        alone = pairs and any(step.second is None for steps in plan.rounds for step in steps)
+        differs = any(step.sign < 0 for steps in plan.rounds for step in steps)
         bits = (plan.words - 1).bit_length()
         factor_bits = plan.factor_bits
         layout = data.StructLayout(
@@ -368,9 +395,10 @@ class RingCore(Shell):
                 **({"coefficient": signed(factor_bits)} if reload is None else {}),
             }
         )
-        rows = [0] * (1 << (plan.last_step).bit_length())
+        size, most = 1 << len(self._step), max(map(len, plan.rounds))
+        rows = [0] * (size * len(plan.rounds))
         at = {name: field.offset for name, field in layout}
-        for k, step in enumerate(plan.steps):
+        for k, step in ((size * turn + k, step) for turn, own in enumerate(plan.rounds) for k, step in enumerate(own)):
             second = step.first if step.second is None else step.second
             rows[k] |= step.first << at["first"] | (second << at["second"] if pairs else 0)
             rows[k + 1] |= (step.second is None) * alone << at["alone"] | (step.sign < 0) << at["minus"]
@@ -380,15 +408,15 @@ class RingCore(Shell):
         words = [check.word(code) for code in rows]
         m.submodules.steps_memory = table = Memory(shape=check.width, depth=len(rows), init=words)
         reader = read_port(table, "steps")
-        m.d.comb += [reader.addr.eq(self._step), reader.en.eq(1)]
-        needed = self._in_steps(1, _LATER + len(plan.steps))
+        m.d.comb += [reader.addr.eq(Cat(self._step, self._turn)), reader.en.eq(1)]
+        needed = self._in_steps(1, _LATER + most)
         row = data.View(layout, self._checked(m, check, reader.data, "steps", needed))
         if reload is None:
             coefficient: Value = row.coefficient
         else:
-            own = [0] * _LATER + [step.coefficient for step in plan.steps]
+            own = [0] * _LATER + [step.coefficient for step in plan.rounds[0]]
             coefficient = self._coefficients(m, own + [0] * (len(rows) - len(own)), reload)
-        needed = self._in_steps(_LATER, _LATER + len(plan.steps) - 1)
+        needed = self._in_steps(_LATER, _LATER + most - 1)
         second_needed = needed & ~row.alone if alone and self.is_guarded else needed
         taps = [
             self._ring(m, name, getattr(row, name), write, needs)
@@ -402,22 +430,25 @@ class RingCore(Shell):
         # On the grid of the sum, which may be finer by what an offset of the output needs.
         m.d.sync += [pair.eq(both), product.eq(pair * coefficient)]
         grid, begin = self._rounding()
-        source = graph.nodes[graph.inputs[0]]
-        last = graph.nodes[graph.outputs[0]]
-        whole = graph.nodes[last.operands[0]] if last.op is Op.CLAMP else last
+        filters = self._filters if reload is None else [with_room(each) for each in self._filters]
+        ends = [end for each in map(_unlimited, filters) for end in (each.low, each.high)]
         span = max(grid, 0)
-        total = Signal(signed(max(_bits(whole.low), _bits(whole.high)) + 1 + span), name="total", reset_less=True)
-        shift = grid - source.frac
+        total = Signal(signed(max(map(_bits, ends)) + 1 + span), name="total", reset_less=True)
+        shift = grid - max(map(_source_frac, self._filters))
         base = Mux(self._step == PIPELINE, Const(begin, signed(len(total))), total)
         m.d.sync += total.eq(base + (product << shift))
         return total
 
     def _rounding(self) -> tuple[int, int]:
         """Return the fraction bits of the sum, and what it begins with: offset of the output, and half a step."""
-        graph = self.datapath.stages[-1].graph
-        constants = [node for node in graph.nodes if node.op is Op.CONSTANT and node.name != "samples"]
-        grid = max([graph.nodes[graph.inputs[0]].frac, *(node.frac for node in constants)])
-        return grid, sum(node.parameter << grid - node.frac for node in constants)
+        constants = [
+            [node for node in each.stages[-1].graph.nodes if node.op is Op.CONSTANT and node.name != "samples"]
+            for each in self._filters
+        ]
+        grid = max([*map(_source_frac, self._filters), *(node.frac for own in constants for node in own)])
+        # All results have the same output, so that they are rounded alike.
+        (begin,) = {sum(node.parameter << grid - node.frac for node in own) for own in constants}
+        return grid, begin
 
     def _ring(self, m: Module, name: str, offset: Value, write: tuple[Value, Value, Value], needed: Value) -> Value:
         """Make a memory of the samples of all channels; return what a tap of the sample before the pointer is."""
@@ -457,8 +488,7 @@ class RingCore(Shell):
         Of its last sample, it is `known` whether a code since the last result was at a rail, and the count.
         """
         output, (rail, counted) = self.datapath.output, known
-        graph = self.datapath.stages[-1].graph
-        last = graph.nodes[graph.outputs[0]]
+        last = _last_node(self.datapath)
         grid, _ = self._rounding()
         value: Value = total[grid:].as_signed() if grid > 0 else (total << -grid)
         code: Value = value
@@ -528,6 +558,24 @@ class RingCore(Shell):
         corrected, failed = Cat(each.corrected for each in found).any(), Cat(each.failed for each in found).any()
         self.report(m, guard, port, (corrected, failed), NEVER)
         return guard.fault | status.failed
+
+
+def _last_node(datapath: Datapath) -> Node:
+    """Return the node that leaves a datapath."""
+    graph = datapath.stages[-1].graph
+    return graph.nodes[graph.outputs[0]]
+
+
+def _unlimited(datapath: Datapath) -> Node:
+    """Return what leaves a datapath before it is limited."""
+    last = _last_node(datapath)
+    return datapath.stages[-1].graph.nodes[last.operands[0]] if last.op is Op.CLAMP else last
+
+
+def _source_frac(datapath: Datapath) -> int:
+    """Return the fraction bits of what the last stage of a datapath takes."""
+    graph = datapath.stages[-1].graph
+    return graph.nodes[graph.inputs[0]].frac
 
 
 def _bits(value: int) -> int:

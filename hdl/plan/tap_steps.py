@@ -129,6 +129,71 @@ class TapSteps:
         return channels if channels > 1 else self.words
 
 
+@dataclass(frozen=True)
+class StepsInTurn:
+    """The steps of filters that one multiplier computes one after the other, from the same samples.
+
+    Coefficients are on the finest grid of all.
+
+    Attributes
+    ----------
+    filters : tuple of TapSteps
+        At least one.
+    """
+
+    filters: tuple[TapSteps, ...]
+
+    @property
+    def frac(self) -> int:
+        """Fraction bits of all coefficients."""
+        return max(each.frac for each in self.filters)
+
+    @cached_property
+    def rounds(self) -> tuple[tuple[TapStep, ...], ...]:
+        """The steps of each filter."""
+        return tuple(
+            tuple(replace(step, coefficient=step.coefficient << self.frac - each.frac) for step in each.steps)
+            for each in self.filters
+        )
+
+    @property
+    def pairs(self) -> bool:
+        """Whether any step adds two samples."""
+        return any(each.pairs for each in self.filters)
+
+    @property
+    def factor_bits(self) -> int:
+        """Bits of a coefficient, with its sign."""
+        return max(each.factor_bits + self.frac - each.frac for each in self.filters)
+
+    def pair_bits(self, port: Port) -> int:
+        """Bits of a sum or a difference of two samples, or of one sample if no step adds two, with its sign."""
+        return max(each.pair_bits(port) for each in self.filters)
+
+    @property
+    def words(self) -> int:
+        """Samples that the ring of a channel holds."""
+        return max(each.words for each in self.filters)
+
+    @property
+    def last_steps(self) -> tuple[int, ...]:
+        """Number of the clock at which each sum is complete, from the first step of its filter on."""
+        return tuple(each.last_step for each in self.filters)
+
+    def cycles_per_sample(self, channels: int) -> int:
+        """Clocks between samples of a channel at the highest rate."""
+        return 1 + (channels > 1) + sum(last + 1 for last in self.last_steps)
+
+    def latency_cycles(self, channels: int, turn: int) -> int:
+        """Most clocks from the edge that accepts a sample to the edge that can output its result number `turn`."""
+        filled = self.words + 2 if channels > 1 else 0
+        return filled + sum(last + 1 for last in self.last_steps[: turn + 1]) + 1
+
+    def reset_cycles(self, channels: int) -> int:
+        """Clocks after a reset until a sample on offer is accepted: while the ring is filled, or channels cleared."""
+        return channels if channels > 1 else self.words
+
+
 def tap_steps(datapath: Datapath, *, loadable: bool = False) -> TapSteps:
     """Return the steps of a datapath that is one FIR filter, for hardware whose coefficients are `loadable` or not.
 

@@ -38,6 +38,7 @@ from sosmith.verify.verdict.generated_files import about_of, ascii_text, content
 from sosmith.verify.verdict.limits import SECONDS, limited
 from sosmith.verify.verdict.scope import Part as ScopePart
 from sosmith.verify.verdict.scope import State
+from sosmith.verify.verdict.shared_hardware import SharedHardware, check_shared_hardware
 from sosmith.verify.verification import Progress
 
 _OWN_FILES = ("{}.sv", "{}.json", "{}.c", "{}.h")
@@ -116,9 +117,12 @@ def judge_chain(
     _check_seal(chain, content)
     groups, stages = list[tuple[Certificate, ...]](), dict[str, Judgement]()
     for entry in chain.stages:
-        cores = []
-        for label, file in zip(_labels(entry), entry.certificates, strict=True):
-            core = _read(chain, label, file, folder)
+        cores = [
+            _read(chain, label, file, folder) for label, file in zip(_labels(entry), entry.certificates, strict=True)
+        ]
+        with limited(seconds):
+            shared = _shared_hardware(chain, entry, cores, folder, progress) if with_files else {}
+        for label, core in zip(_labels(entry), cores, strict=True):
             stated = None
             if text is not None:
                 stated = _stated(core, spec_folder, "calibration" if entry.kind == "polynomial" else "filter")
@@ -130,10 +134,10 @@ def judge_chain(
                     folder=folder if with_files else None,
                     content=entries_text(core).encode(),
                     seconds=seconds,
+                    elsewhere=shared.get(core.name),
                 )
             except RejectedError as error:
                 raise RejectedError(f"stage {label}: {error}") from None
-            cores.append(core)
         groups.append(tuple(cores))
     with limited(seconds):
         progress("chain", 0, 0)
@@ -155,6 +159,28 @@ def judge_chain(
     loaded = [e.name for e, own in zip(chain.stages, items, strict=True) if len(own) > 1 and own[0].reload]
     scope = _scope(chain, stages, loaded, text is not None, with_files)
     return ChainJudgement(stages, chain.bound, budget, files, scope)
+
+
+def _shared_hardware(
+    chain: ChainCertificate, entry: ChainStageEntry, cores: Sequence[Certificate], folder: Path, progress: Progress
+) -> dict[str, SharedHardware]:
+    """Prove the hardware that the cores of a stage share, by their names; nothing if each has its own."""
+    items = [about_of(core).item for core in cores]
+    if not any(item is not None and item.shared for item in items):
+        return {}
+    module = f"{chain.name}_{entry.name}"
+    digests = {file.name: file.sha256 for file in chain.files}
+    texts = []
+    for name in (f"{module}.sv", f"{module}.il"):
+        require(name in digests, f"the files of the chain must have {name}")
+        content = content_of(folder / name, links=False)
+        _compare(str(folder / name), digests[name], content)
+        texts.append(ascii_text(name, content))
+    try:
+        proven = check_shared_hardware(*texts, module, cores, partial(_named, progress, entry.name))
+    except RejectedError as error:
+        raise RejectedError(f"stage {entry.name}: {error}") from None
+    return {core.name: each for core, each in zip(cores, proven, strict=True)}
 
 
 def read_cores(chain: ChainCertificate, folder: Path) -> list[tuple[Certificate, ...]]:
@@ -285,7 +311,7 @@ def _check_beside(entry: ChainStageEntry, items: Sequence[ItemEntry]) -> None:
     what = f"the cores of stage {entry.name}"
     require(entry.kind in _RISING, f"{what} must be one for the kind {entry.kind}, not {len(items)}")
     for item in items:
-        for part in ("taken", "given", "flags", "calibrated", "protect", "reload"):
+        for part in ("taken", "given", "flags", "calibrated", "protect", "reload", "shared"):
             require(getattr(item, part) == getattr(items[0], part), f"{what} must have the same {part}")
 
 
@@ -374,6 +400,8 @@ def _check_files(
         for entry, own, own_items in zip(chain.stages, groups, items, strict=True)
     ]
     wanted = [name.format(chain.name) for name in _OWN_FILES]
+    for stage in joined:
+        wanted += [f"{stage.shared_module}{end}" for end in (".sv", ".il") if stage.item.shared]
     wanted += [f"{chain.name}_{stage.name}{end}" for stage in joined if stage.loads for end in ("_registers.h", ".rdl")]
     require(names == wanted, f"the files of the chain must be {', '.join(wanted)}, not {', '.join(names)}")
     contents = {}
@@ -385,7 +413,10 @@ def _check_files(
     texts = [
         ascii_text(f"{core.name}.sv", stage.files[f"{core.name}.sv"])
         for core, stage in zip(cores, stages.values(), strict=True)
+        if f"{core.name}.sv" in stage.files
     ]
+    shared = [f"{stage.shared_module}.sv" for stage in joined if stage.item.shared]
+    texts += [ascii_text(name, contents[name]) for name in shared]
     top = ascii_text(sv, contents[sv])
     check_top(texts, top, chain.name, joined, flags)
     check_chain_manifest(contents[json], chain, groups, items)

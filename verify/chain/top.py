@@ -28,10 +28,20 @@ class Stage:
     item: ItemEntry
 
     @property
+    def modules(self) -> tuple[str, ...]:
+        """Modules of its hardware: of each core, or the one that all share."""
+        return (self.shared_module,) if self.item.shared else self.cores
+
+    @property
+    def shared_module(self) -> str:
+        """Module that computes all results of a sample."""
+        return self.cores[0].removesuffix("_p0")
+
+    @property
     def placed(self) -> list[str]:
-        """Modules of which it has an instance: its cores, and what joins several."""
-        if len(self.cores) == 1:
-            return [*self.cores]
+        """Modules of which it has an instance: those of its hardware, and what joins several."""
+        if len(self.modules) == 1:
+            return [*self.modules]
         return [*self.cores, self.joining, *([self.registers] if self.loads else [])]
 
     @property
@@ -86,13 +96,13 @@ def check_top(texts: Sequence[str], top: str, name: str, stages: Sequence[Stage]
     rest, alone = iter(wires), dict[str, dict[str, str]]()
     for k, stage in enumerate(stages):
         own = [next(rest) for _ in stage.placed]
-        alone |= {stage.name: own[0]} if len(stage.cores) == 1 else {stage.name: own[-1]} if stage.loads else {}
+        alone |= {stage.name: own[0]} if len(stage.modules) == 1 else {stage.name: own[-1]} if stage.loads else {}
         nets = _nets_of(stages, k, gated=flags is not None)
-        for core, ports in zip(stage.cores, own, strict=False):
+        for core, ports in zip(stage.modules, own, strict=False):
             for clock in _CLOCKS:
                 require(ports[clock] == clock, f"{clock} of {core} must be that of {name}, not {ports[clock]}")
-        if len(stage.cores) == 1:
-            _check_streams(stage.cores[0], own[0], nets)
+        if len(stage.modules) == 1:
+            _check_streams(stage.modules[0], own[0], nets)
         else:
             _check_in_turn(stage, own, nets, modules)
         if stage.loads:

@@ -48,6 +48,7 @@ from sosmith.verify.verdict.item import (
 from sosmith.verify.verdict.limits import SECONDS, limited
 from sosmith.verify.verdict.manifest import read_manifest
 from sosmith.verify.verdict.scope import Part, Proofs, scope_of
+from sosmith.verify.verdict.shared_hardware import SharedHardware
 from sosmith.verify.verification import Progress, Verdict, verify
 
 _PLAIN = re.compile(r"[A-Za-z_]\w{0,199}", re.ASCII)
@@ -85,6 +86,7 @@ def judge(
     folder: Path | None = None,
     content: bytes = b"",
     seconds: float = SECONDS,
+    elsewhere: SharedHardware | None = None,
 ) -> Judgement:
     """Prove a certificate, and hold it against a specification and a folder of files.
 
@@ -101,6 +103,8 @@ def judge(
         Content of the certificate's own file.
     seconds : float
         Time that it may take, in s; 0 for any.
+    elsewhere : SharedHardware or None
+        What is proven of the hardware of an item that shares it with others; None if nothing is known of it.
 
     Raises
     ------
@@ -108,11 +112,16 @@ def judge(
         If anything is wrong: what is only not proven is in the scope.
     """
     with limited(seconds):
-        return _judged(certificate, progress, stated, folder, content)
+        return _judged(certificate, progress, stated, folder, content, elsewhere)
 
 
 def _judged(
-    certificate: Certificate, progress: Progress, stated: Stated | None, folder: Path | None, content: bytes
+    certificate: Certificate,
+    progress: Progress,
+    stated: Stated | None,
+    folder: Path | None,
+    content: bytes,
+    elsewhere: SharedHardware | None,
 ) -> Judgement:
     item = None if certificate.about is None else certificate.about.item
     if certificate.about is not None:
@@ -132,7 +141,7 @@ def _judged(
         names, wanted = [entry.name for entry in about.files], file_names(certificate.name, item)
         require(names == wanted, f"the files of the certificate must be {', '.join(wanted)}, not {', '.join(names)}")
         contents = check_files(about, folder)
-        proofs, decimator = _files_proven(certificate, item, contents, progress)
+        proofs, decimator = _files_proven(certificate, item, contents, progress, elsewhere)
     scope = scope_of(certificate, item, agreement, core, proofs)
     return Judgement(verdict, agreement, contents, proofs or Proofs(), decimator, scope)
 
@@ -164,26 +173,35 @@ def _held_against(
 
 
 def _files_proven(
-    certificate: Certificate, item: ItemEntry | None, contents: Mapping[str, bytes], progress: Progress
+    certificate: Certificate,
+    item: ItemEntry | None,
+    contents: Mapping[str, bytes],
+    progress: Progress,
+    elsewhere: SharedHardware | None,
 ) -> tuple[Proofs, DecimatorVerdict | None]:
     require(_PLAIN.fullmatch(certificate.name) is not None, "the name of a core must be a plain identifier")
     sv, c, h, il, json = (f"{certificate.name}.{end}" for end in ("sv", "c", "h", "il", "json"))
-    text = ascii_text(sv, contents[sv])
-    modules = read_source(text, certificate.name).modules
+    text = "" if item is not None and item.shared else ascii_text(sv, contents[sv])
+    modules = read_source(text, certificate.name).modules if text else {}
     if item is None:
         return Proofs(), None
     progress("manifest", 0, 0)
-    check_ports(modules[certificate.name], item)
+    if modules:
+        check_ports(modules[certificate.name], item)
     manifest = read_manifest(contents[json], certificate, item)
-    proofs, decimator = _hardware_proven(certificate, item, text, progress)
+    proofs, decimator = _hardware_proven(certificate, item, text, progress) if modules else (Proofs(), None)
+    if elsewhere is not None:
+        proofs = replace(proofs, hardware=elsewhere.hardware)
     manifest.hold_clocks(proofs.hardware or proofs.unit if certificate.decimation is None else None)
     manifest.hold_program(proofs.program)
     progress("C model", 0, 0)
     source, header = (unicode_text(name, contents[name]) for name in (c, h))
     model = check_c_model(source, header, certificate, item)
-    progress("RTLIL", 0, 0)
-    rtlil = check_rtlil(ascii_text(il, contents[il]), modules)
-    check_kept(ascii_text(il, contents[il]), modules, asked=item.keep)
+    rtlil = None if elsewhere is None else elsewhere.rtlil
+    if modules:
+        progress("RTLIL", 0, 0)
+        rtlil = check_rtlil(ascii_text(il, contents[il]), modules)
+        check_kept(ascii_text(il, contents[il]), modules, asked=item.keep)
     return replace(proofs, unheld=tuple(manifest.open), model=model, rtlil=rtlil), decimator
 
 

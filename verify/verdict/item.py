@@ -66,6 +66,11 @@ def check_item(certificate: Certificate, item: ItemEntry) -> None:
     _same("ahead", item.ahead is not None, entry is not None and entry.calibration is not None, "there")
     down = certificate.downsampling
     lowers = entry is not None or (down is not None and down.factor > 1)
+    plain = item.architecture == "folded" and not item.reload and item.protect == "none" and not item.keep
+    require(
+        not item.shared or (plain and down is not None and down.factor == 1),
+        "hardware for several results must be folded, of filters with fixed taps and no check bits",
+    )
     require(lowers or not item.hold, "hold of the item must not be stated without a decimator")
     require(item.channels == 1 or item.samples == 1, "several samples a clock must be those of one channel")
     _same("flags", [*item.flags.items()], [*_STATUS.items()])
@@ -212,7 +217,8 @@ def file_names(name: str, item: ItemEntry | None) -> list[str]:
     """Return the names of the files that are written with a certificate, in their order."""
     there = item is not None and item.reload and item.reload_registers
     registers = ["_registers.h", ".rdl"] if there else []
-    return [f"{name}{end}" for end in (".sv", ".il", ".json", ".c", ".h", *registers)]
+    hardware = [] if item is not None and item.shared else [".sv", ".il"]
+    return [f"{name}{end}" for end in (*hardware, ".json", ".c", ".h", *registers)]
 
 
 def check_ports(top: Module, item: ItemEntry) -> None:

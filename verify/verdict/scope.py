@@ -197,6 +197,8 @@ def _manifest(item: ItemEntry | None, proofs: Proofs) -> Part:
 def _why_not(item: ItemEntry | None) -> str:
     if item is None:
         return "the certificate does not state what the item is"
+    if item.shared:
+        return "its hardware is a module of a chain, and proven with that"
     if item.reload:
         return "constants that can be loaded are not proven"
     if item.protect != "none":

@@ -64,7 +64,7 @@ class RegistersUnit:
 def registers_unit(design: ChainDesign, stage: StageDesign) -> RegistersUnit | None:
     """Return the registers of the cores of a stage; None if there is one core, or nothing can be loaded."""
     hardware = stage.design.spec.hardware
-    if len(stage.cores) == 1 or not hardware.reload:
+    if len(stage.modules) == 1 or not hardware.reload:
         return None
     prints = [core.architecture.fingerprint or 0 for core in stage.cores]
     return RegistersUnit(

@@ -158,8 +158,8 @@ class TurnsUnit:
 
 
 def turns_unit(design: ChainDesign, stage: StageDesign) -> TurnsUnit | None:
-    """Return what joins the cores of a stage; None for a single one."""
-    if len(stage.cores) == 1:
+    """Return what joins the cores of a stage; None for a single one, or one multiplier for all."""
+    if len(stage.modules) == 1:
         return None
     return TurnsUnit(
         name=f"{design.name}_{stage.spec.name}_turns",

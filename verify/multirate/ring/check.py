@@ -92,8 +92,10 @@ class _Way(NamedTuple):
     latency: int
 
 
-def check_rings(text: str, certificate: Certificate, item: ItemEntry) -> RingVerdict:
-    """Prove that a core computes every N-th result of the graphs of a certificate.
+def check_rings(
+    text: str, certificate: Certificate, item: ItemEntry, *, top: str | None = None, turn: int = 0, turns: int = 1
+) -> RingVerdict:
+    """Prove that a core computes every N-th result of the graphs of a certificate, or one of `turns` for each sample.
 
     Parameters
     ----------
@@ -103,23 +105,29 @@ def check_rings(text: str, certificate: Certificate, item: ItemEntry) -> RingVer
         Its certificate, which `verify` has accepted, with a downsampling.
     item : ItemEntry
         What it is about.
+    top : str or None
+        Name of the module; None for that of the certificate.
+    turn, turns : int
+        Which result of a sample is that of the graphs, and how many each sample brings.
 
     Raises
     ------
     RejectedError
         If it computes anything else, or has anything that cannot be followed.
     """
-    modules = read_source(text, certificate.name).modules
+    modules = read_source(text, top or certificate.name).modules
     with deep_recursion():
-        return _Check(flattened(modules, CLOCK), certificate, item).checked()
+        return _Check(flattened(modules, CLOCK), certificate, item, turn, turns).checked()
 
 
 class _Check:
     """The check of a core."""
 
-    def __init__(self, netlist: Netlist, certificate: Certificate, item: ItemEntry) -> None:
+    def __init__(self, netlist: Netlist, certificate: Certificate, item: ItemEntry, turn: int, turns: int) -> None:
         entry = certificate.downsampling
         assert entry is not None
+        require(turns == 1 or entry.factor == 1, "only where all results leave may there be several of a sample")
+        self._turn, self._turns = turn, turns
         self._netlist, self._certificate, self._entry = netlist, certificate, entry
         self._channels, self._hold = item.channels, entry.factor if item.hold else 1
         self.forms = Forms()
@@ -394,7 +402,7 @@ class _Check:
     @property
     def _reset_values(self) -> dict[str, int]:
         """What registers of the control hold after a reset."""
-        values = {"running": 0, VALID: 0}
+        values = {"running": 0, VALID: 0} | ({"turn": 0} if self._turns > 1 else {})
         if self._several:
             return values | {"clearing": 1, "filling": 0, "waits": 0, "channel": 0}
         return values | {"filling": 1} | dict.fromkeys(self._names, 0)
@@ -478,7 +486,8 @@ class _Check:
         """Return the state in which the core waits for a sample."""
         self._machine.pointer = fields.pointer
         ring = {-ago % self._words: self._sample(ago) for ago in range(1, self._remembered + 1)}
-        state = State({"running": {}, "filling": {}}, {name: dict(ring) for name in self._rings})
+        turn: dict[str, Form] = {"turn": {}} if self._turns > 1 else {}
+        state = State({"running": {}, "filling": {}, **turn}, {name: dict(ring) for name in self._rings})
         if self._several:
             state.registers |= {"clearing": {}, "waits": {}}
             state.words[_CONTROL] = {0: self._control(fields)}
@@ -518,7 +527,7 @@ class _Check:
         inputs = {SOURCE: constant(1), DATA: self._bus, **({DEST: self._channel} if self._several else {})}
         state, result, ready = self._clocks(state, inputs)
         require(bool(ready) and result is None, f"{READY} must be 1 while the core waits for a sample")
-        clocks, latency = 1, 0
+        clocks, latency, results = 1, 0, 0
         while True:
             require(clocks < _MOST_CLOCKS, f"a sample must be done within {_MOST_CLOCKS} clocks")
             if self._machine.clock(state, {RESET: constant(1)}, self._number).bit(READY):
@@ -531,12 +540,13 @@ class _Check:
                 state.words |= {name: self._waiting(fields).words[name] for name in self._rings}
                 fills = False
             if result is not None:
-                require(
-                    brings and not fills and not latency, "every N-th sample must bring one result, and no other any"
-                )
-                latency = clocks
-                self._check_result(result, fields)
-        require(bool(latency) == brings, "every N-th sample must bring one result, and no other any")
+                require(not fills, "no result must come while a ring is filled")
+                if results == self._turn:
+                    latency = clocks
+                    self._check_result(result, fields)
+                results += 1
+        wanted = self._turns if brings else 0
+        require(results == wanted, f"a sample must bring {self._shown(wanted)}, not {self._shown(results)}")
         last, rail = constant(self._entry.factor - 1), self._gathered(fields.rail)
         counted: Form = {}
         if self._counter is not None:
@@ -560,6 +570,10 @@ class _Check:
         for name in waits.keys() - {*self._names}:
             require(state.registers[name] == {}, f"{name} must be 0 while the core waits for a sample")
         return _Way(clocks, latency)
+
+    @staticmethod
+    def _shown(results: int) -> str:
+        return f"{results or 'no'} result{'s' * (results != 1)}"
 
     def _counting(self, form: Form, fields: _Fields) -> Form:
         """Return a form with the count of a sample, which for the first one is 0."""

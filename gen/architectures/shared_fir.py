@@ -1,0 +1,108 @@
+"""One multiplier for all results of a stage that interpolates: each of them is an FIR filter of the same samples."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from sosmith.gen.architectures.architecture import Architecture
+from sosmith.gen.architectures.folded_fir import FoldedFir
+from sosmith.hdl.plan.tap_steps import StepsInTurn, tap_steps
+from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.errors import ShortfallError
+
+if TYPE_CHECKING:
+    from amaranth.lib.wiring import Component
+
+
+@dataclass(frozen=True)
+class SharedFir(FoldedFir):
+    """What a datapath has of hardware that computes several results of each sample, one after the other.
+
+    Attributes
+    ----------
+    results : tuple of Datapath
+        What is computed of each sample, in the order of the results.
+    turn : int
+        Which of them the datapath is.
+    """
+
+    results: tuple[Datapath, ...] = ()
+    turn: int = 0
+
+    @cached_property
+    def in_turn(self) -> StepsInTurn:
+        """The steps of all results."""
+        return StepsInTurn(tuple(map(tap_steps, self.results)))
+
+    @property
+    def multiplier_blocks(self) -> int:
+        """Multiplier blocks that it takes: the first result has them for all."""
+        return 0 if self.turn else self.blocks_of(self.in_turn)
+
+    @property
+    def memory_bits(self) -> int:
+        """Bits of the samples that it keeps of a channel, once, for all results."""
+        return 0 if self.turn else self.in_turn.words * self.datapath.inputs[0].bits
+
+    @property
+    def _latency_cycles(self) -> int:
+        return self.in_turn.latency_cycles(self.channels, self.turn)
+
+    @property
+    def _cycles_per_sample(self) -> int:
+        return self.in_turn.cycles_per_sample(self.channels)
+
+    @property
+    def _cleared_cycles(self) -> int:
+        return self.in_turn.reset_cycles(self.channels)
+
+    @property
+    def has_module(self) -> bool:
+        """Return False: all results share one."""
+        return False
+
+    def whole(self) -> Component:
+        """Make the hardware of all results."""
+        from sosmith.hdl.cores.ring import RingCore  # only what makes hardware loads Amaranth
+
+        first, *others = self.results
+        return RingCore(first, self.channels, others=others)
+
+
+def shared(architectures: Sequence[Architecture], available: int) -> list[SharedFir]:
+    """Return hardware that computes what others do, each alone, with one multiplier; `available` are clocks a sample.
+
+    Raises
+    ------
+    ShortfallError
+        If these keep no samples, or have constants that can be loaded, check bits or a count of samples after the
+        start, or if there are not enough clocks, or their products take more multiplier blocks than there are results.
+    """
+    results = tuple(each.datapath for each in architectures)
+    for each in architectures:
+        if not isinstance(each, FoldedFir) or each.reload or each.protect != "none" or each.datapath.settles:
+            raise ShortfallError("results that share a multiplier must have fixed taps and no check bits")
+    first = architectures[0]
+    made = [
+        SharedFir(
+            datapath=datapath,
+            channels=first.channels,
+            digit_bits=first.digit_bits,
+            blocks=first.blocks,
+            results=results,
+            turn=turn,
+        )
+        for turn, datapath in enumerate(results)
+    ]
+    if made[0].multiplier_blocks > len(made):
+        raise ShortfallError(
+            "results that share a multiplier must take no more multiplier blocks than there are results"
+        )
+    if made[0].cycles_per_result > available:
+        raise ShortfallError(
+            f"one multiplier must have {made[0].cycles_per_result:,} clocks a sample for all results, not {available:,}"
+        )
+    return made
