@@ -1,4 +1,4 @@
-"""What the coefficients of an FIR filter that decimates are chosen for: few steps of one multiplier, and short ones."""
+"""What coefficients of an FIR filter are chosen for where one multiplier takes its steps: few steps, and short ones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""An FIR filter that decimates: samples in a ring of memory, one multiplier, and its steps for every N-th sample alone.
+"""FIR filters of the same samples, which lie in a ring of memory: one multiplier takes their steps, filter by filter.
 
 ::
 
@@ -23,6 +23,8 @@ With samples x0, x1, .. for N = 2 and a filter of S steps, one channel, once the
 
 A step that the table has in one row reads its taps one clock later, adds them two later, multiplies three later, and is
 in the sum four later; so offsets, sign and coefficient of a step stand in three rows of the table, one below the other.
+With N = 1 every sample brings a result. Where several filters make as many results of a sample, their steps lie in the
+table one filter after the other, and `turn` says which is in work.
 The sum begins with half a step of the output, so that it is rounded by what is left out of it.
 
 `pointer` is where the next sample goes. Before the first one the ring is filled, a word a clock: with zeros, or with
@@ -93,7 +95,7 @@ class _Taken(NamedTuple):
 
 
 class RingCore(Shell):
-    """An FIR filter that decimates, for any number of channels in any order.
+    """An FIR filter, which may decimate, or several of the same samples, for any number of channels in any order.
 
     Latency and throughput: those of `sosmith.hdl.plan.tap_steps.TapSteps`. With several channels a sample of a channel
     that does not exist is accepted and dropped.
@@ -446,9 +448,8 @@ class RingCore(Shell):
             for each in self._filters
         ]
         grid = max([*map(_source_frac, self._filters), *(node.frac for own in constants for node in own)])
-        # All results have the same output, so that they are rounded alike.
-        (begin,) = {sum(node.parameter << grid - node.frac for node in own) for own in constants}
-        return grid, begin
+        # All results have the same output: half a step more changes none of those that need no rounding.
+        return grid, max(sum(node.parameter << grid - node.frac for node in own) for own in constants)
 
     def _ring(self, m: Module, name: str, offset: Value, write: tuple[Value, Value, Value], needed: Value) -> Value:
         """Make a memory of the samples of all channels; return what a tap of the sample before the pointer is."""

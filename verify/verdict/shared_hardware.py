@@ -46,8 +46,6 @@ def check_shared_hardware(
         If it computes anything else.
     """
     modules, verdicts = read_source(text, name).modules, []
-    proven = check_rtlil(rtlil, modules)
-    check_kept(rtlil, modules, asked=False)
     for turn, certificate in enumerate(certificates):
         item = None if certificate.about is None else certificate.about.item
         if item is None or certificate.downsampling is None:
@@ -55,6 +53,7 @@ def check_shared_hardware(
         require(item.shared, f"{certificate.name} must say that it shares its hardware")
         check_ports(modules[name], item)
         progress("hardware of all results", turn, len(certificates))
-        verdict = check_rings(text, certificate, item, top=name, turn=turn, turns=len(certificates))
-        verdicts.append(SharedHardware(verdict, proven))
-    return verdicts
+        verdicts.append(check_rings(text, certificate, item, top=name, turn=turn, turns=len(certificates)))
+    proven = check_rtlil(rtlil, modules)
+    check_kept(rtlil, modules, asked=False)
+    return [SharedHardware(verdict, proven) for verdict in verdicts]

@@ -61,8 +61,8 @@ def test_flags_are_those_since_the_result_before() -> None:
 
 
 def test_what_it_refuses() -> None:
-    with pytest.raises(ValueError, match=r"^factor must be at least 2, not 1$"):
-        Downsampler(factor=1, filled=0)
+    with pytest.raises(ValueError, match=r"^factor must be at least 1, not 0$"):
+        Downsampler(factor=0, filled=0)
     with pytest.raises(ValueError, match=r"^filled must not be negative, not -1$"):
         Downsampler(factor=2, filled=-1)
     down = datapath("zero")

@@ -1,0 +1,120 @@
+"""One multiplier for all results of a stage that interpolates: where it can be, its clocks, and what it refuses."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sosmith
+from sosmith.gen.architectures.folded_fir import FoldedFir, NarrowFir
+from sosmith.gen.architectures.shared_fir import SharedFir, shared
+from sosmith.gen.architectures.shared_unit import SharedUnit
+from sosmith.gen.fpga.boards import find_board
+from sosmith.model.errors import ShortfallError
+
+TAPS = [0.25, 0.5, 1.0, 0.75, 0.25, 0.125, 0.5]
+
+
+def chain(clock: float = 1e6, bits: int = 8, **hardware: Any) -> sosmith.Chain:
+    """Design a filter that makes three results of each sample, of 3, 2 and 2 taps."""
+    tree = {
+        "name": "rx",
+        "sample_rate": 8000.0,
+        "input": {"x": {"bits": bits, "range": [-1.0, 1.0], "signed": True}},
+        "stage": [{"name": "up", "kind": "fir", "interpolate": 3, "taps": TAPS}],
+        "output": {"bits": bits, "range": [-4.0, 4.0], "signed": True},
+        "hardware": {"clock": clock, **hardware},
+    }
+    return sosmith.design_chain(sosmith.ChainSpecification.load(tree))
+
+
+def test_all_results_have_one_multiplier() -> None:
+    made = chain()
+    (stage,) = made.core.stages
+    assert stage.modules == ("rx_up",)
+    architectures = [core.architecture for core in stage.cores]
+    assert all(isinstance(each, SharedFir) for each in architectures)
+    assert [each.multiplier_blocks for each in architectures] == [1, 0, 0]
+    assert [each.memory_bits for each in architectures] == [4 * 8, 0, 0]
+    assert [each.cycles_per_sample for each in architectures] == [1 + (3 + 5) + (2 + 5) + (2 + 5)] * 3
+    assert [each.latency_cycles for each in architectures] == [9, 16, 23]
+    board = find_board("ulx3s_25f")
+    assert [design.estimates[0].luts > 0 for design in made.stages] == [True, False, False]
+    assert board.device.multipliers > 1
+    assert "one multiplier for all 3 results; takes 23 of 125 clocks a sample" in made.stages[0].reasons["architecture"]
+
+
+@pytest.mark.parametrize(
+    ("clock", "hardware"),
+    [
+        (22 * 8000.0, {}),
+        (1e6, {"architecture": "serial"}),
+        (1e6, {"reload": True}),
+        (1e6, {"protect": "detect"}),
+        (1e6, {"start": "zero"}),
+        (1e6, {"keep": True}),
+    ],
+)
+def test_each_result_has_its_own_hardware_otherwise(clock: float, hardware: dict[str, Any]) -> None:
+    (stage,) = chain(clock, **hardware).core.stages
+    assert stage.shared is None
+    assert stage.modules == ("rx_up_p0", "rx_up_p1", "rx_up_p2")
+
+
+def test_results_are_those_of_the_filter() -> None:
+    made = chain(bits=12)
+    codes = np.random.default_rng(1).integers(-2048, 2048, (40, 1))
+    spread = np.zeros(3 * (len(codes) + 3))
+    spread[::3] = np.concatenate([np.repeat(codes[:1, 0], 3), codes[:, 0]])
+    wanted = np.convolve(spread, TAPS)[9 : 9 + 3 * len(codes)] / 4
+    assert np.abs(made.core.compute(codes[:, :, None])[:, 0] - wanted).max() <= 0.5
+
+
+def test_what_cannot_share_is_told() -> None:
+    architectures = [core.architecture for core in chain(architecture="folded", start="zero").core.stages[0].cores]
+    assert all(isinstance(each, FoldedFir) for each in architectures)
+    sentence = "results that share a multiplier must have fixed taps and no check bits"
+    with pytest.raises(ShortfallError, match=f"^{sentence}$"):
+        shared(architectures, 100)
+    steady = [core.architecture for core in chain().core.stages[0].cores]
+    with pytest.raises(ShortfallError, match=f"^{sentence}$"):
+        shared([replace(each, protect="detect") for each in steady], 100)
+    with pytest.raises(ShortfallError, match=r"^one multiplier must have 23 clocks a sample for all results, not 22$"):
+        shared(steady, 22)
+    few = [replace(each, blocks=each.blocks._replace(bits=3)) for each in steady]
+    sentence = "results that share a multiplier must take no more multiplier blocks than there are results"
+    with pytest.raises(ShortfallError, match=f"^{re.escape(sentence)}$"):
+        shared(few, 100)
+
+
+@pytest.mark.parametrize(
+    ("bits", "clock", "multipliers", "kind"),
+    [
+        (8, 1e6, None, NarrowFir),
+        (24, 10e6, None, SharedUnit),  # a product of 25 by 24 bits takes four blocks, a program one
+        (24, 0.2e6, None, FoldedFir),
+        (24, 10e6, 4, NarrowFir),
+        (24, 10e6, 3, SharedUnit),
+    ],
+)
+def test_wide_products_are_those_of_a_program_where_there_is_time(
+    bits: int, clock: float, multipliers: int | None, kind: type
+) -> None:
+    tree = {
+        "name": "wide",
+        "sample_rate": 8000.0,
+        "input": {"x": {"bits": bits, "range": [-1.0, 1.0], "signed": True}},
+        "filter": {"taps": [0.1, 0.2345678, 0.3456789, 0.2345678, 0.1]},
+        "output": {"bits": bits, "range": [-2.0, 2.0], "signed": True},
+        "hardware": {"clock": clock, "architecture": "folded"}
+        | ({} if multipliers is None else {"multipliers": multipliers}),
+    }
+    architecture = sosmith.design(sosmith.Specification.load(tree)).core.architecture
+    assert isinstance(architecture, kind)
+    if kind is FoldedFir:
+        assert not isinstance(architecture, NarrowFir)
+        assert architecture.multiplier_blocks == 4
