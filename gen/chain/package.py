@@ -127,7 +127,8 @@ def _bench(design: ChainDesign, modules: list[str]) -> dict[str, str]:
         "inputs": into.fields,
         "output": design.spec.base.output,
     }
-    return bench_texts(modules, hex_in, hex_out, values)
+    models = [*(core.datapath.name for stage in design.stages for core in stage.cores), design.name]
+    return bench_texts(modules, hex_in, hex_out, values, models=models)
 
 
 def _stimuli(design: ChainDesign) -> tuple[Codes, tuple[str, ...]]:

@@ -170,14 +170,15 @@ def _shared_hardware(
         return {}
     module = f"{chain.name}_{entry.name}"
     digests = {file.name: file.sha256 for file in chain.files}
-    texts = []
+    texts = list[str]()
     for name in (f"{module}.sv", f"{module}.il"):
         require(name in digests, f"the files of the chain must have {name}")
         content = content_of(folder / name, links=False)
         _compare(str(folder / name), digests[name], content)
         texts.append(ascii_text(name, content))
     try:
-        proven = check_shared_hardware(*texts, module, cores, partial(_named, progress, entry.name))
+        sv, il = texts
+        proven = check_shared_hardware(sv, il, module, cores, partial(_named, progress, entry.name))
     except RejectedError as error:
         raise RejectedError(f"stage {entry.name}: {error}") from None
     return {core.name: each for core, each in zip(cores, proven, strict=True)}

@@ -65,7 +65,9 @@ def bench_files(design: CoreDesign, facts: PackageFacts) -> dict[str, str]:
     return bench_texts([facts.name], hex_in, hex_out, values)
 
 
-def bench_texts(modules: Sequence[str], hex_in: str, hex_out: str, values: Mapping[str, Any]) -> dict[str, str]:
+def bench_texts(
+    modules: Sequence[str], hex_in: str, hex_out: str, values: Mapping[str, Any], *, models: Sequence[str] = ()
+) -> dict[str, str]:
     """Return the texts of a bench for modules of a file each, the last of which is the top.
 
     Parameters
@@ -75,9 +77,11 @@ def bench_texts(modules: Sequence[str], hex_in: str, hex_out: str, values: Mappi
         The vectors.
     values : mapping of str
         Of the other placeholders of the templates.
+    models : sequence of str
+        Names of the C models, if they are not those of the modules.
     """
     name = modules[-1]
-    values = {"name": name, "modules": modules, **values}
+    values = {"name": name, "modules": modules, "models": models or modules, **values}
     return {
         f"bench/{name}_bench.sv": render(__package__, "bench.sv.jinja", **values),
         f"bench/{name}_bench.c": render(__package__, "bench.c.jinja", **values),

@@ -23,7 +23,7 @@ TREES = {"plain": PLAIN, "guarded": GUARDED, "up": UP}
 
 CORES = {
     "plain": ("rx_slow", "rx_double", "rx_out", "rx"),
-    "up": ("rx_fill_p0", "rx_fill_p1", "rx_third", "rx"),
+    "up": ("rx_fill", "rx_third", "rx"),
 }
 
 
