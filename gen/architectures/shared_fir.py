@@ -5,16 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from sosmith.gen.architectures.architecture import Architecture
 from sosmith.gen.architectures.folded_fir import FoldedFir
+from sosmith.gen.word_lengths.settling import with_settling
 from sosmith.hdl.plan.tap_steps import StepsInTurn, tap_steps
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.errors import ShortfallError
 
 if TYPE_CHECKING:
     from amaranth.lib.wiring import Component
+
+    from sosmith.model.sections.output import OutputStage
 
 
 @dataclass(frozen=True)
@@ -78,12 +81,14 @@ def shared(architectures: Sequence[Architecture], available: int) -> list[Shared
     Raises
     ------
     ShortfallError
-        If these keep no samples, or have constants that can be loaded, check bits or a count of samples after the
-        start, or if there are not enough clocks, or their products take more multiplier blocks than there are results.
+        If these keep no samples, or have constants that can be loaded or check bits, or if there are not enough clocks,
+        or their products take more multiplier blocks than there are results.
     """
-    results = tuple(each.datapath for each in architectures)
+    # After a start from zero all results are flagged for as long as the one that settles last.
+    settles = max(cast("OutputStage", each.datapath.stages[-1]).settling for each in architectures)
+    results = tuple(with_settling(each.datapath, settles) for each in architectures)
     for each in architectures:
-        if not isinstance(each, FoldedFir) or each.reload or each.protect != "none" or each.datapath.settles:
+        if not isinstance(each, FoldedFir) or each.reload or each.protect != "none":
             raise ShortfallError("results that share a multiplier must have fixed taps and no check bits")
     first = architectures[0]
     made = [

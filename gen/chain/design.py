@@ -458,7 +458,12 @@ class _Budget:
             return ()
         why = architectures[0].reason(f"one multiplier for all {len(specs)} results", available)
         return tuple(
-            replace(core, architecture=architecture, reasons={**core.reasons, "architecture": why})
+            replace(
+                core,
+                quantized=replace(core.quantized, datapath=architecture.datapath),
+                architecture=architecture,
+                reasons={**core.reasons, "architecture": why},
+            )
             for core, architecture in zip(cores, architectures, strict=True)
         )
 

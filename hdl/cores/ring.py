@@ -108,7 +108,7 @@ class RingCore(Shell):
         Number of channels.
     others : sequence of Datapath
         What it computes of each sample after that, one result after the other: filters alike but for their taps, with
-        fixed coefficients and without settling.
+        fixed coefficients.
     copies : int
         Times that each result leaves.
     fingerprint : int or None

@@ -73,6 +73,10 @@ def packed(
             f"{path}: hardware.reload_registers must be true in a package, not false: the registers of such a core are "
             "in the package of its chain"
         )
+    if not design.architecture.has_module:
+        raise SpecificationError(
+            f"{path}: a result that shares its hardware with others must be packed with its chain, not by itself"
+        )
     facts = package_facts(design, vlnv)
     core = generated(design, progress, facts=facts.core)
     progress("bench")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from sosmith.gen.architectures.folded_fir import FoldedFir, NarrowFir
 from sosmith.gen.architectures.shared_fir import SharedFir, shared
 from sosmith.gen.architectures.shared_unit import SharedUnit
 from sosmith.gen.fpga.boards import find_board
-from sosmith.model.errors import ShortfallError
+from sosmith.model.errors import ShortfallError, SpecificationError
 
 TAPS = [0.25, 0.5, 1.0, 0.75, 0.25, 0.125, 0.5]
 
@@ -55,7 +56,6 @@ def test_all_results_have_one_multiplier() -> None:
         (1e6, {"architecture": "serial"}),
         (1e6, {"reload": True}),
         (1e6, {"protect": "detect"}),
-        (1e6, {"start": "zero"}),
         (1e6, {"keep": True}),
     ],
 )
@@ -74,12 +74,16 @@ def test_results_are_those_of_the_filter() -> None:
     assert np.abs(made.core.compute(codes[:, :, None])[:, 0] - wanted).max() <= 0.5
 
 
+def test_all_results_settle_at_once() -> None:
+    made = chain(start="zero")
+    (stage,) = made.core.stages
+    assert stage.modules == ("rx_up",)
+    assert [core.quantized.settling for core in stage.cores] == [3, 3, 3]
+    assert made.core.settling == 9
+
+
 def test_what_cannot_share_is_told() -> None:
-    architectures = [core.architecture for core in chain(architecture="folded", start="zero").core.stages[0].cores]
-    assert all(isinstance(each, FoldedFir) for each in architectures)
     sentence = "results that share a multiplier must have fixed taps and no check bits"
-    with pytest.raises(ShortfallError, match=f"^{sentence}$"):
-        shared(architectures, 100)
     steady = [core.architecture for core in chain().core.stages[0].cores]
     with pytest.raises(ShortfallError, match=f"^{sentence}$"):
         shared([replace(each, protect="detect") for each in steady], 100)
@@ -118,3 +122,16 @@ def test_wide_products_are_those_of_a_program_where_there_is_time(
     if kind is FoldedFir:
         assert not isinstance(architecture, NarrowFir)
         assert architecture.multiplier_blocks == 4
+
+
+def test_a_result_is_packed_with_its_chain(tmp_path: Path) -> None:
+    (first, *_) = chain().stages
+    sentence = "a result that shares its hardware with others must be packed with its chain, not by itself"
+    with pytest.raises(SpecificationError, match=rf": {sentence}$"):
+        first.package(tmp_path)
+    assert sorted(path.name for path in first.generate(tmp_path)) == [
+        f"rx_up_p0.{end}" for end in ("c", "certificate.json", "h", "json")
+    ]
+    (overview, *_) = first.tables()
+    rows = {row.name if hasattr(row, "name") else row[0]: str(row) for row in overview.rows}
+    assert "3 steps for a result, for all 3 results of a sample" in rows["multipliers"]

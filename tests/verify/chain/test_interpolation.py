@@ -17,7 +17,8 @@ from sosmith.gen.specification.exact_values import exact
 from sosmith.gen.specification.toml_text import toml_text
 from sosmith.model.errors import ShortfallError
 
-TREE = UP | {"hardware": {"start": "zero"}}
+TREE = UP | {"hardware": {"start": "zero", "architecture": "parallel"}}
+"""Cores side by side; one multiplier for all is in `tests.verify.chain.test_shared_hardware`."""
 
 
 @pytest.fixture(scope="module")

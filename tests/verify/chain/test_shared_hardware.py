@@ -41,6 +41,16 @@ def folder(written: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(written, tmp_path / "copy"))
 
 
+@pytest.mark.parametrize("channels", [1, pytest.param(3, marks=pytest.mark.slow)])
+def test_all_of_a_start_from_zero_is_proven(channels: int, tmp_path: Path) -> None:
+    tree = TREE | {"channels": channels, "hardware": {"clock": 1e6, "start": "zero"}}
+    chain = sosmith.design_chain(sosmith.ChainSpecification.load(tree))
+    chain.generate(tmp_path)
+    (tmp_path / "rx.toml").write_text(chain.specification.toml(), encoding="utf-8")
+    assert (tmp_path / "rx_up.sv").exists()
+    assert not proven(tmp_path).missing
+
+
 def test_all_of_it_is_proven(folder: Path) -> None:
     proof = proven(folder)
     assert not proof.missing

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from sosmith.gen.architectures.architecture import Architecture
 from sosmith.gen.architectures.folded_fir import FoldedFir
+from sosmith.gen.architectures.shared_fir import SharedFir
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.estimate.estimate import Estimate
 from sosmith.gen.facts.cost_table import cost_table
@@ -201,10 +202,13 @@ def _hardware_rows(architecture: Architecture) -> list[tuple[str, str]]:
     program, cost = architecture.program, architecture.cost
     latency = ("latency", f"{architecture.latency_cycles:,} clocks")
     if isinstance(architecture, FoldedFir):
-        port, plan = architecture.datapath.inputs[0], architecture.plan
+        port, plan, shared = architecture.datapath.inputs[0], architecture.plan, ""
+        if isinstance(architecture, SharedFir):
+            shared = f", for all {len(architecture.results)} results of a sample"
+        steps = f"{len(plan.steps)} steps for a result{shared}"
         return [
             latency,
-            ("multipliers", f"1 of {plan.pair_bits(port)} x {plan.factor_bits}, {len(plan.steps)} steps for a result"),
+            ("multipliers", f"1 of {plan.pair_bits(port)} x {plan.factor_bits}, {steps}"),
             ("memory", f"{plan.words:,} samples of {port.bits} bits a channel{', twice' * plan.pairs}"),
         ]
     if program is None:
