@@ -94,6 +94,9 @@ class GraphCodes:
         Number of words of each memory of a core with look-ahead, by its name.
     prefix : str
         Prefix of the core's nets.
+    space : int
+        Another number for each of several graphs of the same inputs, whose forms are mixed: what their stages hand on
+        then has variables of its own.
 
     Attributes
     ----------
@@ -115,6 +118,7 @@ class GraphCodes:
         lanes: int = 1,
         memories: Mapping[str, int] = MappingProxyType({}),
         prefix: str = "",
+        space: int = 0,
     ) -> None:
         self._prefix = prefix
         self.forms = forms
@@ -155,8 +159,9 @@ class GraphCodes:
             if forms.is_variable(code) and (lanes > 1 or forms.keys(code) == {(index, 0)}):
                 continue
             if index in between or index in self._remembered:
-                self._definitions[index, 0] = code
-                short = forms.variable((index, 0), node.entry.low, node.entry.high)
+                key: Hashable = (index, 0, space) if space else (index, 0)
+                self._definitions[key] = code
+                short = forms.variable(key, node.entry.low, node.entry.high)
             if index in between:
                 self._handed_on[index] = self._seams.setdefault(frozenset(code.items()), short)
             if index in self._remembered and len(code) > 1:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from sosmith.verify.certificate_file import Certificate
 from sosmith.verify.graph import RejectedError, require
-from sosmith.verify.multirate.ring.check import check_rings
+from sosmith.verify.multirate.ring.check import check_rings_in_turn
 from sosmith.verify.multirate.ring.verdict import RingVerdict
 from sosmith.verify.reader.rtlil.check import RtlilVerdict, check_rtlil
 from sosmith.verify.reader.rtlil.kept import check_kept
@@ -45,15 +45,18 @@ def check_shared_hardware(
     RejectedError
         If it computes anything else.
     """
-    modules, verdicts = read_source(text, name).modules, []
-    for turn, certificate in enumerate(certificates):
+    modules = read_source(text, name).modules
+    items = []
+    for certificate in certificates:
         item = None if certificate.about is None else certificate.about.item
         if item is None or certificate.downsampling is None:
             raise RejectedError(f"{certificate.name} must be one of several results that share hardware")
         require(item.shared, f"{certificate.name} must say that it shares its hardware")
         check_ports(modules[name], item)
-        progress("hardware of all results", turn, len(certificates))
-        verdicts.append(check_rings(text, certificate, item, top=name, turn=turn, turns=len(certificates)))
+        items.append(item)
+    require(all(item == items[0] for item in items), "results that share hardware must be of the same item")
+    progress("hardware of all results", 0, 0)
+    verdicts = check_rings_in_turn(text, name, certificates, items[0])
     proven = check_rtlil(rtlil, modules)
     check_kept(rtlil, modules, asked=False)
     return [SharedHardware(verdict, proven) for verdict in verdicts]

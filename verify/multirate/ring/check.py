@@ -26,12 +26,13 @@ source must keep a sample on offer until it is accepted, as AXI4-Stream asks.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from sosmith.verify.certificate_file import Certificate, ItemEntry
 from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.multirate.ring.machine import UNKNOWN, Machine, State
+from sosmith.verify.multirate.ring.results import Result, Results
 from sosmith.verify.multirate.ring.verdict import RingVerdict
 from sosmith.verify.parallel.check import CLOCK, FLAGS, OUTPUT, OUTPUT_DEST
 from sosmith.verify.parallel.control import RESET, SINK, SOURCE
@@ -86,16 +87,14 @@ class _Sink(NamedTuple):
 
 
 class _Way(NamedTuple):
-    """The clocks of a sample: until the next one is taken, and until its result can leave; 0 if it brings none."""
+    """The clocks of a sample: until the next one is taken, and until each of its results can leave."""
 
     clocks: int
-    latency: int
+    latencies: Sequence[int]
 
 
-def check_rings(
-    text: str, certificate: Certificate, item: ItemEntry, *, top: str | None = None, turn: int = 0, turns: int = 1
-) -> RingVerdict:
-    """Prove that a core computes every N-th result of the graphs of a certificate, or one of `turns` for each sample.
+def check_rings(text: str, certificate: Certificate, item: ItemEntry) -> RingVerdict:
+    """Prove that a core computes every N-th result of the graphs of a certificate.
 
     Parameters
     ----------
@@ -105,36 +104,56 @@ def check_rings(
         Its certificate, which `verify` has accepted, with a downsampling.
     item : ItemEntry
         What it is about.
-    top : str or None
-        Name of the module; None for that of the certificate.
-    turn, turns : int
-        Which result of a sample is that of the graphs, and how many each sample brings.
 
     Raises
     ------
     RejectedError
         If it computes anything else, or has anything that cannot be followed.
     """
-    modules = read_source(text, top or certificate.name).modules
+    (verdict,) = check_rings_in_turn(text, certificate.name, [certificate], item)
+    return verdict
+
+
+def check_rings_in_turn(
+    text: str, top: str, certificates: Sequence[Certificate], item: ItemEntry
+) -> Sequence[RingVerdict]:
+    """Prove that a core computes the results of certificates in turn, one of each for each sample.
+
+    Parameters
+    ----------
+    text : str
+        SystemVerilog of the core.
+    top : str
+        Name of its module.
+    certificates : sequence of Certificate
+        Certificates, which `verify` accepts, with a downsampling; by 1 if there are several.
+    item : ItemEntry
+        What all of them are about.
+
+    Raises
+    ------
+    RejectedError
+        If it computes anything else, or has anything that cannot be followed.
+    """
+    modules = read_source(text, top).modules
     with deep_recursion():
-        return _Check(flattened(modules, CLOCK), certificate, item, turn, turns).checked()
+        return _Check(flattened(modules, CLOCK), certificates, item).checked()
 
 
 class _Check:
     """The check of a core."""
 
-    def __init__(self, netlist: Netlist, certificate: Certificate, item: ItemEntry, turn: int, turns: int) -> None:
+    def __init__(self, netlist: Netlist, certificates: Sequence[Certificate], item: ItemEntry) -> None:
+        certificate = certificates[0]
         entry = certificate.downsampling
         assert entry is not None
-        require(turns == 1 or entry.factor == 1, "only where all results leave may there be several of a sample")
-        self._turn, self._turns = turn, turns
         self._netlist, self._certificate, self._entry = netlist, certificate, entry
         self._channels, self._hold = item.channels, entry.factor if item.hold else 1
         self.forms = Forms()
-        self._graph = GraphCodes(certificate, self.forms)
-        (self._lane,), (self._port,) = self._graph.lanes, certificate.inputs
-        (self._input,) = self._lane.inputs
-        self._remembered, self._counter = self._memory_of_graphs()
+        self._results = Results(certificates, self.forms)
+        self._graph, (self._port,) = self._results.first.graph, certificate.inputs
+        self._input = self._results.input
+        self._remembered, self._counter = self._results.remembered, self._results.first.counter
         self._rings, self._words = self._find_rings()
         self._bits = (self._words - 1).bit_length()
         self._channel = self.forms.variable("channel", 0, self._channels - 1)
@@ -154,18 +173,6 @@ class _Check:
         return self.forms.variable(("constant", name), 0, (1 << self._netlist.memories[name].width) - 1)
 
     # What there is.
-
-    def _memory_of_graphs(self) -> tuple[int, int | None]:
-        """Return how many samples the graphs remember, and the node that counts those since a start, if one does."""
-        remembered, counter = 0, None
-        for index in self._graph.delays:
-            node, ago = self._graph.origin(index)
-            if node == self._input:
-                remembered = max(remembered, ago)
-            else:
-                require(counter is None and ago == 1, "the graphs must remember samples alone, and their number")
-                counter = index
-        return remembered, counter
 
     def _find_rings(self) -> tuple[list[str], int]:
         """Return the memories of samples, and how many words each has for a channel."""
@@ -210,26 +217,29 @@ class _Check:
 
     # All of it.
 
-    def checked(self) -> RingVerdict:
-        """Check everything."""
+    def checked(self) -> list[RingVerdict]:
+        """Check everything; return what is proven of each result."""
         cleared = self._check_reset()
         fills = self._check_first()
         ways = [self._check_sample(phase) for phase in self._phases]
         self._check_waiting()
         clocks = ways[0].clocks + (self._entry.factor - 1) * max((way.clocks for way in ways[1:]), default=0)
-        latency = max(fills.latency, ways[0].latency)
+        latencies = [max(times) for times in zip(fills.latencies, ways[0].latencies, strict=True)]
         taken = max(fills.clocks, *(way.clocks for way in ways)) + self._hold
-        return RingVerdict(
-            registers=len(self._netlist.registers),
-            memories=len(self._netlist.memories),
-            states=len(self._rings) + self._several,
-            latency=latency,
-            waits=0,
-            clearing=cleared,
-            result_clocks=clocks,
-            factor=self._entry.factor,
-            pace=Progress(taken, latency + self._hold, cleared),
-        )
+        return [
+            RingVerdict(
+                registers=len(self._netlist.registers),
+                memories=len(self._netlist.memories),
+                states=len(self._rings) + self._several,
+                latency=latency,
+                waits=0,
+                clearing=cleared,
+                result_clocks=clocks,
+                factor=self._entry.factor,
+                pace=Progress(taken, latency + self._hold, cleared),
+            )
+            for latency in latencies
+        ]
 
     @property
     def _phases(self) -> list[Form]:
@@ -250,13 +260,13 @@ class _Check:
 
     # What is known of words.
 
-    def _is(self, word: Form, wanted: Form, width: int) -> bool:
-        """Whether two words are the same, if need be by opening what stages of the graphs hand on."""
+    def _is(self, word: Form, wanted: Form, width: int, graph: GraphCodes | None = None) -> bool:
+        """Whether two words are the same, if need be by opening what stages of a graph hand on."""
         pair: tuple[Form, Form] | None = word, wanted
         for _ in range(_MOST_OPENED):
             if pair is None or same_word(self.forms, *pair, width):
                 break
-            pair = self._graph.opened(*pair)
+            pair = (graph or self._graph).opened(*pair)
         else:
             return False
         return pair is not None
@@ -281,7 +291,7 @@ class _Check:
     @property
     def _at_rail(self) -> Form:
         """Whether the sample is at an end of its range."""
-        flags = flags_of(self._graph, self._lane, self._certificate, (), None)
+        flags = flags_of(self._graph, self._graph.lanes[0], self._certificate, (), None)
         return next(flag.value for flag in flags if flag.name == "input_at_rail")
 
     def _gathered(self, rail: Form) -> Form:
@@ -402,7 +412,7 @@ class _Check:
     @property
     def _reset_values(self) -> dict[str, int]:
         """What registers of the control hold after a reset."""
-        values = {"running": 0, VALID: 0} | ({"turn": 0} if self._turns > 1 else {})
+        values = {"running": 0, VALID: 0} | ({"turn": 0} if len(self._results.all) > 1 else {})
         if self._several:
             return values | {"clearing": 1, "filling": 0, "waits": 0, "channel": 0}
         return values | {"filling": 1} | dict.fromkeys(self._names, 0)
@@ -462,7 +472,7 @@ class _Check:
         for name, value in self._reset_values.items():
             right = name == VALID or state.registers[name] == {}
             require(right, f"{name} must be 0 once the ring is filled, as {value} was after a reset")
-        return _Way(0, 0)
+        return _Way(0, [0] * len(self._results.all))
 
     def _check_filled(self, state: State) -> None:
         """Check that a ring is full of zeros, or of the first sample: then that is what all samples before were."""
@@ -486,7 +496,7 @@ class _Check:
         """Return the state in which the core waits for a sample."""
         self._machine.pointer = fields.pointer
         ring = {-ago % self._words: self._sample(ago) for ago in range(1, self._remembered + 1)}
-        turn: dict[str, Form] = {"turn": {}} if self._turns > 1 else {}
+        turn: dict[str, Form] = {"turn": {}} if len(self._results.all) > 1 else {}
         state = State({"running": {}, "filling": {}, **turn}, {name: dict(ring) for name in self._rings})
         if self._several:
             state.registers |= {"clearing": {}, "waits": {}}
@@ -527,7 +537,8 @@ class _Check:
         inputs = {SOURCE: constant(1), DATA: self._bus, **({DEST: self._channel} if self._several else {})}
         state, result, ready = self._clocks(state, inputs)
         require(bool(ready) and result is None, f"{READY} must be 1 while the core waits for a sample")
-        clocks, latency, results = 1, 0, 0
+        clocks, latencies = 1, list[int]()
+        results = self._results.all if brings else []
         while True:
             require(clocks < _MOST_CLOCKS, f"a sample must be done within {_MOST_CLOCKS} clocks")
             if self._machine.clock(state, {RESET: constant(1)}, self._number).bit(READY):
@@ -541,12 +552,11 @@ class _Check:
                 fills = False
             if result is not None:
                 require(not fills, "no result must come while a ring is filled")
-                if results == self._turn:
-                    latency = clocks
-                    self._check_result(result, fields)
-                results += 1
-        wanted = self._turns if brings else 0
-        require(results == wanted, f"a sample must bring {self._shown(wanted)}, not {self._shown(results)}")
+                if len(latencies) < len(results):
+                    self._check_result(results[len(latencies)], result, fields)
+                latencies.append(clocks)
+        told = tuple(f"{len(each) or 'no'} result{'s' * (len(each) != 1)}" for each in (results, latencies))
+        require(len(latencies) == len(results), f"a sample must bring {told[0]}, not {told[1]}")
         last, rail = constant(self._entry.factor - 1), self._gathered(fields.rail)
         counted: Form = {}
         if self._counter is not None:
@@ -569,11 +579,7 @@ class _Check:
         waits = self._waiting(fields).registers
         for name in waits.keys() - {*self._names}:
             require(state.registers[name] == {}, f"{name} must be 0 while the core waits for a sample")
-        return _Way(clocks, latency)
-
-    @staticmethod
-    def _shown(results: int) -> str:
-        return f"{results or 'no'} result{'s' * (results != 1)}"
+        return _Way(clocks, latencies)
 
     def _counting(self, form: Form, fields: _Fields) -> Form:
         """Return a form with the count of a sample, which for the first one is 0."""
@@ -581,17 +587,19 @@ class _Check:
             return form
         return self.forms.settled(form, {self._graph.origin(self._counter): fields.counted})
 
-    def _check_result(self, state: State, fields: _Fields) -> None:
+    def _check_result(self, wanted: Result, state: State, fields: _Fields) -> None:
         """Check the code, the flags and the channel of a result."""
         clock = self._machine.clock(State({name: state.registers[name] for name in self._held}), {}, self._number)
         whole = -(-self._certificate.output.bits // 8) * 8
         for name, width in ((OUTPUT, whole), (FLAGS, _FLAG_BITS)):
             require(self._netlist.widths[name] == width, f"the port {name} must have {width} bits")
-        rail, code = self._gathered(fields.rail), self._graph.seen(self._lane.output, "")
-        label = self._graph.nodes[self._lane.output].label
-        require(self._is(clock.net(OUTPUT), code, whole), f"{OUTPUT} must be {label}, not another value")
-        for flag in flags_of(self._graph, self._lane, self._certificate, (rail,), self._limits):
-            right = self._is(clock.net(FLAGS, flag.place, 1), self._counting(flag.value, fields), 1)
+        graph, lane = wanted.graph, wanted.lane
+        rail, code = self._gathered(fields.rail), graph.seen(lane.output, "")
+        label = graph.nodes[lane.output].label
+        require(self._is(clock.net(OUTPUT), code, whole, graph), f"{OUTPUT} must be {label}, not another value")
+        for flag in flags_of(graph, lane, wanted.certificate, (rail,), self._limits):
+            value = self._counting(self._results.with_one_count(wanted, flag.value), fields)
+            right = self._is(clock.net(FLAGS, flag.place, 1), value, 1, graph)
             what = flag.name or "0, as there is no such flag"
             require(right, f"bit {flag.place} of {FLAGS} must be {what}, not another value")
         if self._several:
