@@ -38,7 +38,7 @@ class FewSteps:
     def of_datapath(self, datapath: Datapath) -> float:
         """Return the number of steps, and little more for long coefficients."""
         section = datapath.stages[0]
-        if not isinstance(section, FirSection) or section.form is Form.TRANSPOSED:
+        if not isinstance(section, FirSection) or (section.form is Form.TRANSPOSED and section.length > 1):
             return math.inf
         plan = TapSteps(section)
         return float(len(plan.steps) + _BIT * max(abs(step.coefficient) for step in plan.steps).bit_length())

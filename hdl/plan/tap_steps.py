@@ -47,7 +47,7 @@ class TapSteps:
     Attributes
     ----------
     section : FirSection
-        In a form that keeps samples: direct, or symmetric.
+        In a form that keeps samples: direct, or symmetric; of one tap, in any.
     loadable : bool
         Whether other coefficients can be loaded: then the steps are the same for all.
     """
@@ -56,7 +56,7 @@ class TapSteps:
     loadable: bool = False
 
     def __post_init__(self) -> None:
-        if self.section.form is Form.TRANSPOSED:
+        if self.section.form is Form.TRANSPOSED and self.section.length > 1:
             raise ValueError("form must be one that keeps samples, not transposed")
 
     @property

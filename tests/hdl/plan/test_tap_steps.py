@@ -54,4 +54,10 @@ def test_a_direct_form_has_a_step_for_each_tap() -> None:
 
 def test_a_form_that_keeps_sums_is_refused() -> None:
     with pytest.raises(ValueError, match=r"^form must be one that keeps samples, not transposed$"):
-        TapSteps(section(TapProduct("b0", 3, 4, ((0, 1),)), form=Form.TRANSPOSED))
+        TapSteps(section(TapProduct("b0", 3, 4, ((1, 1),)), form=Form.TRANSPOSED))
+
+
+def test_one_tap_keeps_its_sample_in_any_form() -> None:
+    plan = TapSteps(section(TapProduct("b0", 3, 4, ((0, 1),)), form=Form.TRANSPOSED))
+    assert plan.steps == (TapStep(3, 0),)
+    assert plan.words == 2
