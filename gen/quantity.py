@@ -14,7 +14,8 @@ _NOTHING = 1e-300
 _LEAST_DECIMAL = 1e-6
 """What is smaller is shown with a power of ten: nobody counts more zeros."""
 LEAST_PART = 1 / 20_000
-"""Least part of an error bound that is shown, in output LSB: at four decimals the others are zero."""
+"""Least part of an error bound that is shown, in output LSB: at four decimals the others are zero. Beside other bounds,
+it is a share of its own, which is about an LSB."""
 
 
 def unit_symbol(unit: str) -> str:

@@ -34,9 +34,12 @@ class ErrorUnit:
         return plain_number(value * self.factor)
 
     def amount(self, value: float) -> str:
-        """Return a value with this unit."""
-        joint = " × " if self.symbol.startswith("10") else " "
-        return f"{self.number(value)}{joint}{self.symbol}".rstrip().replace(" ", self.blank)
+        """Return a value with this unit; one that reads 0 has no power of ten."""
+        number, symbol = self.number(value), self.symbol
+        if number == "0" and symbol.startswith("10"):
+            symbol = symbol.partition(" ")[2]
+        joint = " × " if symbol.startswith("10") else " "
+        return f"{number}{joint}{symbol}".rstrip().replace(" ", self.blank)
 
     def titled(self, words: str) -> str:
         """Return the title of a column in this unit."""

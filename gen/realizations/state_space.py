@@ -95,7 +95,10 @@ def _minimum_noise(row: tuple[float, ...]) -> StateDesign:
     side, big1, big2 = _about_side(row)
     step = math.sqrt(big2)
     M, B = np.array([[0.0, step], [-step, -big1]]), np.array([0.0, 1.0])
-    return _completed(row, side, *least_noise(side, M, _completed(row, side, M, B).C))
+    C = _completed(row, side, M, B).C
+    if not C.any():  # the zeros are at the poles: no state reaches the output, and nor does its noise
+        return _normal(row)
+    return _completed(row, side, *least_noise(side, M, C))
 
 
 @lru_cache(maxsize=256)

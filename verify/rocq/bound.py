@@ -34,7 +34,7 @@ def why_no_bound(certificate: Certificate) -> str | None:
     """Why the theorem cannot be written for this certificate, whose ranges are proven; None if it can."""
     if not certificate.ideal.sections:
         return "there are no sections"
-    if not certificate.claims.budget.get("output rounding") and not _rounds(certificate):
+    if not _rounds(certificate):
         return "its output is not rounded"
     entry = certificate.decimation
     if entry is not None and entry.calibration is not None and entry.calibration.output.zero:

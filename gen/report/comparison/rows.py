@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sosmith.gen.quantity import decibels, full_scale_level, number, plain_number, quantity
+from sosmith.gen.quantity import LEAST_PART, decibels, full_scale_level, number, plain_number, quantity
 from sosmith.gen.report.comparison.differences import UNKNOWN
 from sosmith.gen.report.comparison.fairness import fairness, source_name
 from sosmith.gen.report.comparison.report_file import Report, fact
@@ -136,8 +136,13 @@ def compare(reports: Sequence[Report]) -> list[Row]:
 
 
 def _parts(reports: Sequence[Report]) -> list[Figure]:
-    """Return what the bounds are sums of: parts of a core, stages of a chain."""
-    names = dict.fromkeys(name for report in reports for name in fact(report, "error.parts") or {})
+    """Return what the bounds are sums of, the parts that count in any of them: parts of a core, stages of a chain."""
+    names = dict.fromkeys(
+        name
+        for report in reports
+        for name, part in (fact(report, "error.parts") or {}).items()
+        if part >= (fact(report, "error.bound") or 0) * LEAST_PART
+    )
     return [Figure("bounds", f"error.parts.{name}", f"of it, {name}", quantity) for name in names]
 
 

@@ -62,6 +62,10 @@ ROWS: dict[str, Row] = {
     "one zero": (0.5, 0.25, 0.0, 1.0, -1.2, 0.5),
     "delays only": (0.25, 0.5, 0.25, 1.0, 0.0, 0.0),
 }
+FLAT: dict[str, Row] = {
+    "a band of an equalizer at 0 dB": (1.0, -1.8, 0.9, 1.0, -1.8, 0.9),
+    "zeros at equal real poles": (0.5, -0.9, 0.405, 1.0, -1.8, 0.81),
+}
 
 
 @pytest.mark.parametrize("cutoff", CUTOFFS)
@@ -132,6 +136,13 @@ def test_designs_are_scaled_by_powers_of_two(name: str, make: object) -> None:
     assert np.all(deviations < 1 + 1e-9)
     assert deviations.max() > 0.5
     assert all(value == 0 or math.frexp(value)[0] == 0.5 for value in made.B)
+
+
+@pytest.mark.parametrize("row", FLAT.values(), ids=FLAT)
+def test_zeros_at_the_poles_leave_a_factor(row: Row) -> None:
+    made = minimum_noise(row)
+    assert (made.C.tolist(), made.D) == ([0.0, 0.0], row[0])
+    assert np.linalg.eigvals(made.system.A) == pytest.approx(np.roots(row[3:]), abs=1e-6)
 
 
 @pytest.mark.parametrize("name", ROWS)

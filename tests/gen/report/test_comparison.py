@@ -42,6 +42,13 @@ def test_rows_show_values_with_units() -> None:
     assert rows["samples"].cells == ("20,000", "20,000")
 
 
+def test_parts_of_a_bound_are_shown_where_they_count_in_any_report() -> None:
+    parts = ({"start": 3e-64, "rounding": 1e-4}, {"start": 3e-64, "rounding": 1e-9, "calibration": 0.0})
+    rows = rows_of(*(report(**{"error.bound": 2e-4, "error.parts": each}) for each in parts))
+    assert [key for key in rows if key.startswith("error.parts.")] == ["error.parts.rounding"]
+    assert rows["error.parts.rounding"].values == (1e-4, 1e-9)
+
+
 def test_errors_against_the_true_value_are_shown_where_all_have_them() -> None:
     known = {"true_error": {"max_abs": 0.5, "rms": 0.1, "mean": 0.0, "readings": 9}}
     better = report(true_error={**known["true_error"], "max_abs": 0.4})

@@ -833,6 +833,12 @@ def test_quantities(value: float | None, unit: str, words: str) -> None:
     assert quantity.quantity(value, unit) == words
 
 
+def test_an_error_of_nothing_has_no_power_of_ten() -> None:
+    shown = [ErrorUnit(*quantity.scale(4e-4, unit)) for unit in ("", "degC", "mm")]
+    assert [unit.amount(0.0) for unit in shown] == ["0", "0 °C", "0 nm"]
+    assert [unit.amount(1e-4) for unit in shown] == ["100 × 10⁻⁶", "100 × 10⁻⁶ °C", "100 nm"]
+
+
 def test_the_worst_channel_has_the_largest_error_of_either_sign() -> None:
     golden = np.zeros((4, 3))
     hardware = golden.copy()

@@ -215,6 +215,16 @@ def test_the_graph_in_rocq_computes_what_the_model_computes(realization: str, tm
     assert shown == quantized.datapath.compute(codes.reshape(-1, 1)).ravel().tolist()
 
 
+SHIFTED = """
+name = "shifted"
+sample_rate = 1.0
+input.x = { bits = 8, signed = true, range = [-1.0, 1.0] }
+filter = { taps = [0.5] }
+output = { bits = 16, range = [-0.59, 15.41], unit = "", max_error = "faithful" }
+"""
+"""All codes of the output are further off by one amount, as its range begins between two of them; none is rounded."""
+
+
 def test_what_no_theorem_is_about_is_named() -> None:
     assert theorems(designed(SETTLING)).unchecked == theorems(designed(DECIMATED)).unchecked == ()
     tree = json.loads(certificate_text(designed(BOTH)))
@@ -223,6 +233,7 @@ def test_what_no_theorem_is_about_is_named() -> None:
         "error bound: the decimator takes values of which 0 has another code than 0",
         "what folds into the pass band at the decimator",
     )
+    assert theorems(designed(SHIFTED)).unchecked == ("error bound: its output is not rounded",)
 
 
 def test_a_theorem_that_cannot_be_written_is_asked_for_and_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
