@@ -21,6 +21,7 @@ from sosmith.verify.program.check import ProgramVerdict, check_program
 from sosmith.verify.progress import Progress
 from sosmith.verify.unit.check import UnitVerdict
 from sosmith.verify.unit.going_on import Pace
+from sosmith.verify.verdict.item import check_item
 from sosmith.verify.verdict.manifest import Manifest, read_manifest
 
 Tree = dict[str, Any]
@@ -265,3 +266,21 @@ def test_another_schedule_is_refused(
     folded = core("folded")
     with pytest.raises(RejectedError, match=f"^{sentence}$"):
         folded.read(folded.changed(f"schedule.{path}", value)).hold_program(program)
+
+
+def test_several_samples_a_clock_are_those_of_one_channel(core: Callable[[str], Core]) -> None:
+    about = core("parallel").certificate.about
+    assert about is not None
+    assert about.item is not None
+    wrong = about.item.model_copy(update={"samples": 2})
+    with pytest.raises(RejectedError, match=r"^several samples a clock must be those of one channel$"):
+        check_item(core("parallel").certificate, wrong)
+
+
+def test_wear_that_the_specification_does_not_have_is_refused(core: Callable[[str], Core]) -> None:
+    about = core("parallel").certificate.about
+    assert about is not None
+    assert about.item is not None
+    wrong = about.item.model_copy(update={"wear": ((1, 2), (1, 2))})
+    with pytest.raises(RejectedError, match=r"^the manifest must be that of a core, not another file$"):
+        read_manifest(core("parallel").manifest.encode(), core("parallel").certificate, wrong)
