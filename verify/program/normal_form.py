@@ -47,9 +47,10 @@ def constant(value: int | Fraction) -> Form:
 
 def plus(a: Form, b: Form, factor: int | Fraction = 1) -> Form:
     """Return ``a + factor b``."""
-    total = dict(a)
-    for monomial, coefficient in b.items():
-        total[monomial] = total.get(monomial, 0) + factor * coefficient
+    multiple = b if factor == 1 else {monomial: factor * coefficient for monomial, coefficient in b.items()}
+    total = {**a, **multiple}
+    for monomial in a.keys() & multiple.keys():
+        total[monomial] += a[monomial]
     return {monomial: coefficient for monomial, coefficient in total.items() if coefficient}
 
 

@@ -37,6 +37,9 @@ KEPT = "keep = 32'd1"
 _TOKEN = re.compile(
     r"[A-Za-z_]\w*|\$signed|[1-9]\d*'h[0-9a-fx]+|[1-9]\d*'d\d+|[1-9]\d*'b[01x]+|\d+|<=|>=|==|!=|<<|>>|[-+*/&|^~!<>=?:;,.(){}\[\]@]"
 )
+_JOINED = re.compile(r"[\w$][\w'$]")
+"""The end of a word, and the begin of another one behind it."""
+
 _LONGEST = 1 << 12
 """Characters of a token, at most."""
 
@@ -170,7 +173,8 @@ def _cut(line: str) -> list[str]:
         if match is None or line.startswith(("//", "/*", "(*"), at) or match.end() - at > _LONGEST:
             raise RejectedError(f"the SystemVerilog must be made of its plain subset, not have {line[at : at + 20]!r}")
         at = match.end()
-        whole = at == len(line) or not (re.match(r"[\w'$]", line[at]) and re.match(r"[\w$]", line[at - 1]))
-        require(whole, f"the SystemVerilog must have blanks between words, not {line[max(at - 10, 0) : at + 10]!r}")
+        if _JOINED.match(line, at - 1):
+            joined = line[max(at - 10, 0) : at + 10]
+            raise RejectedError(f"the SystemVerilog must have blanks between words, not {joined!r}")
         tokens.append(match[0])
     return tokens

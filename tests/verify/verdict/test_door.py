@@ -8,6 +8,7 @@ import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -20,7 +21,7 @@ from sosmith.interface.certificate import Certificate, Proof
 from sosmith.verify.certificate_file import Certificate as Entries
 from sosmith.verify.certificate_file import certificate_text, sealed
 from sosmith.verify.graph import RejectedError
-from sosmith.verify.verdict import generated_files
+from sosmith.verify.verdict import door, generated_files
 from sosmith.verify.verdict.scope import State
 
 Tree = dict[str, Any]
@@ -329,3 +330,26 @@ def test_words_that_nothing_is_held_against_are_named(copy: Callable[..., Path])
     agreement = proof(next(copy(text).glob("*.certificate.json")), spec=True).agreement
     assert agreement is not None
     assert agreement.not_compared == ("hardware.realization", "hardware.clock")
+
+
+def test_each_step_is_announced_before_its_work(copy: Callable[..., Path]) -> None:
+    (path,) = copy(FOLDED).glob("*.certificate.json")
+    steps: list[tuple[str, int, int]] = []
+    spec = path.parent / "spec.toml"
+    Certificate.load(path).verify(spec=spec, files=path.parent, progress=lambda *step: steps.append(step))
+    named = ("specification", "files", "manifest", "program", "unit", "C model", "RTLIL")
+    assert [step for step in steps if step[0] in named] == [(name, 0, 0) for name in named]
+
+
+@pytest.mark.parametrize(("architecture", "serial"), [("folded", False), ("serial", True)])
+def test_a_unit_is_proven_as_what_the_item_says(
+    architecture: str, serial: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kinds: list[bool] = []
+    for name in ("check_program", "behind_decimator", "at_lower_rate", "_calibrated", "_ahead"):
+        monkeypatch.setattr(door, name, lambda *arguments, **keys: None)
+    monkeypatch.setattr(door, "check_unit", lambda text, certificate, serial: kinds.append(serial))
+    certificate: Any = SimpleNamespace(decimation=None, downsampling=None)
+    stated: Any = SimpleNamespace(architecture=architecture, protect="none", reload=False)
+    door._hardware_proven(certificate, stated, "", lambda *step: None)
+    assert kinds == [serial]

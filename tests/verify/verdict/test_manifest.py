@@ -21,6 +21,8 @@ from sosmith.verify.program.check import ProgramVerdict, check_program
 from sosmith.verify.progress import Progress
 from sosmith.verify.unit.check import UnitVerdict
 from sosmith.verify.unit.going_on import Pace
+from sosmith.verify.verdict import manifest
+from sosmith.verify.verdict.item import check_item
 from sosmith.verify.verdict.manifest import Manifest, read_manifest
 
 Tree = dict[str, Any]
@@ -265,3 +267,33 @@ def test_another_schedule_is_refused(
     folded = core("folded")
     with pytest.raises(RejectedError, match=f"^{sentence}$"):
         folded.read(folded.changed(f"schedule.{path}", value)).hold_program(program)
+
+
+def test_several_samples_a_clock_are_those_of_one_channel(core: Callable[[str], Core]) -> None:
+    about = core("parallel").certificate.about
+    assert about is not None
+    assert about.item is not None
+    wrong = about.item.model_copy(update={"samples": 2})
+    with pytest.raises(RejectedError, match=r"^several samples a clock must be those of one channel$"):
+        check_item(core("parallel").certificate, wrong)
+
+
+def test_wear_that_the_specification_does_not_have_is_refused(core: Callable[[str], Core]) -> None:
+    about = core("parallel").certificate.about
+    assert about is not None
+    assert about.item is not None
+    wrong = about.item.model_copy(update={"wear": ((1, 2), (1, 2))})
+    with pytest.raises(RejectedError, match=r"^the manifest must be that of a core, not another file$"):
+        read_manifest(core("parallel").manifest.encode(), core("parallel").certificate, wrong)
+
+
+def test_without_a_rate_no_time_to_settle_is_held(core: Callable[[str], Core]) -> None:
+    certificate = core("parallel").certificate
+    about = certificate.about
+    assert about is not None
+    assert about.item is not None
+    assert certificate.claims.settling
+    assert manifest._specified(certificate, about.item)["settling"] is not None
+    words = "\n".join(line for line in about.specification.splitlines() if not line.startswith("sample_rate"))
+    other = certificate.model_copy(update={"about": about.model_copy(update={"specification": words})})
+    assert manifest._specified(other, about.item)["settling"] is None

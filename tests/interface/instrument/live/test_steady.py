@@ -68,8 +68,8 @@ def test_what_was_kept_before_does_not_count_and_a_filter_settles() -> None:
 
 def test_results_of_the_target_before_do_not_count() -> None:
     """The board has kept 255 of them, which stand still as well."""
-    steady, _ = reader(lambda t: 2.0 if t < 10 else 5.0, clock := Time())
-    clock.now = 10.0
+    steady, _ = reader(lambda t: 2.0 if t < 1 else 5.0, clock := Time())
+    clock.now = 1.0
     assert steady.read(0.1, 0.002).value == pytest.approx(clearance(5.0), abs=0.002)
 
 
