@@ -409,6 +409,20 @@ class Pipeline:
         words = [word for _, word in cases(fixed, lambda case: self.at(position, case).net(name))]
         return words[0]
 
+    def codes_of(self, bits: Bits) -> Iterator[Form]:
+        """Yield what bits of a net are for a sample at each position where that is the same in all cases."""
+        width = self._netlist.width(bits)
+        for position in range(self._source, len(self._control.valid)):
+            fixed = {RESET: 1, self._control.full: 0}
+            if position >= 0:
+                fixed[self._control.valid[position]] = 1
+            try:
+                words = [word for _, word in cases(fixed, partial(self._part_at, bits, position))]
+                if all(self.same(words[0], word, width) for word in words[1:]):
+                    yield words[0]
+            except RejectedError:
+                continue
+
     def check_states(self) -> None:
         """Prove by induction that each state holds the code of its DELAY node.
 
@@ -442,8 +456,8 @@ class Pipeline:
                 right = self.same(word, wanted, part.width)
                 require(right, f"{net} must be {self._graph.nodes[source].label}, not another value")
 
-    def _part_at(self, part: _Part, position: int, case: Case) -> Form:
-        return self.at(position, case).net(*part)
+    def _part_at(self, part: _Part | Bits, position: int, case: Case) -> Form:
+        return self.at(position, case).net(part.name, part.low, part.width)
 
     def _check_state(self, name: str) -> None:
         state, register = self.states[name], self._netlist.registers[name]

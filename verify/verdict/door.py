@@ -177,6 +177,7 @@ def _files_proven(
     manifest = read_manifest(contents[json], certificate, item)
     proofs, decimator = _hardware_proven(certificate, item, text, progress)
     manifest.hold_clocks(proofs.hardware or proofs.unit if certificate.decimation is None else None)
+    manifest.hold_cost(certificate, item, proofs)
     manifest.hold_program(proofs.program)
     progress("C model", 0, 0)
     source, header = (unicode_text(name, contents[name]) for name in (c, h))
