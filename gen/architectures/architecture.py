@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar
@@ -241,9 +240,9 @@ class Architecture(ABC):
         return None
 
     @property
-    def _sized(self) -> tuple[Sequence[Graph], Sequence[frozenset[int]]]:
-        """What is computed at a clock, and its products by constants that are made of adders."""
-        return self.graphs, self.adders
+    def _own_cost(self) -> Cost:
+        """Operators of what is computed at a clock."""
+        return cost_of_graphs(self.graphs, self.adders)
 
     @property
     def cost(self) -> Cost:
@@ -251,15 +250,14 @@ class Architecture(ABC):
 
         Those of a calibration before a decimator are among them, unless that alone has a program.
         """
-        own = cost_of_graphs(*self._sized)
+        own = self._own_cost
         apart = self.calibration is None or (self.program is None and self.calibration.program is not None)
         return own if self.calibration is None or apart else self.calibration.cost.beside(own)
 
     @property
     def multiplier_blocks(self) -> int:
         """Multiplier blocks that it takes, without what stands before a decimator."""
-        sizes = cost_of_graphs(*self._sized).multiplications
-        return sum(product.blocks_of(self.blocks.bits) for product in sizes)
+        return sum(product.blocks_of(self.blocks.bits) for product in self._own_cost.multiplications)
 
     @property
     def memory_bits(self) -> int | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -12,13 +11,12 @@ from sosmith.gen.architectures.blocks import NO_LIMIT, Blocks
 from sosmith.gen.architectures.look_ahead_products import products_for
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.specification.combinations import PARALLEL
-from sosmith.gen.word_lengths.cost import products_from_adders
+from sosmith.gen.word_lengths.cost import Cost, cost_of_graphs, products_from_adders
 from sosmith.gen.word_lengths.objective import FEW_ADDERS, SMALL_AREA, Objective
 from sosmith.hdl.plan import parallel_clocks
 from sosmith.hdl.plan.look_ahead import Products, in_pieces
 from sosmith.model.dataflow.adder_graph import scalings
 from sosmith.model.dataflow.datapath import Datapath
-from sosmith.model.dataflow.graph import Graph
 from sosmith.model.reload.constants import with_room
 
 if TYPE_CHECKING:
@@ -57,12 +55,18 @@ class Parallel(Architecture):
         return products_for(self.graphs, self.blocks) if self.look_ahead else None
 
     @cached_property
-    def _sized(self) -> tuple[Sequence[Graph], Sequence[frozenset[int]]]:
-        """What is computed at a clock, with products in pieces as multiplier blocks take them; which adders make."""
-        if self.products is None:
-            return super()._sized
-        pieces = in_pieces(self.graphs, self.products)
-        return [graph for graph, _ in pieces], [scalings(graph) - blocks for graph, blocks in pieces]
+    def _own_cost(self) -> Cost:
+        """Operators at a clock, with products in pieces as multiplier blocks take them where there is look-ahead.
+
+        Products made of adders share sums within a pipeline stage.
+        """
+        if self.products is not None:
+            pieces = in_pieces(self.graphs, self.products)
+            return cost_of_graphs(
+                [graph for graph, _ in pieces], [scalings(graph) - blocks for graph, blocks in pieces]
+            )
+        clocks = parallel_clocks.pipeline_stages_of(self.graphs, self.channels, self.protect, self.adders)
+        return cost_of_graphs(self.graphs, self.adders, pipeline_stages=clocks)
 
     @cached_property
     def built(self) -> Datapath:

@@ -7,6 +7,7 @@ import math
 from amaranth.lib.wiring import Component
 
 from sosmith.gen.chain.design import ChainDesign, StageDesign
+from sosmith.gen.chain.rates import Pattern, pattern_of
 from sosmith.gen.chain.shared_hardware import shared_hardware
 from sosmith.gen.chain.top import chain_interface, registers_port, top_text
 from sosmith.gen.output.identity import BoardItem
@@ -15,6 +16,7 @@ from sosmith.hdl.boards.chain_core import ChainCore
 from sosmith.hdl.boards.channel_holder import CLOCKS, HeldChannels
 from sosmith.model.dataflow.status import Flag
 from sosmith.model.errors import SpecificationError
+from sosmith.model.link.protocol import MAX_BODY
 from sosmith.model.reload.registers import ADDRESS_BITS
 
 
@@ -24,17 +26,15 @@ def chain_item(design: ChainDesign) -> BoardItem:
     Raises
     ------
     SpecificationError
-        If it interpolates, or more than one stage has registers.
+        If the link has no whole number of results for a sample, too many for a message, or those of one channel with
+        samples of others, or more than one stage has registers.
     """
     spec, loaded = design.spec.base, _loaded(design)
-    channels, factor = spec.channels, design.factor
-    if design.rise > 1:
-        raise SpecificationError(
-            f"{spec.path}: interpolate must be left out on a board, whose link returns one result for each sample"
-        )
+    channels = spec.channels
     first, last = design.stages[0].design.datapath, design.stages[-1].design.datapath
+    results, copies = results_and_copies(pattern_of(design.rates), channels, last.output.bytes, spec.path)
     face = chain_interface(design)
-    in_turn = factor > 1 and channels > 1
+    in_turn = copies > 1 and channels > 1
     latency = face.latency_cycles + (CLOCKS if in_turn else 0)
     fingerprint = None if loaded is None else loaded.design.architecture.fingerprint
 
@@ -44,12 +44,12 @@ def chain_item(design: ChainDesign) -> BoardItem:
             first.inputs,
             last.output,
             channels=channels,
-            factor=1 if in_turn else factor,
+            factor=1 if in_turn else copies,
             registers="" if loaded is None else registers_port(loaded),
             address_bits=ADDRESS_BITS,
             lock=loaded is not None and bool(loaded.design.spec.hardware.reload_lock),
         )
-        return HeldChannels(core, factor, channels) if in_turn else core
+        return HeldChannels(core, copies, channels) if in_turn else core
 
     return BoardItem(
         name=design.name,
@@ -60,14 +60,54 @@ def chain_item(design: ChainDesign) -> BoardItem:
         output=last.output,
         flags=dict(face.outputs.flags),
         possible=_possible(design, loaded),
-        cycles_per_sample=latency if in_turn else _cycles(design),
+        cycles_per_sample=latency if in_turn else math.ceil(design.clocks_per_sample),
         latency_cycles=latency,
         fingerprint=fingerprint,
         words=0 if loaded is None else loaded.design.architecture.bank_size[0],
         component=component,
         make_verilog=lambda: top_text(design),
         make_modules=lambda: modules(design),
+        results=results,
     )
+
+
+def results_and_copies(pattern: Pattern, channels: int, result_bytes: int, path: object) -> tuple[int, int]:
+    """Return the results of each sample on the link, and how often the board repeats each of the chain's.
+
+    Parameters
+    ----------
+    pattern : Pattern
+        Which samples bring results.
+    channels : int
+        Number of channels.
+    result_bytes : int
+        Bytes of a result, without its flags.
+    path : object
+        What an error begins with.
+
+    Raises
+    ------
+    SpecificationError
+        If there is no such number, or a message is too short.
+    """
+    rise, factor = pattern.rise, pattern.factor
+    if rise % factor and factor % rise:
+        raise SpecificationError(
+            f"{path}: interpolate and decimate must make the rate a whole multiple or a whole part on a board, whose "
+            f"link returns as many results for each sample, not {rise} / {factor} of it"
+        )
+    if pattern.rises_last and factor > 1 and channels > 1:
+        raise SpecificationError(
+            f"{path}: interpolate must come before decimate on a board with several channels: behind it, a sample "
+            "brings results that leave with later samples, which may be those of another channel"
+        )
+    results, most = max(rise // factor, 1), (MAX_BODY - 1) // (result_bytes + 1)
+    if results > most:
+        raise SpecificationError(
+            f"{path}: interpolate must give at most {most} results for each sample on a board, as many as fit a "
+            f"message of the link, not {results}"
+        )
+    return results, max(factor // rise, 1)
 
 
 def modules(design: ChainDesign) -> str:
@@ -91,15 +131,6 @@ def _loaded(design: ChainDesign) -> StageDesign | None:
             f"registers of one core, not of {names}"
         )
     return stages[0] if stages else None
-
-
-def _cycles(design: ChainDesign) -> int:
-    """Clocks between samples at the highest rate: those of the slowest stage, rounded up."""
-    slowest, factor = 1, 1
-    for stage in design.stages:
-        slowest = max(slowest, math.ceil(stage.design.architecture.clocks_per_sample / factor))
-        factor *= stage.design.datapath.samples_per_result
-    return slowest
 
 
 def _possible(design: ChainDesign, loaded: StageDesign | None) -> tuple[int, ...]:

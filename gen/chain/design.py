@@ -235,12 +235,19 @@ class ChainDesign:
     @cached_property
     def foldings(self) -> tuple[Folding, ...]:
         """What each segment makes of a sine at other frequencies; empty if no stage changes the rate."""
+        if self.limited is not None and self.spec.span is None:
+            return (self.limited,)
         return foldings_of(self.spec, self.parts)
+
+    @cached_property
+    def limited(self) -> Folding | None:
+        """The same of the stages that the limits hold of, with the gains in their pass band; None without limits."""
+        return limited_of(self.spec, [stage.parts for stage in self.stages])
 
     @property
     def excess(self) -> tuple[str, ...]:
         """Which limits the chain does not keep to, a phrase for each; nothing if it keeps to all, or has none."""
-        return excess_of(self.spec.limits, self.foldings)
+        return excess_of(self.spec.limits, self.limited)
 
     @property
     def clocks_per_sample(self) -> float:
@@ -311,18 +318,30 @@ class ChainDesign:
 
 
 def foldings_of(spec: ChainSpec, parts: Sequence[Part]) -> tuple[Folding, ...]:
-    """Return what each segment of parts makes of a sine at other frequencies."""
+    """Return what each segment of parts makes of a sine at other frequencies, without limits of the whole."""
     segments = [each for each in segments_of(parts) if each.rise > 1 or each.factor > 1]
-    return tuple(_folding(spec, each) for each in segments)
+    edge = None if spec.edge is None else spec.edge / spec.base.sample_rate
+    return tuple(_folding(each, edge) for each in segments)
 
 
-def _folding(spec: ChainSpec, segment: Segment) -> Folding:
-    edge = None if spec.edge is None else spec.edge / spec.base.sample_rate / segment.highest
+def limited_of(spec: ChainSpec, parts: Sequence[Sequence[Part]]) -> Folding | None:
+    """Return what the stages that limits hold of make of a sine, by the parts of each stage; None without limits."""
+    limits = spec.limits
+    if limits is None:
+        return None
+    first, end = spec.span or (0, len(parts))
+    rate = spec.stages[first].rate
+    (segment,) = segments_of([part for each in parts[first:end] for part in each])
+    return replace(_folding(segment, limits.passband_edge / rate), kept=_kept(segment, limits, rate))
+
+
+def _folding(segment: Segment, edge: Fraction | None) -> Folding:
+    """Return what a segment makes of a sine; the edge of the pass band is in units of the chain's first rate."""
+    edge = None if edge is None else edge / segment.highest
     if edge is not None and 2 * edge * max(segment.rise, segment.factor) > 1:
         edge = None
     passing = None if edge is None else gain_into_passband(segment, edge)
-    kept = None if spec.limits is None else _kept(segment, spec.limits, spec.base.sample_rate)
-    return Folding(segment=segment, anywhere=folding_gain(segment), edge=edge, passing=passing, kept=kept)
+    return Folding(segment=segment, anywhere=folding_gain(segment), edge=edge, passing=passing, kept=None)
 
 
 def _kept(segment: Segment, limits: Limits, rate: Fraction) -> Kept:
@@ -331,11 +350,10 @@ def _kept(segment: Segment, limits: Limits, rate: Fraction) -> Kept:
     return Kept(least=least, most=most, stop=stop, stopped=None if stop is None else gain_from(segment, stop))
 
 
-def excess_of(limits: Limits | None, foldings: Sequence[Folding]) -> tuple[str, ...]:
-    """Say which limits gains do not keep to, as they stand in a certificate."""
-    if limits is None:
+def excess_of(limits: Limits | None, folding: Folding | None) -> tuple[str, ...]:
+    """Say which limits the gains of the stages that have them do not keep to, as they stand in a certificate."""
+    if limits is None or folding is None:
         return ()
-    (folding,) = foldings
     kept, passing = folding.kept, folding.passing
     assert kept is not None
     assert passing is not None

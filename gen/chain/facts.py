@@ -24,7 +24,8 @@ def chain_tables(design: ChainDesign) -> list[Table]:
     if design.settling:
         tables.append(_start(design))
     tables += [_folding(design, each) for each in design.foldings]
-    tables += [_kept(design, each.kept) for each in design.foldings if each.kept is not None]
+    if design.limited is not None and design.limited.kept is not None:
+        tables.append(_kept(design, design.limited, design.limited.kept))
     return tables
 
 
@@ -34,10 +35,12 @@ def limits(design: ChainDesign) -> list[tuple[float, float, float, str]]:
     return [(edge, end, top, name) for (edge, end, name), top in zip(bands(design), most, strict=True)]
 
 
-def _kept(design: ChainDesign, kept: Kept) -> Table:
-    """Say how the gain from end to end keeps to the limits of the whole."""
-    rate, limits = design.spec.base.sample_rate, design.spec.limits
+def _kept(design: ChainDesign, folding: Folding, kept: Kept) -> Table:
+    """Say how the gain of the whole, or of some stages from end to end, keeps to its limits."""
+    first, end = design.spec.span or (0, len(design.stages))
+    rate, limits = design.stages[first].spec.rate, design.spec.limits
     assert limits is not None
+    whose = "the whole" if design.spec.span is None else _from_to(design, first, end - 1)
     most = kept.most.gain
     droop = loss_of(kept.least.gain, most)
     rows = [
@@ -45,12 +48,16 @@ def _kept(design: ChainDesign, kept: Kept) -> Table:
         Fact("Smallest gain", _decibels(kept.least), sentence=f"reached at {_frequency(kept.least.at * rate)}"),
         Fact("Droop and ripple", decibels(droop), sentence=f"at most {float(limits.passband_loss):g} dB asked"),
     ]
-    (folding,) = design.foldings
     for what, peak in (("Aliases into the pass band", folding.passing), ("In the stop band", kept.stopped)):
         if peak is not None:
             asked = f"at least {float(limits.stopband_loss):g} dB below the largest gain asked"
             rows.append(Fact(what, decibels(-loss_of(peak.gain, most)), sentence=asked))
-    return Table(f"Pass band of the whole, up to {_frequency(limits.passband_edge)}, proven", rows)
+    return Table(f"Pass band of {whose}, up to {_frequency(limits.passband_edge)}, proven", rows)
+
+
+def _from_to(design: ChainDesign, first: int, last: int) -> str:
+    names = [design.stages[k].spec.name for k in dict.fromkeys((first, last))]
+    return " to ".join(names)
 
 
 def _stages(design: ChainDesign) -> Table:

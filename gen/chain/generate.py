@@ -26,6 +26,7 @@ from sosmith.verify.chain.chain_file import (
     FoldingEntry,
     KeptEntry,
     LargestEntry,
+    LimitedEntry,
     sealed_chain,
 )
 
@@ -161,6 +162,7 @@ def _certified(
             bound=sum((entry.error * entry.gain for entry in entries), Fraction(0)),
             settling=design.settling,
             folding=tuple(map(_folding, design.foldings)),
+            limited=_limited(design),
             files=tuple(_file(name, text) for name, text in own.items()),
             certificate="0" * 64,
         )
@@ -176,6 +178,14 @@ def _folding(folding: Folding) -> FoldingEntry:
         passing=None if folding.passing is None else _largest(folding.passing),
         kept=None if folding.kept is None else _kept(folding.kept),
     )
+
+
+def _limited(design: ChainDesign) -> LimitedEntry | None:
+    """Return what is claimed of some stages that have limits; None if those are of all stages, or there are none."""
+    if design.spec.span is None or design.limited is None:
+        return None
+    first, end = design.spec.span
+    return LimitedEntry(**dict(_folding(design.limited)), first=first, last=end - 1)
 
 
 def _kept(kept: Kept) -> KeptEntry:

@@ -15,8 +15,8 @@ from sosmith.gen.chain.design import (
     ChainDesign,
     StageDesign,
     excess_of,
-    foldings_of,
     gains_to_the_end,
+    limited_of,
     parts_of,
     reach_behind,
 )
@@ -98,7 +98,7 @@ def reload_chain(design: ChainDesign, wanted: ChainSpec, *, reset: bool) -> Chai
             "to be loaded"
         )
     if wanted.limits is not None:
-        excess = excess_of(wanted.limits, foldings_of(wanted, [part for each in parts for part in each]))
+        excess = excess_of(wanted.limits, limited_of(wanted, parts))
         if excess:
             raise ShortfallError(
                 f"the limits of the chain must be kept with the set, and are not: {'; '.join(excess)}: nothing is to "

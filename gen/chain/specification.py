@@ -14,7 +14,7 @@ from math import prod
 from pathlib import Path
 from typing import Any
 
-from sosmith.gen.chain.automatic.asked import check_factor, check_kinds, limits_in
+from sosmith.gen.chain.automatic.asked import Place, check_factor, check_kinds, limits_in
 from sosmith.gen.chain.automatic.limits import KEYS, LIMITS, Limits
 from sosmith.gen.chain.automatic.structures import MAX_STAGES
 from sosmith.gen.specification.choices import AUTO, FIR_FAMILIES, MAX_DECIMATION, MAX_DOWNSAMPLING, MAX_TAPS
@@ -217,7 +217,9 @@ class ChainSpec:
     stages : tuple of StageSpec
         In the order of the samples.
     limits : Limits or None
-        What is asked of the whole.
+        What is asked of the whole, or of some stages.
+    span : tuple of int or None
+        Number of the first of these, and of the one behind the last; None for all.
     is_written : bool
         Whether the stages were chosen for one of the kind auto, so that nobody has the text yet.
     tree : mapping
@@ -229,13 +231,14 @@ class ChainSpec:
     text: str
     stages: tuple[StageSpec, ...]
     limits: Limits | None = None
+    span: tuple[int, int] | None = None
     is_written: bool = False
     tree: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
     @property
     def is_automatic(self) -> bool:
         """Whether the stages have to be chosen first, for the one of the kind auto."""
-        return self.stages[0].kind == AUTO
+        return any(stage.kind == AUTO for stage in self.stages)
 
     @property
     def is_steady(self) -> bool:
@@ -264,8 +267,8 @@ class ChainSpec:
 
     @property
     def edge(self) -> Fraction | None:
-        """Upper edge of the pass band, in Hz: that of the limits, or the lowest of a stage; None without one."""
-        if self.limits is not None:
+        """Upper edge of the pass band, in Hz: that of limits of all stages, or the lowest of one; None without one."""
+        if self.limits is not None and self.span is None:
             return self.limits.passband_edge
         return min((stage.edge for stage in self.stages if stage.edge is not None), default=None)
 
@@ -354,14 +357,16 @@ def _checked(tree: dict[str, Any], path: Path, text: str | None) -> ChainSpec:
     _check_names([stage.name for stage in read])
     _check_factors(read)
     check_kinds(kinds)
+    limits, span = limits_in(
+        tree, [Place(each.name, each.kind, each.rate, each.factor, rises=each.rise > 1) for each in read]
+    )
     chain = ChainSpec(
         base=base,
         source={key: to_json(value) for key, value in tree.items()},
         text=text if text is not None else toml_text(tree),
         stages=tuple(read),
-        limits=limits_in(
-            tree, base.sample_rate, prod(each.factor for each in read), rises=any(each.rise > 1 for each in read)
-        ),
+        limits=limits,
+        span=span,
         tree=tree,
     )
     _check_steps(chain)

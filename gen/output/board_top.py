@@ -76,6 +76,7 @@ def board_top(
         channels=design.spec.channels,
         schedule=schedule,
         packing=about.packing,
+        results=item.results,
         waits=waits,
     )
 

@@ -30,7 +30,7 @@ _ROOM = 1.1
 
 @dataclass(frozen=True, kw_only=True)
 class BoardItem:
-    """What stands in a board, with one result for each sample.
+    """What stands in a board, with one result for each sample, or with several.
 
     Attributes
     ----------
@@ -60,6 +60,8 @@ class BoardItem:
         Makes its SystemVerilog, whose digest the board tells.
     make_modules : callable
         Makes the SystemVerilog of modules that the component takes as they are.
+    results : int
+        Results of each sample.
     """
 
     name: str
@@ -77,6 +79,7 @@ class BoardItem:
     component: Callable[[], Component]
     make_verilog: Callable[[], str]
     make_modules: Callable[[], str] = lambda: ""
+    results: int = 1
 
     @cached_property
     def verilog(self) -> str:
@@ -181,10 +184,13 @@ def _identity(item: BoardItem, verilog: str, baud: int, clock: float, source: Li
         output=_quantity(item.output),
         flags=item.flags | ({} if source == "link" else CONVERTER_FLAGS),
         reload=None if item.fingerprint is None else Reload(design=item.fingerprint, words=item.words),
+        results=item.results,
     )
     of_one_sample = of_one_sample.model_copy(
-        update={"samples": samples_per_message(of_one_sample.sample_bytes, of_one_sample.result_bytes)}
+        update={"samples": samples_per_message(of_one_sample.sample_bytes, item.results * of_one_sample.result_bytes)}
     )
+    if item.results > 1:  # the link has no packed form of these
+        return of_one_sample
     return of_one_sample.model_copy(update={"packed": _packed(item, of_one_sample)})
 
 

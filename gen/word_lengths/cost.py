@@ -143,16 +143,19 @@ def cost_of_graphs(
     graphs: Sequence[Graph],
     from_adders: Sequence[Collection[int]] = (),
     bits: Callable[[Graph, Collection[int]], int] | None = None,
+    pipeline_stages: Sequence[Sequence[int]] = (),
 ) -> Cost:
     """Count the operators of a chain of graphs; the products in `from_adders`, by graph, are made of adders.
 
-    `bits` says how many adder bits products of a graph take; None for those of the sums that are really made.
+    `bits` says how many adder bits products of a graph take; None for those of the sums that are really made. These are
+    shared by products in the same pipeline stage; `pipeline_stages` has that of each node, by graph.
     """
     multiplications: list[Multiplication] = []
     adders = registers = 0
-    for graph, products in zip(graphs, from_adders or [()] * len(graphs), strict=True):
+    for k, (graph, products) in enumerate(zip(graphs, from_adders or [()] * len(graphs), strict=True)):
         nodes, used = graph.nodes, used_bits(graph)
-        adders += (bits or _bits_of_products)(graph, products)
+        for together in _by_stage(products, pipeline_stages[k]) if pipeline_stages else [products]:
+            adders += (bits or _bits_of_products)(graph, together)
         for index, node in enumerate(nodes):
             if index in products:
                 continue
@@ -222,6 +225,14 @@ def products_from_adders(
         from_adders[k].add(index)
         needed -= taken
     return tuple(map(frozenset, from_adders))
+
+
+def _by_stage(products: Collection[int], pipeline_stages: Sequence[int]) -> list[list[int]]:
+    """Return products by their pipeline stages."""
+    groups: dict[int, list[int]] = {}
+    for index in sorted(products):
+        groups.setdefault(pipeline_stages[index], []).append(index)
+    return list(groups.values())
 
 
 def _bits_of_products(graph: Graph, products: Iterable[int]) -> int:

@@ -63,6 +63,8 @@ class BoardTop(wiring.Component):
         When the front-end reads which converter; None for a core that is fed over the link.
     packing : Packing or None
         The form of packed results; None for a link without them.
+    results : int
+        Results of each sample.
     waits : bool
         Whether `rst` is high until the clock has its frequency, and nothing may come over the line before.
 
@@ -93,6 +95,7 @@ class BoardTop(wiring.Component):
         channels: int = 1,
         schedule: Schedule | None = None,
         packing: Packing | None = None,
+        results: int = 1,
         waits: bool = False,
     ) -> None:
         self.core, self.memory, self.ratio, self.schedule, self.waits = core, memory, ratio, schedule, waits
@@ -103,6 +106,7 @@ class BoardTop(wiring.Component):
             address_bits=len(core.s_axil_awaddr) if hasattr(core, "s_axil_awaddr") else 0,
             readings=0 if schedule is None else channels * len(schedule.readings),
             packing=packing,
+            results=results,
         )
         members: dict[str, In | Out] = {"clk": In(1), "rst": In(1), "rx": In(1), "tx": Out(1), "leds": Out(LEDS)}
         if schedule is not None:

@@ -83,6 +83,8 @@ class Face:
         Inputs of all channels that a front-end reads from converters; 0 for a core that is fed over the link.
     packing : Packing or None
         The form of packed results; None for a link without them.
+    results : int
+        Results of each sample; more than 1 for a core that is fed over the link, without packed results.
     """
 
     sample_bytes: int
@@ -91,6 +93,7 @@ class Face:
     address_bits: int = 0
     readings: int = 0
     packing: Packing | None = None
+    results: int = 1
 
     def __post_init__(self) -> None:
         if not 1 <= self.channels <= MAX_CHANNELS:
@@ -99,6 +102,11 @@ class Face:
             raise ValueError(f"sample_bytes must be 1 to {MAX_SAMPLE_BYTES}, not {self.sample_bytes}")
         if not 0 <= self.readings <= MAX_READINGS:
             raise ValueError(f"readings must be 0 to {MAX_READINGS}, not {self.readings}")
+        if self.results > 1 and (self.readings or self.packing is not None):
+            raise ValueError(f"results must be 1 with converters or packed results, not {self.results}")
+        if self.samples < 1:
+            most = (MAX_BODY - 1) // self.response_bytes
+            raise ValueError(f"results must be 1 to {most}, as many as fit a message, not {self.results}")
 
     @property
     def response_bytes(self) -> int:
@@ -108,7 +116,7 @@ class Face:
     @property
     def samples(self) -> int:
         """How many samples fit a message."""
-        return samples_per_message(self.sample_bytes, self.response_bytes)
+        return samples_per_message(self.sample_bytes, self.results * self.response_bytes)
 
     @property
     def polled(self) -> int:
@@ -275,6 +283,7 @@ class _Machine:
         self.status = Signal(3)
         self.expected = Signal(8)
         self.retained = Signal(2)  # the next number; responses that can be sent again
+        self.left = Signal(range(engine.face.results))  # results of the sample that are still to come
         self.gap = Signal()  # a result was given up since the channel of the first one was told
         self.target = Signal(8)  # channel, address of a register, or block of the identity
         # Of packed results, the bits of the byte that is being filled, and their number.
@@ -517,18 +526,23 @@ class _Machine:
                 self.answer(Status.OK)
 
     def feed(self) -> None:
-        """Give the core a sample, and wait for its result."""
+        """Give the core a sample, and wait for its result, or for each of its results."""
         m, engine = self.m, self.engine
         with m.State("feed"):
             m.d.comb += engine.s_axis_tvalid.eq(1)
             with m.If(engine.s_axis_tready):
+                if self.face.results > 1:
+                    m.d.sync += self.left.eq(self.face.results - 1)
                 m.next = "result"
         with m.State("result"):
             m.d.comb += engine.m_axis_tready.eq(1)
             with m.If(engine.m_axis_tvalid):
                 self.took(Cat(engine.m_axis_tdata, engine.m_axis_tuser))
                 if self.face.channels > 1:
-                    m.d.sync += self.target.eq(Mux(self.target == self.face.channels - 1, 0, self.target + 1))
+                    following: Value = Mux(self.target == self.face.channels - 1, 0, self.target + 1)
+                    if self.face.results > 1:
+                        following = Mux(self.left.any(), self.target, following)
+                    m.d.sync += self.target.eq(following)
 
     def took(self, result: Value) -> None:
         """Take a result with its status, to append it to the response."""
@@ -569,6 +583,10 @@ class _Machine:
             m.d.sync += self.word.eq(self.word[8:])
             with m.If(self.counted(last)):
                 m.next = "more" if self.face.readings else "load"
+                if self.face.results > 1:
+                    with m.If(self.left != 0):
+                        m.d.sync += self.left.eq(self.left - 1)
+                        m.next = "result"
                 if self.face.address_bits:
                     with m.If(reads):
                         m.next = "status"

@@ -6,9 +6,10 @@ from collections.abc import Collection, Sequence
 
 from sosmith.hdl.plan.interleaving import Schedule, schedule
 from sosmith.hdl.plan.look_ahead import Products, period, plans
-from sosmith.hdl.plan.pipeline import longest_time, pipeline_depth
+from sosmith.hdl.plan.pipeline import longest_time, pipeline_depth, pipeline_stages
 from sosmith.hdl.plan.unfolding import unfolded_stages
 from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.dataflow.graph import Graph
 from sosmith.model.sections.start import StartStage
 
 _UNIT, _CHAINED, _BESIDE = 0.5e-9, 0.4e-9, 3.6e-9
@@ -40,6 +41,18 @@ def schedules(
     return [
         schedule(stage.graph, channels, rewrites=protect != "none", adders=own)
         for stage, own in zip(datapath.stages, made_of_adders, strict=True)
+    ]
+
+
+def pipeline_stages_of(
+    graphs: Sequence[Graph], channels: int, protect: str, adders: Sequence[Collection[int]]
+) -> list[Sequence[int]]:
+    """Return the pipeline stage of each node of the graphs of stages, without look-ahead."""
+    if channels == 1:
+        return [pipeline_stages(graph) for graph in graphs]
+    return [
+        schedule(graph, channels, rewrites=protect != "none", adders=own).pipeline_stages
+        for graph, own in zip(graphs, adders, strict=True)
     ]
 
 

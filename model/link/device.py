@@ -28,7 +28,10 @@ class Core(Protocol):
         ...
 
     def feed(self, channel: int, samples: bytes) -> bytes:
-        """Return the results of samples, the first of `channel` and the others of those that follow in turn."""
+        """Return the results of samples, the first of `channel` and the others of those that follow in turn.
+
+        Each sample has as many as the identity says, one after the other.
+        """
         ...
 
     def read(self, address: int) -> int | None:

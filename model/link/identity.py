@@ -17,7 +17,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 from sosmith.model.dataflow.status import Flag
 from sosmith.model.errors import LinkError, SpecificationError
 from sosmith.model.link.packing import Packing
-from sosmith.model.link.protocol import BLOCK_BYTES, MAX_IDENTITY, VERSION, samples_per_message
+from sosmith.model.link.protocol import BLOCK_BYTES, MAX_BODY, MAX_IDENTITY, VERSION, samples_per_message
 from sosmith.model.port import Port
 
 MAX_NAME = 64
@@ -101,6 +101,8 @@ class Identity(BaseModel):
         Bit of each flag of a result's status.
     reload : Reload or None
         The registers of a core that can load coefficients.
+    results : int
+        Results for each sample: more than 1 behind a chain that interpolates.
     packed : tuple of int or None
         Bits of the status that packed results have, in increasing order; None if the board packs none.
     """
@@ -123,6 +125,7 @@ class Identity(BaseModel):
     output: Quantity
     flags: dict[Name, Bit]
     reload: Reload | None
+    results: Annotated[int, Field(ge=1, le=MAX_BODY - 1)] = 1
     packed: tuple[Bit, ...] | None = None
 
     @model_validator(mode="after")
@@ -135,6 +138,8 @@ class Identity(BaseModel):
             raise ValueError("Flags of a device with converters should have fault")
         if self.packed is not None and self.packed != tuple(sorted({*self.packed} & {*self.flags.values()})):
             raise ValueError("Packed flags should be bits of flags, in increasing order")
+        if self.results > 1 and (self.packed is not None or self.source == "converter"):
+            raise ValueError("Several results for each sample should be plain, of a device that is fed over the link")
         return self
 
     @property
@@ -163,6 +168,11 @@ class Identity(BaseModel):
         return self.output_port.bytes + 1
 
     @property
+    def result_rate(self) -> float:
+        """Results of a channel in a second."""
+        return self.sample_rate * self.results
+
+    @property
     def packing(self) -> Packing | None:
         """The form of packed results; None if the board packs none."""
         return None if self.packed is None else Packing(self.output_port, self.packed)
@@ -176,7 +186,8 @@ class Identity(BaseModel):
         SpecificationError
             If the text is too long, as it is for very long names.
         """
-        about = self.model_dump(mode="json", exclude={"packed"} if self.packed is None else None)
+        left_out = {"results"} if self.results == 1 else set()
+        about = self.model_dump(mode="json", exclude=left_out | ({"packed"} if self.packed is None else set()))
         text = json.dumps(about, ensure_ascii=False, separators=(",", ":")).encode()
         if len(text) >= MAX_IDENTITY:
             raise SpecificationError(
@@ -202,7 +213,7 @@ class Identity(BaseModel):
                 f"the board's identity must be the JSON of docs/protocol.md, not: {first_fault(error)}"
             ) from None
         json.loads(text, object_pairs_hook=_each_key_once)
-        fitting = samples_per_message(identity.sample_bytes, identity.result_bytes)
+        fitting = samples_per_message(identity.sample_bytes, identity.results * identity.result_bytes)
         if identity.samples > fitting:
             raise LinkError(
                 f"the board's identity must have at most {fitting} samples in a message, not {identity.samples}"

@@ -145,9 +145,9 @@ LAYOUTS = {
     Type.SAMPLES: Layout(
         "`channel`, samples",
         "results",
-        "Feeds samples to the core, and returns a result for each, in the same order. The first sample is of "
-        "`channel`, the others of the channels that follow it in turn, the first after the last. As many as fit both "
-        "bodies. "
+        "Feeds samples to the core, and returns a result for each, in the same order, or as many for each as `results` "
+        "of the identity says, one after the other. The first sample is of `channel`, the others of the channels that "
+        "follow it in turn, the first after the last. As many as fit both bodies. "
         "Unknown to a device with converters.",
     ),
     Type.POLL: Layout(

@@ -15,7 +15,16 @@ from sosmith.model.link.frames import Message
 from sosmith.model.link.identity import Identity
 from sosmith.model.link.integer_core import IntegerCore
 from sosmith.model.link.packing import Packing
-from sosmith.model.link.protocol import LAYOUTS, LINE_BITS, VERSION, Counter, Status, Type, samples_per_message
+from sosmith.model.link.protocol import (
+    LAYOUTS,
+    LINE_BITS,
+    MAX_BODY,
+    VERSION,
+    Counter,
+    Status,
+    Type,
+    samples_per_message,
+)
 from sosmith.model.port import Port
 
 _PART = re.compile(r"<!-- (?P<what>[a-z]+) -->\n.*?<!-- end of (?P=what) -->", re.DOTALL)
@@ -87,7 +96,7 @@ def _counters() -> str:
 
 def _identity() -> str:
     made, _ = _board()
-    return f"```json\n{json.dumps(made.model_dump(mode='json'))}\n```\n"
+    return f"```json\n{json.dumps(made.model_dump(mode='json', exclude={'results'}))}\n```\n"
 
 
 def _ranges() -> str:
@@ -110,13 +119,15 @@ def _ranges() -> str:
         "LSB": f"{gate.MIN_LSB:g} to {gate.MAX_VALUE:g}",
         "unit": f"printable text of {gate.MAX_UNIT} characters at most, none of them a control character",
         "bits of `flags`": "0 to 7, each once; with converters, `fault` is one of the flags",
+        "`results`": f"missing, or 1 to {MAX_BODY - 1}, so many that a message holds those of a sample; "
+        "1 with `packed` or converters",
         "`packed`": "missing, null, or some of the bits of `flags`, in increasing order",
     }
     return "| key | value |\n|---|---|\n" + "".join(f"| {key} | {value} |\n" for key, value in rows.items())
 
 
 def _refused() -> str:
-    text = json.dumps(_board()[0].model_dump(mode="json"))
+    text = json.dumps(_board()[0].model_dump(mode="json", exclude={"results"}))
     edits = (
         ('"sample_rate": 100.0', '"sample_rate": 1e-12'),
         ('"name": "gauge"', r'"name": "gauge\u001b[2J"'),

@@ -9,8 +9,11 @@ from tests.interface.small import filter_design, instrument_design
 
 import sosmith
 from sosmith.host.board import Board
+from sosmith.host.rows import rows
+from sosmith.model.errors import LinkError
 from sosmith.model.link.device import Device
 from sosmith.model.link.frames import Message, Receiver
+from sosmith.model.link.integer_core import IntegerCore
 from sosmith.model.link.protocol import Counter, Status, Type
 from sosmith.sim.virtual_board.line_damage import LineDamage
 
@@ -334,3 +337,50 @@ def test_a_response_has_a_result_for_each_sample() -> None:
         pytest.raises(sosmith.LinkError, match=r"^the board must return 80 results, not 79$"),
     ):
         board.run_codes(random_codes(filter_design(), 100))
+
+
+class Several:
+    """A core with three results for each sample: that of its channel, and twice more."""
+
+    def __init__(self, made: sosmith.Design) -> None:
+        self.channels = made.core.spec.channels
+        self.inner = IntegerCore(made.core.datapath, self.channels)
+
+    def reset(self) -> None:
+        self.inner.reset()
+
+    def feed(self, channel: int, samples: bytes) -> bytes:
+        results = self.inner.feed(channel, samples)
+        size = len(results) // (len(samples) // 4)
+        rows = [results[start : start + size] for start in range(0, len(results), size)]
+        return b"".join(row[:-1] + bytes([flag]) for row in rows for flag in (0, 1, 4))
+
+    def read(self, address: int) -> int | None:
+        return None
+
+    def write(self, address: int, word: int) -> bool:
+        return False
+
+
+def test_several_results_for_each_sample_come_in_the_order_of_time() -> None:
+    made = instrument_design()
+    codes = random_codes(made, 50)
+    about = device_of(made)._identity.model_copy(update={"results": 3, "samples": 26, "packed": None})
+    line = BadLine(Device(about, Several(made)))
+    with Board.on(line) as board:
+        results = board.run_codes(codes)
+    expected = made.core.datapath.compute(codes)
+    assert np.array_equal(results.codes, np.repeat(expected, 3, axis=0))
+    assert results.status.tolist() == [[flag, flag] for _ in range(50) for flag in (0, 1, 4)]
+    times = [row[0] for row in rows(board.identity, results)]
+    assert times[:8] == [n / 300 for n in (0, 0, 1, 1, 2, 2, 3, 3)]
+
+
+def test_a_board_with_fewer_results_than_it_says_is_refused() -> None:
+    made = filter_design()
+    about = device_of(made)._identity.model_copy(update={"results": 2, "samples": 40, "packed": None})
+    with (
+        Board.on(BadLine(Device(about, IntegerCore(made.core.datapath)))) as board,
+        pytest.raises(LinkError, match=r"^the board must return 6 results, not 3$"),
+    ):
+        board.run_codes(random_codes(made, 3))

@@ -81,6 +81,13 @@ class FoldingEntry(Entry):
     kept: KeptEntry | None = None
 
 
+class LimitedEntry(FoldingEntry):
+    """The same of the stages from `first` to `last` by themselves, of which limits are asked."""
+
+    first: Annotated[int, Field(strict=True, ge=0, le=7)]
+    last: Annotated[int, Field(strict=True, ge=0, le=7)]
+
+
 class ChainCertificate(Entry):
     """The certificate of a chain.
 
@@ -88,7 +95,7 @@ class ChainCertificate(Entry):
     at the end. `settling` is the number of results of a channel that are flagged after a start from zero: those until
     all stages have settled, one after the other. `specification` is the whole text, TOML, and `files` are those of the
     whole: those of the stages stand in their own certificates. `certificate` is the SHA-256 of this file's own text
-    with 64 zeros in this place.
+    with 64 zeros in this place. `limited` is None where limits are those of all stages, or there are none.
     """
 
     format: Literal["sosmith chain certificate 1"]
@@ -102,6 +109,7 @@ class ChainCertificate(Entry):
     bound: Rational
     settling: Annotated[int, Field(strict=True, ge=0, le=1 << 30)] = 0
     folding: Annotated[tuple[FoldingEntry, ...], Field(max_length=8)] = ()
+    limited: LimitedEntry | None = None
     files: Annotated[tuple[FileEntry, ...], Field(max_length=32)] = ()
     certificate: Sha256
 

@@ -26,7 +26,7 @@ from sosmith.verify.certificate_file import (
 from sosmith.verify.chain.c_model import check_chain_model
 from sosmith.verify.chain.chain_file import ChainCertificate, ChainStageEntry, sealed_chain
 from sosmith.verify.chain.flags import FlagsClaim, timing_of
-from sosmith.verify.chain.folding import check_folding
+from sosmith.verify.chain.folding import check_folding, check_limited
 from sosmith.verify.chain.manifest import check_chain_manifest
 from sosmith.verify.chain.responses import Part, factor_of, parts_of, peak_gain, reach_of, rise_of
 from sosmith.verify.chain.top import Stage, check_top
@@ -147,7 +147,9 @@ def judge_chain(
         budget = _check_bound(chain, groups, steady=steady)
         progress("folding", 0, 0)
         try:
-            check_folding(chain.folding, [part for cores in groups for part in parts_of(cores)])
+            parts = [parts_of(cores) for cores in groups]
+            check_folding(chain.folding, [part for own in parts for part in own])
+            check_limited(chain.limited, parts)
         except UndecidedError as error:
             raise RejectedError(f"{error} could not be decided") from None
         if text is not None:
@@ -434,11 +436,12 @@ def _scope(
         scope[name] = _together({stage: each.scope[name] for stage, each in stages.items()})
     gains = "each stage's error and its gain to the end bound the whole, and no port between stages limits what passes"
     folds = "; no alias or image has more than the gains that are claimed" if chain.folding else ""
-    if any(entry.kept is not None for entry in chain.folding):
+    if chain.limited is not None or any(entry.kept is not None for entry in chain.folding):
         folds += "; gains in the pass band lie between those that are claimed"
     chained = {"chain": ScopePart(State.PROVEN, gains + folds)}
     if specified:
-        kept = ", and the whole keeps to its limits" if "pass band" in folds else ""
+        whole = "the whole keeps to its" if chain.limited is None else "some of them by themselves keep to their"
+        kept = f", and {whole} limits" if "pass band" in folds else ""
         chained["stages"] = ScopePart(State.PROVEN, f"each stage is the one that the words of the chain ask for{kept}")
     if with_files:
         has = "it has the cores, wires between their streams, and what joins their flags; manifest and C model follow"

@@ -16,7 +16,7 @@ from fractions import Fraction
 from flint import acb, acb_poly, arb, ctx, fmpq
 
 from sosmith.verify.bounds.l1_response import UndecidedError
-from sosmith.verify.chain.chain_file import FoldingEntry, KeptEntry, LargestEntry
+from sosmith.verify.chain.chain_file import FoldingEntry, KeptEntry, LargestEntry, LimitedEntry
 from sosmith.verify.chain.responses import Part, Run, runs_of
 from sosmith.verify.graph import RejectedError, require
 
@@ -51,6 +51,18 @@ def check_folding(entries: Sequence[FoldingEntry], parts: Sequence[Part]) -> Non
     )
     for entry, run in zip(entries, runs, strict=True):
         _check_run(entry, run)
+
+
+def check_limited(entry: LimitedEntry | None, parts: Sequence[Sequence[Part]]) -> None:
+    """Check what is claimed of some stages by themselves, by the parts of each stage; errors as `check_folding`."""
+    if entry is None:
+        return
+    require(
+        entry.first <= entry.last < len(parts),
+        f"limits must be of stages that there are, 0 to {len(parts) - 1}, not {entry.first} to {entry.last}",
+    )
+    require(entry.kept is not None, "some stages with limits must claim the gains in their pass band")
+    check_folding([entry], [part for own in parts[entry.first : entry.last + 1] for part in own])
 
 
 def _check_run(entry: FoldingEntry, run: Run) -> None:

@@ -19,6 +19,7 @@ from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.specified.stated_specification import stated_number
 from sosmith.verify.specified.words import with_fractions
 
+_SPAN = ("first", "last")
 _KEYS = ("passband_edge", "passband_loss", "stopband_loss", "stopband_edge")
 _AUTO = "auto"
 _CHOSEN = {"fir", "halfband", "cic", "iir"}
@@ -40,9 +41,18 @@ def limits_of(tree: Mapping[str, Any]) -> Limits | None:
     table = tree.get("limits")
     if table is None:
         return None
-    require(set(table) <= set(_KEYS), f"the limits must have the keys {', '.join(_KEYS)}, not {', '.join(table)}")
+    known = (*_KEYS, *_SPAN)
+    require(set(table) <= set(known), f"the limits must have the keys {', '.join(known)}, not {', '.join(table)}")
     edge, passed, stopped = (stated_number(table[key]) for key in _KEYS[:3])
     return Limits(edge, passed, stopped, stated_number(table[_KEYS[3]]) if _KEYS[3] in table else None)
+
+
+def span_of(tree: Mapping[str, Any]) -> tuple[int, int] | None:
+    """Return the numbers of the first and the last stage that the limits of a specification hold of; None for all."""
+    table, names = tree.get("limits", {}), [stage["name"] for stage in tree["stage"]]
+    if not set(_SPAN) & set(table):
+        return None
+    return names.index(table.get("first", names[0])), names.index(table.get("last", names[-1]))
 
 
 def check_limits(entries: Sequence[FoldingEntry], limits: Limits, rate: Fraction) -> None:
@@ -88,7 +98,7 @@ def _ball(value: Fraction) -> arb:
 
 def is_automatic(tree: Mapping[str, Any]) -> bool:
     """Say whether a specification leaves the stages to the program that made them."""
-    return [stage.get("kind") for stage in tree["stage"]] == [_AUTO]
+    return any(stage.get("kind") == _AUTO for stage in tree["stage"])
 
 
 def check_chosen(asked: Mapping[str, Any], own: Mapping[str, Any]) -> None:
@@ -106,11 +116,19 @@ def check_chosen(asked: Mapping[str, Any], own: Mapping[str, Any]) -> None:
     RejectedError
         If the limits, the decimation or anything else of the whole differ.
     """
-    (stage,) = asked["stage"]
-    _same("the limits", own.get("limits"), {key: stage[key] for key in _KEYS if key in stage})
-    factor = prod(each.get("decimate", 1) for each in own["stage"])
+    kinds = [stage["kind"] for stage in asked["stage"]]
+    require(kinds.count(_AUTO) == 1, "there must be one stage auto, not several")
+    k, others = kinds.index(_AUTO), len(kinds) - 1
+    stage, end = asked["stage"][k], len(own["stage"]) - (others - k)
+    chosen = own["stage"][k:end]
+    require(len(chosen) >= 1, "there must be stages in the place of the stage auto")
+    _same("the stages before those that were chosen", own["stage"][:k], asked["stage"][:k])
+    _same("the stages behind those that were chosen", own["stage"][end:], asked["stage"][k + 1 :])
+    span = {"first": chosen[0]["name"], "last": chosen[-1]["name"]} if others else {}
+    _same("the limits", own.get("limits"), {key: stage[key] for key in _KEYS if key in stage} | span)
+    factor = prod(each.get("decimate", 1) for each in chosen)
     require(factor == stage["decimate"], f"all stages must decimate by {stage['decimate']}, not {factor}")
-    for each in own["stage"]:
+    for each in chosen:
         filters = each["kind"] in _CHOSEN and "interpolate" not in each
         require(filters, f"stage {each['name']} must be a filter that was chosen, not of the kind {each['kind']}")
     for key in sorted({*asked, *own} - {"stage", "limits"}):

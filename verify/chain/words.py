@@ -13,7 +13,7 @@ from typing import Any
 
 from sosmith.verify.certificate_file import Certificate
 from sosmith.verify.chain.chain_file import ChainCertificate
-from sosmith.verify.chain.limits import check_chosen, check_limits, is_automatic, limits_of
+from sosmith.verify.chain.limits import check_chosen, check_limits, is_automatic, limits_of, span_of
 from sosmith.verify.chain.responses import taps_in_turn
 from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.specified.filter_table import read_filter_table
@@ -86,11 +86,33 @@ def _check(chain: ChainCertificate, tree: Mapping[str, Any], groups: Groups, fol
             wanted = with_fractions(_table(stage, rate))
             _same(f"the {table} of stage {stage['name']}", with_fractions(own[table]), wanted)
         rate = rate * rise / stage.get("decimate", 1)
-    if (limits := limits_of(tree)) is not None:
-        check_limits(chain.folding, limits, first)
-    else:
+    limits, span = limits_of(tree), span_of(tree)
+    if limits is None or span is not None:
         require(all(entry.kept is None for entry in chain.folding), "a chain without limits must claim none")
-    _check_edges(chain, stages, first, None if limits is None else limits.passband_edge)
+    _same("the stages with limits of their own", _span_in(chain), span)
+    if limits is not None and span is not None:
+        rates = _rates(stages, first)
+        assert chain.limited is not None  # as it has the span
+        check_limits([chain.limited], limits, rates[span[0]])
+        edge = limits.passband_edge / rates[span[0]]
+        _same("the edge of the pass band that has limits", chain.limited.edge, edge)
+    elif limits is not None:
+        check_limits(chain.folding, limits, first)
+    of_whole = None if limits is None or span is not None else limits.passband_edge
+    _check_edges(chain, stages, first, of_whole)
+
+
+def _span_in(chain: ChainCertificate) -> tuple[int, int] | None:
+    return None if chain.limited is None else (chain.limited.first, chain.limited.last)
+
+
+def _rates(stages: Sequence[Mapping[str, Any]], rate: Fraction) -> list[Fraction]:
+    """Return the rate of the samples of each stage, in Hz."""
+    rates = []
+    for stage in stages:
+        rates.append(rate)
+        rate = rate * stage.get("interpolate", 1) / stage.get("decimate", 1)
+    return rates
 
 
 def _check_core(

@@ -25,7 +25,7 @@ by the name of its DELAY node. Under a wrong name a proof is not found.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from sosmith.verify.certificate_file import Certificate
 from sosmith.verify.graph import RejectedError, require
@@ -36,8 +36,9 @@ from sosmith.verify.parallel.fault import fault
 from sosmith.verify.parallel.flags import flags_of, wear_limits
 from sosmith.verify.parallel.forms import Forms
 from sosmith.verify.parallel.graph_codes import GraphCodes
+from sosmith.verify.parallel.input_fields import DATA
 from sosmith.verify.parallel.netlist import Netlist, flattened
-from sosmith.verify.parallel.pipeline import DATA, Pipeline
+from sosmith.verify.parallel.pipeline import Pipeline
 from sosmith.verify.parallel.register_words import with_memories
 from sosmith.verify.parallel.split import split
 from sosmith.verify.progress import Progress
@@ -54,6 +55,15 @@ _FLAG_BITS = 8
 
 
 @dataclass(frozen=True)
+class Reading:
+    """A core as it was read: its netlist, what its registers hold, and the graph that it computes."""
+
+    netlist: Netlist
+    pipeline: Pipeline
+    graph: GraphCodes
+
+
+@dataclass(frozen=True)
 class HardwareVerdict:
     """The result of the check of the hardware.
 
@@ -67,6 +77,8 @@ class HardwareVerdict:
         Clocks that a sample may have to wait at the entrance for one before it, of its channel.
     clearing : int
         Clocks after a reset in which no sample is taken.
+    reading : Reading or None
+        What was read; None where it was in parts.
     """
 
     registers: int
@@ -75,6 +87,7 @@ class HardwareVerdict:
     latency: int
     waits: int
     clearing: int
+    reading: Reading | None = field(default=None, repr=False, compare=False, kw_only=True)
 
     @property
     def interval(self) -> int:
@@ -176,7 +189,8 @@ def _checked(netlist: Netlist, certificate: Certificate, channels: int, inside: 
     memories = 0 if pipeline.memories is None else len(pipeline.memories.states)
     latency = len(control.valid) + (channels > 1)
     waits, clearing = (0, 0) if control.entrance is None else (len(control.entrance.near), channels)
-    return HardwareVerdict(pipeline.registers, memories, len(pipeline.states) + memories, latency, waits, clearing)
+    states, reading = len(pipeline.states) + memories, Reading(netlist, pipeline, graph)
+    return HardwareVerdict(pipeline.registers, memories, states, latency, waits, clearing, reading=reading)
 
 
 def _check_output(

@@ -41,50 +41,15 @@ from sosmith.verify.parallel.equality import same_word
 from sosmith.verify.parallel.evaluation import Content, Evaluation, KnownBits, none_known
 from sosmith.verify.parallel.forms import Forms, shifted
 from sosmith.verify.parallel.graph_codes import GraphCodes
+from sosmith.verify.parallel.input_fields import DATA, fields_of
 from sosmith.verify.parallel.netlist import Netlist
 from sosmith.verify.parallel.state_memories import State, StateMemories
 from sosmith.verify.parallel.turn_memories import Counter, TurnMemories
-from sosmith.verify.program.normal_form import Form, constant, plus
+from sosmith.verify.program.normal_form import ONE, Form, constant, plus
 from sosmith.verify.reader.syntax import Bits, Choice, Statement
-
-DATA = "s_axis_tdata"
 
 _MOST_OPENED = 8
 """Most variables that are replaced by what they stand for, one after the other, for one comparison."""
-
-
-class _Field(NamedTuple):
-    """Bits of the input: their place, and what they hold as an unsigned word."""
-
-    offset: int
-    width: int
-    word: Form
-
-
-def _fields(graph: GraphCodes, certificate: Certificate, width: int, input_flags: Sequence[Form]) -> list[_Field]:
-    """Return the fields of the input and what is beside them; each begins a byte. Above them are flags of inputs.
-
-    Raises
-    ------
-    RejectedError
-        If they do not fill the input, which has `width` bits.
-    """
-    fields: list[_Field] = []
-    offset = 0
-    for lane in graph.lanes:
-        for node, port in zip(lane.inputs, certificate.inputs, strict=True):
-            fields.append(_Field(offset, port.bits, graph.forms.unsigned(graph.codes[node], port.bits)))
-            offset += port.bits
-            beside = -offset % 8
-            if beside:
-                padding = graph.forms.variable(("padding", node), 0, (1 << beside) - 1)
-                fields.append(_Field(offset, beside, padding))
-            offset += beside
-    for flag in input_flags:
-        fields.append(_Field(offset, 1, flag))
-        offset += 1
-    require(width == offset, f"the port {DATA} must have {offset} bits, not {width}")
-    return fields
 
 
 class _Part(NamedTuple):
@@ -140,12 +105,13 @@ class Pipeline:
     ) -> None:
         self._netlist, self._control, self._graph, self.forms = netlist, control, graph, forms
         self.input_flags = [forms.variable(("input flag", place), 0, 1) for place in range(flag_count)]
-        self._fields = _fields(graph, certificate, netlist.widths[DATA], self.input_flags)
+        self._fields = fields_of(graph, certificate, netlist.widths[DATA], self.input_flags)
         self._dependence = Dependence(netlist, control.cuts)
         self._numbers = itertools.count()
         self._behind: dict[str, int | None] = {}
         self._found: dict[str, Form] = {}
         self._second: dict[str, Form] = {}
+        self._constants: dict[str, Form | None] = {}
         self._open: list[str] = []
         self._followed: set[str] = set()
         self.states: dict[str, State] = {}
@@ -222,8 +188,13 @@ class Pipeline:
             if name in self._counters:
                 counted = self._counters[name]
                 return counted.value if counted.behind == position else self._unknown(name, frame)
-            known = position >= self._source and name not in self._apart and self.behind(name) == position - 1
-            return self.content_of(name) if known else self._unknown(name, frame)
+            if name in self._apart or position < self._source:
+                return self._unknown(name, frame)
+            behind = self.behind(name)
+            if behind is None:
+                always = self.constant_of(name) if position > 0 else None
+                return self._unknown(name, frame) if always is None else always
+            return self.content_of(name) if behind == position - 1 else self._unknown(name, frame)
 
         return content
 
@@ -287,10 +258,26 @@ class Pipeline:
             If it is not loaded whenever a sample moves on, or then not always with the same.
         """
         if name not in self._found:
-            self.behind(name)
+            behind = self.behind(name)
+            always = self.constant_of(name) if behind is None else None
+            require(behind is not None or always is not None, f"{name} must hold a word of a sample, or one constant")
             with self._once(name):
-                self._found[name] = self._taken_over(name)
+                self._found[name] = self._taken_over(name) if always is None else always
         return self._found[name]
+
+    def constant_of(self, name: str) -> Form | None:
+        """Return what a register of no position holds while there is a sample inside; None if that may be anything.
+
+        A sample has moved there since the last reset: what the register takes over whenever samples move is there, too.
+        """
+        if name not in self._constants:
+            with self._once(name):
+                moving = [*self._all_taken(name, 1, {RESET: 1, self._control.full: 0})]
+                standing = [*self._all_taken(name, 1, {RESET: 1, self._control.full: 1})]
+            word = moving[0]
+            same = all(other == word for other in moving) and all(other in (None, word) for other in standing)
+            self._constants[name] = word if same and word is not None and not word.keys() - {ONE} else None
+        return self._constants[name]
 
     def behind(self, name: str) -> int | None:
         """Return the position that a register is loaded behind; None if it only ever takes over constants."""
@@ -369,9 +356,8 @@ class Pipeline:
 
     def _taken_over(self, name: str) -> Form:
         behind = self.behind(name)
+        assert behind is not None
         valid, entrance = self._control.valid, self._control.entrance
-        if behind is None:
-            raise RejectedError(f"{name} must hold a word of a sample, not a constant")
         if behind < 0 and entrance is not None:
             return self._first_of_two(name, entrance.buffer, behind)
         require(behind < self.last, f"{name} must hold a word of a sample inside the pipeline")
@@ -423,6 +409,20 @@ class Pipeline:
         words = [word for _, word in cases(fixed, lambda case: self.at(position, case).net(name))]
         return words[0]
 
+    def codes_of(self, bits: Bits) -> Iterator[Form]:
+        """Yield what bits of a net are for a sample at each position where that is the same in all cases."""
+        width = self._netlist.width(bits)
+        for position in range(self._source, len(self._control.valid)):
+            fixed = {RESET: 1, self._control.full: 0}
+            if position >= 0:
+                fixed[self._control.valid[position]] = 1
+            try:
+                words = [word for _, word in cases(fixed, partial(self._part_at, bits, position))]
+                if all(self.same(words[0], word, width) for word in words[1:]):
+                    yield words[0]
+            except RejectedError:
+                continue
+
     def check_states(self) -> None:
         """Prove by induction that each state holds the code of its DELAY node.
 
@@ -456,8 +456,8 @@ class Pipeline:
                 right = self.same(word, wanted, part.width)
                 require(right, f"{net} must be {self._graph.nodes[source].label}, not another value")
 
-    def _part_at(self, part: _Part, position: int, case: Case) -> Form:
-        return self.at(position, case).net(*part)
+    def _part_at(self, part: _Part | Bits, position: int, case: Case) -> Form:
+        return self.at(position, case).net(part.name, part.low, part.width)
 
     def _check_state(self, name: str) -> None:
         state, register = self.states[name], self._netlist.registers[name]
@@ -500,8 +500,8 @@ class Pipeline:
         sources = self._positions_of(leaves) or {
             contents[leaf].behind for contents in (self.states, self._counters) for leaf in leaves & contents.keys()
         }
-        require(len(sources) == 1, f"{name} must take over a word of one sample, not of {len(sources)}")
-        return sources.pop()
+        require(len(sources) < 2, f"{name} must take over a word of one sample, not of {len(sources)}")
+        return sources.pop() if sources else None
 
     def _positions_of(self, leaves: frozenset[str]) -> set[int]:
         """Return the positions whose samples registers and inputs hold, without states."""

@@ -22,7 +22,7 @@ from sosmith.verify.certificate_file import (
 from sosmith.verify.decimation import samples_of_filter
 from sosmith.verify.graph import inputs_of
 from sosmith.verify.verdict.figures import Figure
-from sosmith.verify.verdict.operators import bits, operators
+from sosmith.verify.verdict.operators import bits
 from sosmith.verify.verdict.recursions import Recursion
 
 _HALF = Fraction(1, 2)
@@ -140,22 +140,6 @@ def section_of(part: Recursion) -> dict[str, Any]:
 
 def _padded(values: Sequence[Fraction]) -> list[Figure]:
     return [Figure(value) for value in [*values, *[Fraction(0)] * (3 - len(values))]]
-
-
-def operators_of(certificate: Certificate, item: ItemEntry) -> dict[str, Any] | None:
-    """Return the operators of the graphs, each by itself; None where units take the place of some."""
-    if item.architecture == "online":
-        return None
-    entry = certificate.decimation
-    stages = list(certificate.stages)
-    program = {"folded", "serial"}
-    if (
-        entry is not None
-        and entry.calibration is not None
-        and (item.architecture in program or item.ahead not in program)
-    ):
-        stages = [*entry.calibration.stages, *stages]
-    return operators(stages)
 
 
 def decimation_of(certificate: Certificate, item: ItemEntry, entry: DecimationEntry, rate: Fraction) -> dict[str, Any]:

@@ -193,6 +193,7 @@ def _files_proven(
     if elsewhere is not None:
         proofs = replace(proofs, hardware=elsewhere.hardware)
     manifest.hold_clocks(proofs.hardware or proofs.unit if certificate.decimation is None else None)
+    manifest.hold_cost(certificate, item, proofs)
     manifest.hold_program(proofs.program)
     progress("C model", 0, 0)
     source, header = (unicode_text(name, contents[name]) for name in (c, h))

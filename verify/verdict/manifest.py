@@ -19,12 +19,12 @@ from sosmith.verify.parallel.check import HardwareVerdict
 from sosmith.verify.program.check import ProgramVerdict
 from sosmith.verify.specified.words import table_of, words_of
 from sosmith.verify.unit.check import UnitVerdict
+from sosmith.verify.verdict.cost import cost_of
 from sosmith.verify.verdict.derived import (
     bound_of,
     decimation_of,
     downsampling_of,
     formats_of,
-    operators_of,
     parts_of,
     section_of,
     settling_of,
@@ -33,6 +33,7 @@ from sosmith.verify.verdict.figures import Figure
 from sosmith.verify.verdict.item import wear_limits
 from sosmith.verify.verdict.recursions import Recursion, is_realized_as, recursions_of
 from sosmith.verify.verdict.resting import limit_cycles_of
+from sosmith.verify.verdict.scope import Proofs
 
 _NO_MANIFEST = (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError, IndexError)
 """What is raised where a manifest has anything else."""
@@ -76,6 +77,17 @@ class Manifest:
         _compare(key, self.tree["decimation"]["cycles_per_result"], verdict.result_clocks)
         self.open.remove(key)
 
+    def hold_cost(self, certificate: Certificate, item: ItemEntry, proofs: Proofs) -> None:
+        """Hold the operators against those of the graphs, made as the hardware that was proven makes them."""
+        try:
+            cost = cost_of(certificate, item, proofs, self.tree["cost"])
+        except _NO_MANIFEST:
+            raise RejectedError("cost in the manifest must be that of a core, not anything else") from None
+        if cost is None:
+            self.open.append("cost")
+        else:
+            _compare("cost", self.tree["cost"], cost)
+
     def hold_program(self, verdict: ProgramVerdict | None) -> None:
         """Hold the schedule against the program of the hardware and what its words hold; None if it was not read."""
         schedule = self.tree["schedule"]
@@ -103,7 +115,7 @@ class Manifest:
 def read_manifest(content: bytes, certificate: Certificate, item: ItemEntry) -> Manifest:
     """Read a manifest, and hold it against a certificate.
 
-    Clocks and program are left to `Manifest.hold_clocks` and `Manifest.hold_program`.
+    Clocks, cost and program are left to `Manifest.hold_clocks`, `Manifest.hold_cost` and `Manifest.hold_program`.
 
     Raises
     ------
@@ -163,11 +175,6 @@ def _check(manifest: Manifest, certificate: Certificate, item: ItemEntry) -> Non
     require((tree["schedule"] is not None) == program, f"the manifest must{'' if program else ' not'} have a schedule")
     if tree["aliasing"] is not None:
         manifest.open.append("aliasing")
-    cost = operators_of(certificate, item)
-    if cost is None or tree["cost"]["multipliers"] != cost["multipliers"]:
-        manifest.open.append("cost")
-    else:
-        _compare("cost", tree["cost"], cost)
 
 
 def _specified(certificate: Certificate, item: ItemEntry) -> dict[str, Any]:

@@ -8,15 +8,24 @@ computed, there and in the sums before. What is added where the other operand ha
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from dataclasses import dataclass
 
 from sosmith.verify.certificate_file import NodeEntry, Operation, StageEntry
 
 _SUMS = frozenset({Operation.ADD, Operation.SUBTRACT})
 
 
-def operators(stages: Sequence[StageEntry]) -> dict[str, Any]:
-    """Return the operators of stages, by the names that a manifest has for them."""
+@dataclass(frozen=True)
+class Operators:
+    """The operators of stages: bits of both operands of each product, of what else takes adders, and of registers."""
+
+    products: list[list[int]]
+    adder_bits: int
+    register_bits: int
+
+
+def operators(stages: Sequence[StageEntry]) -> Operators:
+    """Return the operators of stages."""
     products: list[list[int]] = []
     adders = registers = 0
     for stage in stages:
@@ -29,12 +38,17 @@ def operators(stages: Sequence[StageEntry]) -> dict[str, Any]:
                 adders += bits(operands[0])
             elif node.op is Operation.DELAY:
                 registers += bits(node)
-            elif node.op is Operation.SCALE:
-                products.append([bits(operands[0]), abs(node.parameter).bit_length() + (node.parameter < 0)])
-            elif node.op is Operation.MULTIPLY:
-                products.append([bits(each) for each in operands])
+            elif is_product(node, operands):
+                scale, factor = node.op is Operation.SCALE, node.parameter
+                others = [abs(factor).bit_length() + (factor < 0)] if scale else [bits(operands[1])]
+                products.append([bits(operands[0]), *others])
         registers += sum(bits(stage.nodes[index]) for index in stage.outputs)
-    return {"multipliers": products, "adder_bits": adders, "register_bits": registers}
+    return Operators(products, adders, registers)
+
+
+def is_product(node: NodeEntry, operands: Sequence[NodeEntry]) -> bool:
+    """Whether a node is a product that may take a multiplier; with a single bit, it takes gates."""
+    return node.op is Operation.SCALE or (node.op is Operation.MULTIPLY and not any(map(_is_bit, operands)))
 
 
 def bits(node: NodeEntry) -> int:

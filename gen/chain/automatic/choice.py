@@ -13,13 +13,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from sosmith.gen.chain.automatic.limits import SPAN
 from sosmith.gen.chain.automatic.screen import Cost, Plan, Problem, Wanted, plan
 from sosmith.gen.chain.automatic.stages import tables_of
-from sosmith.gen.chain.automatic.structures import structures
-from sosmith.gen.chain.design import ChainDesign, design_stages
+from sosmith.gen.chain.automatic.structures import MAX_STAGES, structures
+from sosmith.gen.chain.design import ChainDesign, StageDesign, design_stages
 from sosmith.gen.chain.specification import ChainSpec, chain_from_tree
 from sosmith.gen.estimate.estimate import TITLES, USUAL, estimated
 from sosmith.gen.fpga.boards import Board, Device, find_board
+from sosmith.gen.specification.choices import AUTO
 from sosmith.gen.specification.toml_text import toml_text
 from sosmith.model.errors import ShortfallError, SpecificationError
 
@@ -114,19 +116,21 @@ class _Search:
     """The structures for one specification."""
 
     def __init__(self, spec: ChainSpec, board: Board | None, progress: Progress) -> None:
-        base, (stage,) = spec.base, spec.stages
+        base = spec.base
         assert spec.limits is not None
+        (self.place,) = (k for k, each in enumerate(spec.stages) if each.kind == AUTO)
+        stage, behind = spec.stages[self.place], len(spec.stages) - self.place - 1
         self.spec, self.name, self.board, self.progress = spec, stage.name, board, progress
         estimates = board is not None and board.device.family in TITLES
         self.for_costs = board if board is not None and estimates else find_board(USUAL[0])
         self.wanted = Wanted(
             limits=spec.limits,
-            rate=base.sample_rate,
+            rate=stage.rate,
             factor=stage.factor,
             clock=base.hardware.clock,
             channels=base.channels,
-            input_bits=base.inputs[0].bits,
-            output_bits=base.output.bits,
+            input_bits=_between(spec) if self.place else base.inputs[0].bits,
+            output_bits=_between(spec) if behind else base.output.bits,
             between_bits=_between(spec),
             exact_bits=max(1, base.output.bits - math.floor(math.log2(base.max_error / base.output.lsb))),
         )
@@ -169,7 +173,7 @@ class _Search:
     def _families(self) -> list[list[Plan]]:
         """Return the plans of each family, in each and of all the most promising one first."""
         families: dict[tuple[str, ...], list[Plan]] = {}
-        for each in structures(self.wanted.factor):
+        for each in structures(self.wanted.factor, MAX_STAGES + 1 - len(self.spec.stages)):
             families.setdefault(each.family, []).append(plan(each, self.wanted, self.device))
         for plans in families.values():
             plans.sort(key=self._order)
@@ -210,16 +214,20 @@ class _Search:
         except (ShortfallError, SpecificationError) as error:
             candidate.plan.against(Problem(1.0, str(error).removeprefix(f"{self.spec.base.path}: ")))
             return
-        candidate.design, candidate.cost = design, cost_of(design, self.for_costs)
+        candidate.design = design
+        candidate.cost = cost_of(design.stages[self.place : self.place + len(tables)], self.for_costs)
 
     def _written(self, tables: Sequence[dict[str, Any]]) -> ChainSpec:
         """Return the specification of stages in place of the one that was asked for."""
-        source = self.spec.tree
-        limits = {key: value for key, value in source["stage"][0].items() if key not in {"name", "kind", "decimate"}}
+        source, k = self.spec.tree, self.place
+        asked = source["stage"]
+        limits = {key: value for key, value in asked[k].items() if key not in {"name", "kind", "decimate"}}
+        if len(asked) > 1:
+            limits |= dict(zip(SPAN, (tables[0]["name"], tables[-1]["name"]), strict=True))
         tree: dict[str, Any] = {}
         for key, value in source.items():
             if key == "stage":
-                tree |= {"stage": list(tables), "limits": limits}
+                tree |= {"stage": [*asked[:k], *tables, *asked[k + 1 :]], "limits": limits}
             else:
                 tree[key] = value
         head = f"# The stages were chosen for {self.name}, of the kind auto.\n"
@@ -271,7 +279,7 @@ class _Search:
 def _between(spec: ChainSpec) -> int:
     """Return how many bits ports between stages are expected to have: for all inputs, in fine steps of the output's."""
     base = spec.base
-    (port,) = base.inputs
+    port = base.output if len(base.inputs) > 1 else base.inputs[0]
     reach = max(abs(port.zero + port.lsb * code) for code in (port.lowest, port.highest + 1))
     return max(2, math.ceil(math.log2(reach / base.max_error)) + _FINER)
 
@@ -283,10 +291,10 @@ def _closest(plans: Sequence[Plan]) -> str:
     return f"the closest is {structure}, {problem.text}"
 
 
-def cost_of(design: ChainDesign, board: Board) -> Cost:
-    """Return what the cores of a chain take together, by the estimate of each."""
+def cost_of(stages: Sequence[StageDesign], board: Board) -> Cost:
+    """Return what the cores of stages take together, by the estimate of each."""
     total = Cost(0, 0, 0)
-    for stage in design.stages:
+    for stage in stages:
         for core in stage.cores:
             each = estimated(core.architecture, board)
             assert each is not None

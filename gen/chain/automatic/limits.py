@@ -17,6 +17,9 @@ from sosmith.model.suggestion import did_you_mean
 KEYS = ("passband_edge", "passband_loss", "stopband_loss", "stopband_edge")
 """Keys of ``[limits]``; the last one may be left out."""
 
+SPAN = ("first", "last")
+"""Keys of ``[limits]`` with the names of the first and the last stage that they hold of; of all stages without them."""
+
 LIMITS = "limits"
 """Name of the table."""
 
@@ -26,7 +29,7 @@ _LOSSES = {"passband_loss": (Fraction(1, 1000), Fraction(20)), "stopband_loss": 
 
 @dataclass(frozen=True, kw_only=True)
 class Limits:
-    """What is asked of a whole chain.
+    """What is asked of a whole chain, or of some of its stages.
 
     Attributes
     ----------

@@ -56,8 +56,8 @@ class Structure:
         return ", ".join(texts)
 
 
-def structures(factor: int) -> Iterator[Structure]:
-    """Return the structures that decimate by `factor`, of at most `MAX_STAGES` stages.
+def structures(factor: int, most: int = MAX_STAGES) -> Iterator[Structure]:
+    """Return the structures that decimate by `factor`, of at most so many stages.
 
     CIC filters first, as they cost least where samples are many, FIR filters that take any factor, half-band filters,
     and an FIR filter, which makes the pass band; or an IIR filter in its place.
@@ -67,7 +67,7 @@ def structures(factor: int) -> Iterator[Structure]:
     >>> [str(each) for each in structures(4)][:4]
     ['FIR 4', '2 FIRs 2', 'half-band, FIR 2', 'half-band, IIR 2']
     """
-    return (each for each in _structures(factor) if len(each.steps) <= MAX_STAGES)
+    return (each for each in _structures(factor) if len(each.steps) <= most)
 
 
 def _structures(factor: int) -> Iterator[Structure]:

@@ -36,7 +36,7 @@ def response_entry(design: ChainDesign) -> dict[str, float | None]:
 
 
 def _stop(spec: ChainSpec) -> Fraction | None:
-    if spec.limits is not None:
+    if spec.limits is not None and spec.span is None:
         return spec.limits.stopband_edge
     filters = [stage.tables["filter"] for stage in spec.stages]
     return min(

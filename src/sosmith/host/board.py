@@ -167,7 +167,7 @@ class Board:
         Returns
         -------
         Results
-            One result for each sample.
+            One result for each sample; of a chain that interpolates, `Identity.results` for each.
 
         Raises
         ------
@@ -215,12 +215,13 @@ class Board:
         block = self._checked(codes)
         total = block.shape[0] * block.shape[1]
         received = bytearray()
-        size, step = self._identity.result_bytes, self._step
+        size, step = self._identity.results * self._identity.result_bytes, self._step
         for body in self._session.exchange(self._requests(block.reshape(total, -1)), self._sound):
             results = self._plain(body)
             asked = min(total - len(received) // size, step)
             if len(results) != asked * size:
-                raise LinkError(f"the board must return {asked} results, not {len(results) / size:g}")
+                wanted, each = asked * self._identity.results, self._identity.result_bytes
+                raise LinkError(f"the board must return {wanted} results, not {len(results) / each:g}")
             received += results
             progress(len(received) // size, total)
         return self._results(bytes(received))
@@ -264,14 +265,19 @@ class Board:
         size = self._identity.result_bytes
         rows = np.frombuffer(data, np.uint8).reshape(-1, size)
         codes = codes_of(rows[:, :-1].tobytes(), [self._identity.output_port])[:, 0]
-        shape = (-1,) if self._identity.channels == 1 else (-1, self._identity.channels)
-        shaped = codes.reshape(shape)
+        codes, status = self._in_order(codes), self._in_order(rows[:, -1])
         return Results(
-            values=self._identity.output_port.decode(shaped),
-            codes=shaped,
-            status=rows[:, -1].reshape(shape).copy(),
+            values=self._identity.output_port.decode(codes),
+            codes=codes,
+            status=status.copy(),
             flags=dict(self._identity.flags),
         )
+
+    def _in_order(self, column: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """Return a column of results, of which each sample of a channel has brought some, in the order of time."""
+        channels, each = self._identity.channels, self._identity.results
+        in_time = column.reshape(-1, channels, each).swapaxes(1, 2)
+        return in_time.reshape((-1,) if channels == 1 else (-1, channels))
 
     def _checked(self, codes: Codes) -> Codes:
         if self._identity.source != "link":

@@ -28,6 +28,6 @@ def influx_lines(identity: Identity, results: Results, first: int, start: float)
     channels, output = identity.channels, identity.output_port.name
     codes, status = results.codes.reshape(-1).tolist(), results.status.reshape(-1).tolist()
     for n, value in enumerate(results.values.reshape(-1).tolist()):
-        time = round((start + (first + n // channels) / identity.sample_rate) * 1e9)
+        time = round((start + (first + n // channels) / identity.result_rate) * 1e9)
         flags = "".join(f",{flag}={'true' if status[n] >> bit & 1 else 'false'}" for flag, bit in results.flags.items())
         yield f"{identity.name},channel={n % channels} {output}={value!r},code={codes[n]}i{flags} {time}"

@@ -158,7 +158,7 @@ def watch(
                 codes = codes_for(known)
             session += 1
             yield Connected(known, session)
-            base, before = TimeBase(clock, known.sample_rate), sent
+            base, before = TimeBase(clock, known.result_rate), sent
             try:
                 batches = (
                     _measured(board, sent, clock, base)
@@ -284,14 +284,16 @@ class _Fetched:
 
 
 def _fed(board: Board, codes: Codes, start: int, speed: float, clock: Clock, base: TimeBase) -> Iterator[_Batch | None]:
-    """Feed the samples from number `start` on, as they become due; give the number of the first one of each batch."""
-    begun, sent, rate = clock.monotonic(), start, board.identity.sample_rate * speed
+    """Feed samples as they become due, from the one with result number `start` on; give each batch's first number."""
+    each = board.identity.results
     base.begin(start)
+    start //= each
+    begun, sent, rate = clock.monotonic(), start, board.identity.sample_rate * speed
     while sent < len(codes):
         due = len(codes) if rate == 0 else min(start + int((clock.monotonic() - begun) * rate) + 1, len(codes))
         end = min(due, sent + MAX_BATCH)
         if end > sent:
-            yield sent, board.run_codes(codes[sent:end])
+            yield sent * each, board.run_codes(codes[sent:end])
             sent = end
         else:
             yield None

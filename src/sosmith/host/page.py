@@ -174,7 +174,7 @@ def picture(readings: Readings, state: str) -> dict[str, Any]:
     """
     about = readings.identity
     curves = [history.thinned(POINTS) for history in readings.histories]
-    seconds = curves[0][0] / about.sample_rate
+    seconds = curves[0][0] / about.result_rate
     return {
         "state": state,
         "samples": readings.samples,
@@ -186,7 +186,7 @@ def picture(readings: Readings, state: str) -> dict[str, Any]:
         "rates": [_rates(seconds, values) for _, values, _ in curves],
         "status": [status.tolist() for _, _, status in curves],
         "newest": [
-            [alarm.flag, alarm.channel, alarm.sample / about.sample_rate, alarm.value]
+            [alarm.flag, alarm.channel, alarm.sample / about.result_rate, alarm.value]
             for alarm in reversed(readings.newest_alarms)
         ],
     }

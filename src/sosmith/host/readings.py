@@ -167,7 +167,7 @@ class Readings:
             history.add(first, values[:, channel], status[:, channel])
         self._last = list(zip(values[-1].tolist(), status[-1].tolist(), strict=True))
         self.samples = first + len(values)
-        self.utc = start + (self.samples - 1) / self.identity.sample_rate
+        self.utc = start + (self.samples - 1) / self.identity.result_rate
 
     def alarm(self, one: Alarm) -> None:
         """Take an alarm."""
@@ -177,7 +177,7 @@ class Readings:
     @property
     def seconds(self) -> float:
         """Time that the samples so far have taken, in s."""
-        return self.samples / self.identity.sample_rate
+        return self.samples / self.identity.result_rate
 
     @property
     def now(self) -> list[Reading]:
@@ -192,7 +192,7 @@ class Readings:
                     channel=channel,
                     value=value,
                     wear=None if self.initial is None else value - self.initial[channel],
-                    per_hour=None if slope is None else slope * self.identity.sample_rate * 3600,
+                    per_hour=None if slope is None else slope * self.identity.result_rate * 3600,
                     flags=self.flags_of(status),
                 )
             )

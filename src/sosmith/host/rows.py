@@ -1,4 +1,4 @@
-"""Results of a board as rows of a table, one for each sample."""
+"""Results of a board as rows of a table, one for each result."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ def value_column(output: Port) -> str:
 
 
 def rows(identity: Identity, results: Results, first: int = 0) -> Iterator[Row]:
-    """Give a row for each result, the first of sample number `first`; all channels are there for each sample."""
+    """Give a row for each result, the first of number `first`; all channels are there for each."""
     channels = identity.channels
     table = np.stack([np.arange(results.codes.size), results.codes.reshape(-1), results.status.reshape(-1)], axis=1)
     for (n, code, status), value in zip(table.tolist(), results.values.reshape(-1).tolist(), strict=True):
-        time = (first + n // channels) / identity.sample_rate
+        time = (first + n // channels) / identity.result_rate
         yield (time, *([n % channels] if channels > 1 else []), value, code, status)

@@ -44,7 +44,7 @@ class RunRecording:
 
     def add(self, event: Received) -> None:
         """Add results; they are in the file when this returns."""
-        rate = self._identity.sample_rate
+        rate = self._identity.result_rate
         self._rows.add(
             (
                 utc_text(event.start + (event.first + n // self._identity.channels) / rate),

@@ -184,7 +184,7 @@ class _Watching:
 
     def _begin(self, identity: Identity) -> None:
         self._identity = identity
-        self._alarms = Alarms(self._asked.alarms, identity.flags, identity.sample_rate)
+        self._alarms = Alarms(self._asked.alarms, identity.flags, identity.result_rate)
         self._readings = Readings(identity, self._manifest, self._asked.port)
         self._on_alarm += [self._note_alarm, self._readings.alarm]
         if self._asked.hook is not None:
@@ -227,7 +227,7 @@ class _Watching:
 
     def _note_alarm(self, alarm: Alarm) -> None:
         unit = self._identity.output_port.unit
-        when = alarm.sample / self._identity.sample_rate
+        when = alarm.sample / self._identity.result_rate
         self._asked.note(
             f"alarm: {alarm.flag} of channel {alarm.channel} at {when:.3f} s, {alarm.value:g} {unit}".rstrip()
         )

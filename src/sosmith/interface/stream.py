@@ -26,7 +26,7 @@ class Streamed:
     identity : Identity
         What the board says that it is.
     results : Results
-        One result for each sample.
+        All results: one for each sample, or as many as the identity says.
     faults : dict of str to int
         Faults of the line that were mended, by their kinds; those that did not occur are left out.
     """
@@ -74,7 +74,7 @@ class Streamed:
         """
         target = Path(fspath(path))
         if is_wav(target):
-            rate = Fraction(self.identity.sample_rate).limit_denominator(10**9)
+            rate = Fraction(self.identity.result_rate).limit_denominator(10**9)
             check_rate(target, rate)
             codes = self.results.codes.reshape(-1, self.identity.channels)
             write_file(target, wav_bytes(codes, self.identity.output_port, rate))

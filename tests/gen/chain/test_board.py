@@ -10,11 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.gen.chain.chains import GUARDED, PLAIN, stimulus
+from tests.gen.chain.rising import UP
 from tests.gen.fpga.stubs import REPORT, Stub
 
 import sosmith
-from sosmith.gen.chain.board import chain_item, modules
+from sosmith.gen.chain.board import chain_item, modules, results_and_copies
 from sosmith.gen.chain.generate import chain_texts
+from sosmith.gen.chain.rates import Rate, pattern_of
 from sosmith.gen.chain.top import chain_interface, top_text
 from sosmith.gen.fpga import bitstream
 from sosmith.gen.output.board_top import board_verilog
@@ -22,6 +24,7 @@ from sosmith.gen.output.identity import BoardItem, identity
 from sosmith.gen.output.vectors import whole_beats
 from sosmith.gen.output.verilog import to_rtlil, to_verilog
 from sosmith.model.errors import SpecificationError
+from sosmith.model.link.identity import Identity
 from sosmith.sim.cosimulate import cosimulate
 from sosmith.sim.simulator_bench import SimulatorBench
 
@@ -142,3 +145,63 @@ def test_a_build_says_what_the_chain_takes(
     project = chain.project("arty_a7", folder=tmp_path / "project")
     assert project["bitstream"] is None
     assert {Path(name).suffix for name in project["project"]["files"]} >= {".tcl", ".xdc"}
+
+
+RISING = UP | {"stage": [UP["stage"][0], UP["stage"][2] | {"interpolate": 2}]}
+
+
+@pytest.mark.parametrize(
+    ("stages", "channels", "results", "factor"),
+    [
+        ([{"interpolate": 3}], 3, 3, 1),
+        ([{"interpolate": 4}, {"decimate": 2}], 3, 2, 1),
+        ([{"decimate": 2}, {"interpolate": 4}], 1, 2, 1),
+        ([{"decimate": 4}, {"interpolate": 2}], 1, 1, 2),
+        ([{"interpolate": 2}, {"decimate": 4}], 3, 1, 2),
+    ],
+)
+def test_how_many_results_a_sample_has(stages: list[dict[str, int]], channels: int, results: int, factor: int) -> None:
+    rates = [Rate(stage.get("interpolate", 1), stage.get("decimate", 1)) for stage in stages]
+    assert results_and_copies(pattern_of(rates), channels, 2, "x.toml") == (results, factor)
+
+
+@pytest.mark.parametrize(
+    ("stages", "channels", "sentence"),
+    [
+        (
+            [(3, 1), (1, 2)],
+            1,
+            "x.toml: interpolate and decimate must make the rate a whole multiple or a whole part on a board, whose "
+            "link returns as many results for each sample, not 3 / 2 of it",
+        ),
+        (
+            [(1, 2), (4, 1)],
+            2,
+            "x.toml: interpolate must come before decimate on a board with several channels: behind it, a sample "
+            "brings results that leave with later samples, which may be those of another channel",
+        ),
+        (
+            [(64, 1), (2, 1)],
+            1,
+            "x.toml: interpolate must give at most 80 results for each sample on a board, as many as fit a message of "
+            "the link, not 128",
+        ),
+    ],
+)
+def test_chains_that_the_link_has_no_results_for(stages: list[tuple[int, int]], channels: int, sentence: str) -> None:
+    with pytest.raises(SpecificationError) as refused:
+        results_and_copies(pattern_of([Rate(*stage) for stage in stages]), channels, 2, "x.toml")
+    assert str(refused.value) == sentence
+
+
+def test_the_identity_says_how_many_results_a_sample_has(rising: sosmith.Chain) -> None:
+    item = chain_item(rising.core)
+    about = identity(item, "", baud=1_000_000, clock=12e6)
+    assert (about.results, about.samples, about.packed) == (4, 20, None)
+    assert (about.sample_rate, about.result_rate) == (8000.0, 32000.0)
+    assert Identity.of_memory(about.memory) == about
+
+
+@pytest.fixture(scope="module")
+def rising() -> sosmith.Chain:
+    return sosmith.design_chain(RISING)

@@ -294,14 +294,6 @@ def test_what_a_chain_does_not_take_is_refused(name: str) -> None:
     assert str(refused.value) == message
 
 
-def test_a_board_does_not_take_it(up: sosmith.Chain, tmp_path: Path) -> None:
-    with pytest.raises(SpecificationError) as refused:
-        up.build("icebreaker", folder=tmp_path)
-    assert str(refused.value) == (
-        "specification: interpolate must be left out on a board, whose link returns one result for each sample"
-    )
-
-
 def from_file(folder: Path, name: str, taps: list[float]) -> Path:
     """Write a specification of a stage that interpolates by 2, and its taps in a file."""
     match name.rpartition(".")[2]:

@@ -120,4 +120,4 @@ output = { bits = 6, range = [0.0, 128.0] }
 """
     core = design_core(from_text(text, Path("far.toml")))
     counted = operators(certificate(core.quantized, core.spec.max_error).stages)
-    assert counted["adder_bits"] == cost_of(core.datapath).adder_bits
+    assert counted.adder_bits == cost_of(core.datapath).adder_bits

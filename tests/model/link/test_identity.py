@@ -59,6 +59,11 @@ REFUSED = [
     ({"sample_rate": "100"}, "sample_rate: Input should be a valid number"),
     ({"clock": 0.0}, "clock: Input should be greater than or equal to 0.000001"),
     ({"protocol": 2}, "protocol: Input should be less than or equal to 1"),
+    ({"results": 0}, "results: Input should be greater than or equal to 1"),
+    (
+        {"results": 2, "packed": [0]},
+        "text: Several results for each sample should be plain, of a device that is fed over the link",
+    ),
     ({"channels": 0}, "channels: Input should be greater than or equal to 1"),
     ({"channels": True}, "channels: Input should be a valid integer"),
     (quantity(4, 1e308), f"output.4: Input should be less than or equal to {10**30}"),

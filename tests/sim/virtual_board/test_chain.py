@@ -8,12 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.gen.chain.chains import GUARDED
+from tests.gen.chain.rising import UP
+from tests.sim.virtual_board.running import running
 
 import sosmith
 from sosmith.gen.chain.board import chain_item
 from sosmith.host.board import Board
 from sosmith.host.identity_check import check_files, folder_of
 from sosmith.model.errors import ShortfallError
+from sosmith.sim.virtual_board.line_damage import LineDamage
 from sosmith.sim.virtual_board.netlist import build
 from sosmith.sim.virtual_board.terminal import Terminal
 
@@ -81,3 +84,32 @@ def test_a_board_keeps_the_results_of_each_channel_of_a_core(decimate: dict[str,
     results, status = core.datapath.compute_with_status(codes)
     assert np.array_equal(got.codes, results[np.arange(203) // 4])
     assert np.array_equal(got.status, status[np.arange(203) // 4])
+
+
+RISING = {"name": "fill", "kind": "fir", "interpolate": 3, "taps": [0.2, 0.5, 0.9, 1.0, 0.7, 0.3, 0.1]}
+HALF = {"name": "half", "kind": "cic", "order": 2, "decimate": 2}
+FOUR = {"name": "four", "kind": "cic", "order": 1, "interpolate": 4}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("stages", "channels", "damaged"),
+    [([RISING], 1, True), ([RISING], 3, False), ([FOUR, HALF], 3, False), ([HALF, FOUR], 1, False)],
+)
+def test_a_board_has_all_results_of_a_sample(
+    stages: list[dict[str, Any]], channels: int, damaged: bool, tmp_path: Path
+) -> None:
+    """In each session from reset, whatever the line does."""
+    chain = sosmith.design_chain(UP | {"stage": stages, "channels": channels})
+    codes = np.random.default_rng(1).integers(-128, 128, (200, channels, 1))
+    netlist = build(chain_item(chain.core), tmp_path, clock=Fraction(4_000_000), baud=1_000_000)
+    shape = (-1,) if channels == 1 else (-1, channels)
+    results, status = (column.reshape(shape) for column in chain.core.compute_with_status(codes))
+    with running(netlist, LineDamage(500, 1) if damaged else None) as port:
+        for count in (78, 150):
+            with Board(port) as board:
+                parts = [board.run_codes(codes[:count]), board.run_codes(codes[count:])]
+                mended = sum(board.faults.values())
+            assert (mended > 0) is damaged
+            assert np.array_equal(np.concatenate([part.codes for part in parts]), results)
+            assert np.array_equal(np.concatenate([part.status for part in parts]), status)

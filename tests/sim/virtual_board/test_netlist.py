@@ -2,9 +2,6 @@
 
 import random
 import socket
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -14,6 +11,7 @@ import pytest
 from tests.gen.designs import EXAMPLES
 from tests.gen.output.packages.made import HELD
 from tests.interface.small import FILTER, filter_design, instrument_design
+from tests.sim.virtual_board.running import running
 from tests.sim.virtual_board.socket_line import SocketLine
 
 import sosmith
@@ -26,8 +24,7 @@ from sosmith.host.identity_check import check_files
 from sosmith.instrument.scenarios.traces import traces_for
 from sosmith.model.link.protocol import Type
 from sosmith.sim.virtual_board.line_damage import LineDamage
-from sosmith.sim.virtual_board.netlist import Damage, Netlist, build, forward
-from sosmith.sim.virtual_board.terminal import Terminal
+from sosmith.sim.virtual_board.netlist import Netlist, build
 
 BUILT: dict[Path, Netlist] = {}
 
@@ -43,27 +40,6 @@ def netlist_of(design: CoreDesign, place: Path, clocks_per_bit: int = 4) -> Netl
     if folder not in BUILT:
         BUILT[folder] = build(design, folder, clock=Fraction(1_000_000 * clocks_per_bit), baud=1_000_000)
     return BUILT[folder]
-
-
-@contextmanager
-def running(netlist: Netlist, damage: Damage | None = None) -> Iterator[str]:
-    """Run a board behind a pseudo-terminal; give its path."""
-    with Terminal() as terminal:
-        if damage is None:
-            with netlist.at(terminal.end):
-                yield terminal.path
-            return
-        ours, theirs = socket.socketpair()
-        stop = threading.Event()
-        with ours, netlist.at(theirs.fileno()):
-            theirs.close()
-            between = threading.Thread(target=forward, args=(terminal.end, ours, damage, lambda: not stop.is_set()))
-            between.start()
-            try:
-                yield terminal.path
-            finally:
-                stop.set()
-                between.join()
 
 
 def codes_for(design: CoreDesign, samples: int, seed: int = 1) -> np.ndarray:  # type: ignore[type-arg]

@@ -25,7 +25,7 @@ def sealed_again(folder: Path, change: Callable[[dict[str, Any]], None] = lambda
     (folder / CERTIFICATE).write_text(entries_text(certificate), encoding="utf-8")
 
 
-def changed(path: str, value: Callable[[str], str]) -> Callable[[dict[str, Any]], None]:
+def changed(path: str, value: Callable[[Any], Any]) -> Callable[[dict[str, Any]], None]:
     """Return a change of one claim, by keys and indices with dots."""
 
     def change(tree: Any) -> None:

@@ -156,8 +156,6 @@ def test_what_is_held_against_nothing_is_named(name: str, unheld: set[str], core
         ("folded", "error_parts.output rounding", 0.0, "error_parts.output rounding in the manifest must be .*"),
         ("folded", "error_parts.filter rounding", None, "error_parts in the manifest must have filter rounding"),
         ("folded", "error_unit", "mm", "error_unit in the manifest must be , .*, not mm"),
-        ("folded", "cost.adder_bits", 1, r"cost.adder_bits in the manifest must be \d+, .*, not 1"),
-        ("folded", "cost.register_bits", 1, r"cost.register_bits in the manifest must be \d+, .*, not 1"),
         ("folded", "decimation", {}, "the manifest must not have a decimation, as in the certificate"),
         ("decimated", "decimation.factor", 8, "decimation.factor in the manifest must be 4, .*, not 8"),
         ("decimated", "decimation.held", True, "decimation.held in the manifest must be False, .*, not True"),

@@ -82,7 +82,7 @@ class _Goals:
         yield output
 
     def _inside(self) -> set[str]:
-        """Return the registers of the pipeline that hold words of a sample."""
+        """Return the registers of the pipeline that hold words of a sample, or a constant."""
         names = {
             name for name in self._netlist.registers if name not in self._control.names | self._pipeline.states.keys()
         }
@@ -92,7 +92,8 @@ class _Goals:
                 behind = self._pipeline.behind(name)
             except RejectedError:
                 continue
-            if behind is not None and 0 <= behind < self._pipeline.last:
+            constant = behind is None and self._pipeline.constant_of(name) is not None
+            if constant or (behind is not None and 0 <= behind < self._pipeline.last):
                 known.add(name)
         return known
 
@@ -111,8 +112,10 @@ class _Goals:
 
     def _of_data(self, name: str) -> list[Goal]:
         behind = self._pipeline.behind(name)
-        assert behind is not None
         valid, full = self._control.valid, self._control.full
+        if behind is None:
+            always = self._pipeline.constant_of(name)
+            return [({RESET: 1, full: 0}, 1, always), ({RESET: 1, full: 1}, 1, None)]
         return [
             ({RESET: 1, full: 0, valid[behind]: 1}, behind, self._pipeline.content_of(name)),
             ({RESET: 1, full: 1, valid[behind + 1]: 1}, behind, None),

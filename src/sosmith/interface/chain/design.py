@@ -155,9 +155,9 @@ class Chain(View):
 
     @property
     def passband(self) -> tuple[float, float] | None:
-        """Smallest and largest gain in the pass band, proven; None for a chain without limits."""
-        kept = [each.kept for each in self.core.foldings if each.kept is not None]
-        return (float(kept[0].least.gain), float(kept[0].most.gain)) if kept else None
+        """Smallest and largest gain in the pass band that limits are given for, proven; None for a chain without."""
+        kept = None if self.core.limited is None else self.core.limited.kept
+        return None if kept is None else (float(kept.least.gain), float(kept.most.gain))
 
     @property
     def structures(self) -> list[dict[str, Any]]:

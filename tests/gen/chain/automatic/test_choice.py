@@ -37,7 +37,7 @@ def check_costs(chain: sosmith.Chain) -> None:
     """Check that the stages by themselves, designed again, cost what is stated of those that were taken."""
     (taken,) = (row for row in chain.structures if row["verdict"] == "taken")
     again = sosmith.design_chain(sosmith.ChainSpecification.load(chain.specification.as_dict()))
-    luts, blocks, bits = cost_of(again.core, find_board("ulx3s_25f"))
+    luts, blocks, bits = cost_of(again.core.stages, find_board("ulx3s_25f"))
     assert taken["designed"]
     assert (taken["luts"], taken["multipliers"], taken["memory_bits"]) == (luts, blocks, bits)
     assert again.choice is None
@@ -85,7 +85,7 @@ def test_the_table_says_why_others_were_not_taken(chosen: sosmith.Chain) -> None
 
 def test_a_cic_filter_is_made_up_for(monkeypatch: pytest.MonkeyPatch) -> None:
     """Samples of two bits at a high rate: a CIC filter takes them, and the last taps have its droop in them."""
-    monkeypatch.setattr(choice, "structures", lambda factor: [s for s in structures(factor) if s.family == CIC])
+    monkeypatch.setattr(choice, "structures", lambda *asked: [s for s in structures(*asked) if s.family == CIC])
     tree = asked(decimate=16, stopband_edge=None, passband_loss=0.1)
     chain = sosmith.design_chain(tree)
     first, *_, last = chain.specification.as_dict()["stage"]

@@ -48,6 +48,11 @@ def without(key: str) -> Change:
     return change
 
 
+def several(tree: dict[str, Any]) -> None:
+    del tree["limits"]
+    tree["stage"] = [TREE["stage"][0], TREE["stage"][0] | {"name": "more", "decimate": 2}]
+
+
 REFUSED: list[tuple[Change, str]] = [
     (
         limit(ripple=1.0),
@@ -83,9 +88,16 @@ REFUSED: list[tuple[Change, str]] = [
     ),
     (
         lambda tree: tree.update(stage=[TREE["stage"][0], *tree["stage"]]),
-        "not yet available: stage[0].kind must be another kind beside other stages, as the limits of a stage auto are "
-        "those of the whole chain, not 'auto'",
+        "limits must be left out beside a stage auto, which has its own, not given",
     ),
+    (
+        several,
+        "not yet available: stage[1].kind must be another kind beside a stage auto, of which there is one at most, not "
+        "'auto'",
+    ),
+    (limit(first="no"), "limits.first must be the name of a stage: slow, out, not 'no'"),
+    (limit(last=3), "limits.last must be the name of a stage: slow, out, not 3"),
+    (limit(first="out", last="slow"), "limits.last must be the name of a stage from out on, not 'slow'"),
     (
         auto(decimate=134),
         "stage[0].decimate must be a product of factors up to 64, by which stages can decimate, not 134",
@@ -113,6 +125,29 @@ def test_limits_that_cannot_be_are_refused(change: Change, sentence: str) -> Non
     with pytest.raises(SpecificationError) as refused:
         sosmith.ChainSpecification.load(tree)
     assert str(refused.value) == f"specification: {sentence}"
+
+
+def test_an_unknown_key_of_limits_is_refused_with_those_of_stages() -> None:
+    tree = GIVEN | {"limits": LIMITS | {"from": "out"}}
+    with pytest.raises(SpecificationError, match=r"^specification: limits\.from must be one of the keys passband_edge"):
+        sosmith.ChainSpecification.load(tree)
+
+
+def test_limits_of_some_stages_are_those_of_these_stages_alone() -> None:
+    """A gain of 2 before them, and a pole behind them, change nothing of what is asked."""
+    before, behind = (
+        {"name": "twice", "kind": "gain", "factor": 2.0},
+        {"name": "pole", "kind": "iir", "family": "butterworth", "order": 1, "cutoff": 50.0},
+    )
+    tree = GIVEN | {"stage": [before, *GIVEN["stage"], behind], "limits": LIMITS | {"first": "slow", "last": "out"}}
+    tree["output"] = {"bits": 10, "range": [-4.0, 4.0], "signed": True}
+    chain, alone = sosmith.design_chain(tree), sosmith.design_chain(GIVEN)
+    assert chain.core.limited == alone.core.foldings[0]
+    assert chain.passband == alone.passband
+    assert [each.kept for each in chain.core.foldings] == [None]
+    assert chain.core.spec.edge == 50
+    tables = [table.title for table in chain.tables()]
+    assert any(title.startswith("Pass band of slow to out, up to 100 Hz") for title in tables), tables
 
 
 def test_a_chain_inside_its_limits_has_its_gains_proven() -> None:

@@ -208,3 +208,10 @@ def test_a_cell_is_one_that_every_tool_takes(
     assert count == 1
     with pytest.raises(RejectedError, match=f"^{sentence}"):
         made.check(changed)
+
+
+def test_a_memory_that_nobody_reads_may_be_missing(texts: Callable[[str], Texts]) -> None:
+    extra = "  memory width 3 size 4 \\unread\n"
+    first = re.search(r"^  memory width .*\n", texts("channels").rtlil, re.MULTILINE)
+    assert first is not None
+    assert texts("channels").check(texts("channels").rtlil.replace(first[0], extra + first[0], 1)).open == ()
