@@ -5,11 +5,11 @@ the poles of D are the M-th powers of those of A::
 
     x --> all B(w) D(w**M) / A(w) multiplied out --> 1 / D(w**M) of one section --> of the next --> .. --> y
 
-The input of a filter has few bits, so that a tap takes a single multiplier block; its products drop bits before they are
-added up, as those of the recursions do (`sosmith.model.sections.floored_products`). Recursions follow one another from
-the poles that lie closest to the unit circle to those that lie furthest from it: what the first ones round then passes
-the others, whose gain is small. Beyond `_MOST_IN_FRONT` samples there would be too many taps; the recursions double
-what is left (`sosmith.model.sections.look_ahead`).
+The input of a filter has few bits, so that a tap takes a single multiplier block; its products drop bits before they
+are added up, as those of the recursions do (`sosmith.model.sections.floored_products`). Recursions follow one another
+from the poles that lie closest to the unit circle to those that lie furthest from it: what the first ones round then
+passes the others, whose gain is small. Beyond `_MOST_IN_FRONT` samples there would be too many taps; the recursions
+double what is left (`sosmith.model.sections.look_ahead`).
 """
 
 from __future__ import annotations
