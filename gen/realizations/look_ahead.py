@@ -5,10 +5,11 @@ the poles of D are the M-th powers of those of A::
 
     x --> all B(w) D(w**M) / A(w) multiplied out --> 1 / D(w**M) of one section --> of the next --> .. --> y
 
-The input of a filter has few bits, so that a tap takes a single multiplier block, and nothing is rounded before the
-recursions. They follow one another from the poles that lie closest to the unit circle to those that lie furthest from
-it: what the first ones round then passes the others, whose gain is small. Beyond `_MOST_IN_FRONT` samples there would
-be too many taps; the recursions double what is left (`sosmith.model.sections.look_ahead`).
+The input of a filter has few bits, so that a tap takes a single multiplier block; its products drop bits before they
+are added up, as those of the recursions do (`sosmith.model.sections.floored_products`). Recursions follow one another
+from the poles that lie closest to the unit circle to those that lie furthest from it: what the first ones round then
+passes the others, whose gain is small. Beyond `_MOST_IN_FRONT` samples there would be too many taps; the recursions
+double what is left (`sosmith.model.sections.look_ahead`).
 """
 
 from __future__ import annotations
@@ -19,7 +20,6 @@ from fractions import Fraction
 from functools import cached_property
 from typing import NamedTuple
 
-from sosmith.gen.realizations.coefficients import Rounding
 from sosmith.gen.realizations.section_format import WIDE, SectionFormat
 from sosmith.model.errors import ShortfallError
 from sosmith.model.sections.fir import FirSection, Form, TapProduct
@@ -111,7 +111,7 @@ def look_ahead(part: Zeros | Poles, form: SectionFormat, name: str) -> FirSectio
     if isinstance(part, Zeros):
         rounding = form.rounding
         rounded = [(name, *rounding(name, value), ((delay, 1),)) for name, value, delay in part.taps]
-        products = tuple(TapProduct(*each) for each in rounded if each[1])
+        products = tuple(TapProduct(*each, form.fracs.get(f"product_{each[0]}")) for each in rounded if each[1])
         if not products:
             raise ShortfallError(f"numerator of {name} must not be zero")
         return FirSection(name=name, products=products, form=Form.TRANSPOSED, x=form.x)
@@ -122,10 +122,8 @@ def look_ahead(part: Zeros | Poles, form: SectionFormat, name: str) -> FirSectio
         return LookAhead(
             name=name,
             distance=part.distance,
-            factors=tuple(
-                _taps(form.rounding, letter, *factor) for letter, factor in zip(_NAMES, part.factors, strict=False)
-            ),
-            recursion=_taps(form.rounding, "A", part.distance, part.denominator),
+            factors=tuple(_taps(form, letter, *factor) for letter, factor in zip(_NAMES, part.factors, strict=False)),
+            recursion=_taps(form, "A", part.distance, part.denominator),
             x=form.x,
             fracs=tuple(form.fracs.get(each, most) for each in quantizers),
             ranges=tuple(form.ranges.get(each, wide) for each in quantizers),
@@ -136,10 +134,11 @@ def look_ahead(part: Zeros | Poles, form: SectionFormat, name: str) -> FirSectio
         raise ShortfallError(f"{name} must be stable with coefficients of {form.rounding.bits} bits: {error}") from None
 
 
-def _taps(rounding: Rounding, letter: str, step: int, polynomial: Polynomial) -> tuple[Tap, ...]:
+def _taps(form: SectionFormat, letter: str, step: int, polynomial: Polynomial) -> tuple[Tap, ...]:
     """Round a polynomial's coefficients but the one; those that are too small for a double are none."""
+    rounding = form.rounding
     return tuple(
-        Tap(name, *rounding(name, float(value)), k * step)
+        Tap(name, *rounding(name, float(value)), k * step, form.fracs.get(f"product_{name}"))
         for k, value in enumerate(polynomial)
         for name in [f"{letter}{k}"]
         if k and float(value)

@@ -6,11 +6,11 @@ coefficients may cancel. They only guide the choice of word lengths; the result 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import zip_longest
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -38,6 +38,13 @@ _LOST = 2.0**-16
 """Share of a response's sum of magnitudes that may be lost when samples with different signs are added up."""
 
 
+class Group(NamedTuple):
+    """Products that are added up: the name of the quantizer of their sum, empty if there is none, and theirs."""
+
+    total: str
+    products: tuple[str, ...]
+
+
 @dataclass(frozen=True, eq=False)
 class Estimate:
     """Double-precision estimates for a section.
@@ -57,8 +64,8 @@ class Estimate:
         Largest centred error at every such node for each of the section's quantizers, if it rounds to integers.
     optional : tuple of str
         Names in `gains` of the quantizers that are optional.
-    products : tuple of str
-        Those of them that are products.
+    groups : tuple of Group
+        Those of them that are products, by what they are added up to.
     """
 
     ideal: dict[str, float]
@@ -67,16 +74,24 @@ class Estimate:
     limits: dict[str, tuple[float, float]]
     spreads: dict[str, dict[str, float]]
     optional: tuple[str, ...]
-    products: tuple[str, ...]
+    groups: tuple[Group, ...]
+
+    @property
+    def products(self) -> tuple[str, ...]:
+        """Names in `gains` of the products, which may be quantized but need not be."""
+        return tuple(name for group in self.groups for name in group.products)
 
     def rounding(self, fracs: Mapping[str, int]) -> float:
         """Error at the filter's output of quantizers that keep so many fraction bits."""
         error = sum(self.gains.get(name, 0.0) * 2.0**-frac for name, frac in fracs.items())
-        if self.products and all(name in fracs for name in self.products):
-            grain = max(fracs[name] for name in (*self.products, "v"))  # of the total, whose bits v drops
-            error -= self.gains.get("v", 0.0) * 2.0**-grain
-            if len(self.products) % 2:  # half a unit is left of what would centre them
-                error += self.gains[self.products[0]] * 2.0 ** -fracs[self.products[0]]
+        for total, products in self.groups:
+            if not all(name in fracs for name in products):
+                continue
+            if total:
+                grain = max(fracs.get(name, 0) for name in (*products, total))  # of the total, which drops its bits
+                error -= self.gains.get(total, 0.0) * 2.0**-grain
+            if len(products) % 2:  # half a unit is left of what would centre them
+                error += self.gains[products[0]] * 2.0 ** -fracs[products[0]]
         return error
 
     def limits_of(self, node: str, fracs: Mapping[str, int]) -> tuple[float, float]:
@@ -126,7 +141,7 @@ def estimates_of(parts: Sequence[Any], realization: str, windows: Sequence[Windo
                 },
                 spreads={name: {s.name: _gain(s, i, poles, impulse) for s in quantizers} for i, name in names.items()},
                 optional=section.optional_quantizers,
-                products=tuple(name for name in _products(section) if name in {s.name for s in quantizers}),
+                groups=_groups(section, {s.name for s in quantizers}),
             )
         )
     return _added_up(result)
@@ -146,6 +161,25 @@ def largest_magnitude(response: Array, windows: Sequence[Window]) -> float:
 def _products(section: Section) -> tuple[str, ...]:
     """Names of the products whose quantizers are optional."""
     return tuple(n.name for n in section.graph.nodes if n.op is Op.SCALE and n.name in section.optional_quantizers)
+
+
+def _groups(section: Section, known: Collection[str]) -> tuple[Group, ...]:
+    """Return the products among the quantizers that are `known`, by the quantizer that their sum goes to."""
+    nodes, products = section.graph.nodes, [name for name in _products(section) if name in known]
+    groups: list[Group] = []
+    left = set(products)
+    for total in (node for node in nodes if node.name in section.stated_fracs and node.name in known):
+        pending, own = [*total.operands], set[str]()
+        while pending:
+            node = nodes[pending.pop()]
+            if node.op is Op.SCALE:
+                own.add(node.name)
+            elif node.op is not Op.DELAY and node.name not in section.stated_fracs:
+                pending += node.operands
+        if own & left:
+            groups.append(Group(total.name, tuple(name for name in products if name in own & left)))
+            left -= own
+    return (*groups, *([Group("", tuple(name for name in products if name in left))] if left else []))
 
 
 def _added_up(estimates: Sequence[Estimate]) -> list[Estimate]:

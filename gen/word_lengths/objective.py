@@ -18,7 +18,7 @@ from sosmith.gen.word_lengths.cost import (
     cost_of,
     cost_of_graphs,
 )
-from sosmith.hdl.plan.block_products import with_blocks
+from sosmith.hdl.plan.block_products import blocks_of, with_blocks
 from sosmith.model.dataflow.adder_graph import scalings
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.folding.fold import columns_of, program
@@ -199,9 +199,17 @@ class FewSums:
 
     def of_graph(self, graph: Graph) -> float:
         """Return the area of the graph's operators, in LUT4: of sums, and a little for each block."""
-        split, pieces = with_blocks(graph, scalings(graph), self.bits)
+        split, pieces = with_blocks(graph, self._in_blocks(graph), self.bits)
         cost = cost_of_graphs([split], [scalings(split) - pieces], bits_by_digits)
         return cost.luts + _LUTS_FOR_A_PIECE * cost.multiplier_blocks
+
+    def _in_blocks(self, graph: Graph) -> list[int]:
+        """Return the products that are not smaller as sums."""
+        return [
+            index
+            for index in scalings(graph)
+            if bits_by_digits(graph, [index]) > _LUTS_FOR_A_PIECE * blocks_of(graph, graph.nodes[index], self.bits)
+        ]
 
     def of_datapath(self, datapath: Datapath) -> float:
         """Return the area of all operators."""

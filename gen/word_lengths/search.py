@@ -314,10 +314,11 @@ class Search:
                 yield choice.with_format(k, replace(form, fracs=kept))
 
     def _places(self, k: int, form: SectionFormat) -> list[tuple[str, ...]]:
-        """Return what keeps a bit more at once in section k: a quantizer, or all that products have."""
-        products = self._estimates[k].products
-        alone = [(name,) for name in form.fracs if name not in products]
-        return [*alone, tuple(name for name in products if name in form.fracs)]
+        """Return what keeps a bit more at once in section k: a quantizer, or all products that are added up."""
+        estimate = self._estimates[k]
+        alone = [(name,) for name in form.fracs if name not in estimate.products]
+        together = [tuple(name for name in group.products if name in form.fracs) for group in estimate.groups]
+        return [*alone, *together]
 
     def _most_saved(self, choice: Choice, bits: int) -> float:
         """Return how much the error falls if the best places keep so many bits more in all, whatever their size."""
@@ -420,16 +421,15 @@ class Search:
                         yield form.with_coefficient(name, lowest_terms(neighbour, frac - step))
 
     def _shorter_products(self, k: int, form: SectionFormat) -> Iterator[SectionFormat]:
-        """Yield formats whose products all drop more bits: one that keeps more keeps the words long."""
+        """Yield formats where all products of a sum drop more bits: one that keeps more keeps the words long."""
         estimate = self._estimates[k]
-        if not estimate.products:
-            return
-        kept = [form.fracs[name] for name in estimate.products if name in form.fracs]
-        gain = sum(estimate.gains[name] for name in estimate.products)
-        most = min(kept) if kept else _bits_below(gain, _UNNOTICED) + 1
-        for step in _STEPS:
-            if most >= step:
-                yield replace(form, fracs={**form.fracs, **dict.fromkeys(estimate.products, most - step)})
+        for _, products in estimate.groups:
+            kept = [form.fracs[name] for name in products if name in form.fracs]
+            gain = sum(estimate.gains[name] for name in products)
+            most = min(kept) if kept else _bits_below(gain, _UNNOTICED) + 1
+            for step in _STEPS:
+                if most >= step:
+                    yield replace(form, fracs={**form.fracs, **dict.fromkeys(products, most - step)})
 
     def error(self, choice: Choice) -> float:
         """Estimated sum of the errors of input stage, coefficients and rounding, in output LSBs."""

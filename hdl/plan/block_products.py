@@ -24,8 +24,9 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from sosmith.model.dataflow.adder_graph import multiple_range, signed_digits
+from sosmith.model.dataflow.adder_graph import multiple_range
 from sosmith.model.dataflow.graph import Graph, GraphBuilder, Node, Op, Wire
+from sosmith.model.sections.floored_products import factors
 
 
 def blocks_of(graph: Graph, node: Node, bits: int) -> int:
@@ -102,31 +103,22 @@ def _product(g: GraphBuilder, operand: Wire, node: Node, bits: int, pieces: set[
         whole = g.scale(operand, node.parameter, node.parameter_frac, node.name)
         pieces.add(int(whole))
         return whole
-    upper, dropped, rest = _factors(node.parameter, bits)
+    upper, dropped, rest = factors(node.parameter, bits)
     frac = node.parameter_frac
     parts = _parts(g, operand, bits)
     # What is never negative, times a number that is not either, takes a block less.
-    factors = [upper if g[part].signed else abs(upper) for part in parts]
-    scaled = [g.scale(part, factor, frac - dropped) for part, factor in zip(parts, factors, strict=True)]
+    constants = [upper if g[part].signed else abs(upper) for part in parts]
+    scaled = [g.scale(part, constant, frac - dropped) for part, constant in zip(parts, constants, strict=True)]
     pieces |= {int(piece) for piece in scaled}
     if rest:  # next to the lowest piece: a sum with the upper ones then has few bits
         more = g.scale(operand, rest, frac)
-        scaled[-1] = g.add(scaled[-1], more) if factors[-1] == upper else g.subtract(scaled[-1], more)
-    total = scaled[0] if factors[0] == upper else g.subtract(g.constant(0, 0), scaled[0])
+        scaled[-1] = g.add(scaled[-1], more) if constants[-1] == upper else g.subtract(scaled[-1], more)
+    total = scaled[0] if constants[0] == upper else g.subtract(g.constant(0, 0), scaled[0])
     for piece in scaled[1:]:
         total = g.add(total, piece) if upper > 0 else g.subtract(total, piece)
     if dropped and not rest:
         total = g.scale(total, 1 << dropped, dropped)
     return g.bound(total, *multiple_range(node.parameter, g[operand].low, g[operand].high), node.name)
-
-
-def _factors(constant: int, bits: int) -> tuple[int, int, int]:
-    """Write a constant as ``upper * 2**dropped + rest`` with few digits in `rest`; a block takes `upper`."""
-    dropped = max(0, abs(constant).bit_length() - (bits - 1))
-    below = constant >> dropped
-    fitting = [upper for upper in (below, below + 1) if abs(upper) < 1 << (bits - 1)]
-    upper = min(fitting, key=lambda upper: len(signed_digits(constant - (upper << dropped))))
-    return upper, dropped, constant - (upper << dropped)
 
 
 def _parts(g: GraphBuilder, operand: Wire, bits: int) -> list[Wire]:

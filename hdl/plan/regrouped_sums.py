@@ -35,7 +35,7 @@ _SUMS = frozenset({Op.ADD, Op.SUBTRACT})
 
 
 class _Term(NamedTuple):
-    """A term of a sum: when it is there, its place among all terms, its sign, and its wire."""
+    """A term of a sum: when it is there, its place among all terms, sums first, its sign, and its wire."""
 
     time: float
     place: int
@@ -116,10 +116,10 @@ def _times(graph: Graph, loops: frozenset[int]) -> list[float]:
 
 
 def _added_up(g: GraphBuilder, terms: list[tuple[int, Wire, float]]) -> Wire:
-    """Add up terms, always the two that are there first."""
+    """Add up terms, always the two that are there first; of those of the same moment, sums made here."""
     left = [_Term(time, place, sign, wire) for place, (sign, wire, time) in enumerate(terms)]
     heapq.heapify(left)
-    for place in range(len(terms), 2 * len(terms) - 1):
+    for place in range(1 - len(terms), 0):
         one, other = heapq.heappop(left), heapq.heappop(left)
         if one.sign == other.sign:
             sign, wire = one.sign, g.add(one.wire, other.wire)

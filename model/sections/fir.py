@@ -7,9 +7,10 @@
     transposed   w_k(n) = b_k x(n) + w_k+1(n-1),  y = w_0                               one for each magnitude
 
 Taps of one magnitude share a product, so that symmetric and antisymmetric filters take half as many, and taps of 0
-take none: a half-band filter of N taps has (N + 1) / 4 products and one for its centre. Nothing is rounded here; the
-stage behind rounds once. The error of the filter is therefore that of its coefficients, ``sum |b_k - b'_k| max |x|``,
-and half an LSB. Nothing comes back, so there are no limit cycles, and every range is an interval, exact.
+take none: a half-band filter of N taps has (N + 1) / 4 products and one for its centre. A filter by itself rounds
+nothing; the stage behind it rounds once. Its error is therefore that of its coefficients, ``sum |b_k - b'_k| max |x|``,
+and half an LSB. In front of recursions with look-ahead, products drop bits (`sosmith.model.sections.floored_products`).
+Nothing comes back, so there are no limit cycles, and every range is an interval, exact.
 
 The transposed form keeps sums instead of samples: its states are wider, and each sample goes through one product and
 one sum only. The names of the forms are those of Oppenheim and Schafer, Discrete-Time Signal Processing, section 6.5.
@@ -23,6 +24,7 @@ from enum import Enum
 from functools import cached_property
 
 from sosmith.model.dataflow.graph import Graph, GraphBuilder, Range, Wire
+from sosmith.model.sections.floored_products import directions, shortened
 
 
 class Form(Enum):
@@ -47,12 +49,20 @@ class TapProduct:
         Fraction bits of the coefficient.
     taps : tuple of (int, int)
         Delay in samples of each tap, rising, and its sign, 1 or -1.
+    floored : int or None
+        Fraction bits that are kept of the product in a transposed form. None keeps all.
     """
 
     name: str
     coefficient: int
     frac: int
     taps: tuple[tuple[int, int], ...]
+    floored: int | None = None
+
+    @property
+    def label(self) -> str:
+        """Name of the product."""
+        return f"product_{self.name}"
 
     def __post_init__(self) -> None:
         if self.coefficient == 0:
@@ -118,7 +128,7 @@ class FirSection:
         for p in self.products:
             if self.form is Form.SYMMETRIC:
                 operand = g.combine([(sign, line[delay]) for delay, sign in p.taps])
-                terms.append(g.scale(operand, p.coefficient, p.frac, f"product_{p.name}"))
+                terms.append(g.scale(operand, p.coefficient, p.frac, p.label))
             else:
                 # One coefficient, several products: all but the first are named after their taps.
                 terms += [
@@ -131,9 +141,9 @@ class FirSection:
 
     def _transposed(self, g: GraphBuilder, x: Wire) -> Wire:
         products = {
-            delay: (sign, wire)
+            delay: (sign * direction, wire)
             for p in self.products
-            for wire in [g.scale(x, p.coefficient, p.frac, f"product_{p.name}")]
+            for direction, wire in [self._scaled(g, x, p)]
             for delay, sign in p.taps
         }
         total: Wire | None = None
@@ -143,6 +153,22 @@ class FirSection:
         assert total is not None
         return total
 
+    def _scaled(self, g: GraphBuilder, x: Wire, product: TapProduct) -> tuple[int, Wire]:
+        """Return a product of the input, and the sign with which it is a term."""
+        direction = self._directions.get(product.name)
+        if direction is None or product.floored is None:
+            return 1, g.scale(x, product.coefficient, product.frac, product.label)
+        return shortened(g, x, product.coefficient, product.frac, product.floored, product.label, direction)
+
+    @cached_property
+    def _directions(self) -> dict[str, int]:
+        """Whether products that drop bits are rounded down or up, by name; the oldest one, which is first, is added."""
+        shorter = [p for p in self.products if p.floored is not None and p.floored < self.x.frac + p.frac]
+        shorter.sort(key=lambda p: -p.taps[-1][0])
+        constants = [p.coefficient * p.taps[-1][1] for p in shorter]
+        constants[:1] = map(abs, constants[:1])
+        return dict(zip((p.name for p in shorter), directions(constants), strict=True))
+
     @property
     def coefficients(self) -> dict[str, tuple[int, int]]:
         """Integer and fraction bits of every coefficient, by name."""
@@ -150,8 +176,8 @@ class FirSection:
 
     @property
     def optional_quantizers(self) -> tuple[str, ...]:
-        """Names of the nodes that may be quantized: none."""
-        return ()
+        """Names of the nodes that may be quantized but need not be: the products of a transposed form."""
+        return tuple(p.label for p in self.products) if self.form is Form.TRANSPOSED else ()
 
     @property
     def stated_fracs(self) -> dict[str, int]:

@@ -13,6 +13,8 @@ w is a power of 1/z already (Parhi and Messerschmitt 1989, the decomposition int
                                                            +-- -A1, -A2 <-+-- z**-M, z**-2M
 
 Each bracket is a quantizer; without such polynomials, that is v alone. A half is added before it to centre its error.
+Products may drop bits too (`sosmith.model.sections.floored_products`), as many as the bracket does or fewer; a bracket
+with nothing left to drop takes no half.
 What is rounded behind the last of them passes the recursion alone, whose gain is far smaller than that of 1/A. The
 coefficients of every step are rounded on their own. The zeros then no longer lie exactly on the poles that were added;
 that is part of the error of the coefficients, and is proven with it.
@@ -27,18 +29,39 @@ from functools import cached_property
 from typing import NamedTuple
 
 from sosmith.model.dataflow.graph import Graph, GraphBuilder, Range, Wire
+from sosmith.model.sections.floored_products import directions, factors, shortened
 
 Limits = tuple[int, int]
 """Smallest and largest code."""
 
+_BLOCK_BITS = 18
+"""Bits of a multiplier block's operand, signed: of the widest one that FPGAs here have."""
+
+_MOST_BEYOND = 8
+"""Bits that a constant has more than a block at most, if it is taken apart."""
+
 
 class Tap(NamedTuple):
-    """One multiplication: ``coefficient * 2**-frac`` times the value `delay` samples ago."""
+    """One multiplication: ``coefficient * 2**-frac`` times the value `delay` samples ago.
+
+    Of the product, `floored` fraction bits are kept; None keeps all.
+    """
 
     name: str
     coefficient: int
     frac: int
     delay: int
+    floored: int | None = None
+
+    def kept(self, frac: int) -> int:
+        """Fraction bits of the product of a value with `frac` fraction bits."""
+        exact = frac + self.frac
+        return exact if self.floored is None else min(exact, self.floored)
+
+    @property
+    def label(self) -> str:
+        """Name of the product."""
+        return f"product_{self.name}"
 
     @property
     def value(self) -> Fraction:
@@ -98,13 +121,16 @@ class LookAhead:
     @property
     def coefficients(self) -> dict[str, tuple[int, int]]:
         """Integer and fraction bits of every coefficient, by name."""
-        taps = [tap for factor in (*self.factors, self.recursion) for tap in factor]
-        return {tap.name: (tap.coefficient, tap.frac) for tap in taps}
+        return {tap.name: (tap.coefficient, tap.frac) for tap in self._taps}
 
     @property
     def optional_quantizers(self) -> tuple[str, ...]:
-        """Names of the nodes that may be quantized but need not be: none."""
-        return ()
+        """Names of the nodes that may be quantized but need not be: the products."""
+        return tuple(tap.label for tap in self._taps)
+
+    @property
+    def _taps(self) -> tuple[Tap, ...]:
+        return tuple(tap for polynomial in (*self.factors, self.recursion) for tap in polynomial)
 
     @cached_property
     def stated_fracs(self) -> dict[str, int]:
@@ -115,8 +141,8 @@ class LookAhead:
             fracs[f"u{k}"] = frac
             frac = min(frac, kept)
             taps = self.factors[k] if k < len(self.factors) else ()
-            frac = max([frac, *(frac + tap.frac for tap in taps)])
-        return fracs | {"v": max([frac, *(self.y_frac + tap.frac for tap in self.recursion)])}
+            frac = max([frac, *(tap.kept(frac) for tap in taps)])
+        return fracs | {"v": max([frac, *(tap.kept(self.y_frac) for tap in self.recursion)])}
 
     @cached_property
     def graph(self) -> Graph:
@@ -127,7 +153,7 @@ class LookAhead:
             if k:
                 taps = self.factors[k - 1]
                 past = _delayed(g, wire, f"x{k}", max((tap.delay for tap in taps), default=0))
-                wire = g.combine([(1, wire), *_products(g, taps, past)])
+                wire = g.combine([(1, wire), *_products(g, taps, past, 1)])
             wire = self._quantized(g, wire, k)
         limits = (end >> (self.stated_fracs["v"] - self._kept) for end in self.v_range)
         first = g.delay("y_1", self._kept, *limits)
@@ -135,7 +161,7 @@ class LookAhead:
         total = self.stated_fracs["v"]
         half = [(1, g.constant(1, self._kept + 1, "half_v"))] if total > self._kept else []
         # The newest sample comes last: what is added to it before is there in time.
-        products = [(-sign, product) for sign, product in _products(g, self.recursion[::-1], past)]
+        products = _products(g, self.recursion[::-1], past, -1)
         v = g.bound(g.combine([(1, wire), *half, *products]), *self.v_range, "v")
         y = g.floor(v, self._kept, "y")
         g.connect(first, y)
@@ -157,9 +183,30 @@ def _halved(g: GraphBuilder, total: Wire, kept: int, name: str) -> Wire:
     return g.add(total, g.constant(1, kept + 1, name)) if g[total].frac > kept else total
 
 
-def _products(g: GraphBuilder, taps: Sequence[Tap], past: Sequence[Wire]) -> list[tuple[int, Wire]]:
-    """Products of a signal's past, whose first value is one sample old, as positive terms of a sum."""
-    return [(1, g.scale(past[tap.delay - 1], tap.coefficient, tap.frac, f"product_{tap.name}")) for tap in taps]
+def _products(g: GraphBuilder, taps: Sequence[Tap], past: Sequence[Wire], sign: int) -> list[tuple[int, Wire]]:
+    """Products of a signal's past, whose first value is one sample old, as terms of a sum that all have a sign."""
+    shorter = [tap for tap in taps if tap.kept(g[past[0]].frac) < g[past[0]].frac + tap.frac]
+    parts = [part for tap in shorter for part in _parts(tap, sign)]
+    ways = directions([part.coefficient for part in parts])
+    plain = [
+        (sign, g.scale(past[tap.delay - 1], tap.coefficient, tap.frac, tap.label)) for tap in taps if tap not in shorter
+    ]
+    return plain + [
+        shortened(g, past[part.delay - 1], part.coefficient, part.frac, part.kept(g[past[0]].frac), part.label, way)
+        for part, way in zip(parts, ways, strict=True)
+    ]
+
+
+def _parts(tap: Tap, sign: int) -> list[Tap]:
+    """Return the taps that make one, times a sign: two if its constant is a little longer than a block takes."""
+    whole = tap._replace(coefficient=sign * tap.coefficient)
+    upper, dropped, rest = factors(whole.coefficient, _BLOCK_BITS)
+    if not (rest and dropped <= min(tap.frac, _MOST_BEYOND)):
+        return [whole]
+    return [
+        whole._replace(name=f"{tap.name}_rest", coefficient=rest),
+        whole._replace(coefficient=upper, frac=tap.frac - dropped),
+    ]
 
 
 def _delayed(g: GraphBuilder, wire: Wire, name: str, count: int, before: int = 0) -> list[Wire]:

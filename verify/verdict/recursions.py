@@ -112,8 +112,14 @@ class Recursion:
 
     @cached_property
     def is_direct(self) -> bool:
-        """Whether it is a direct form I."""
-        return self.is_single and self._holds(self.total)
+        """Whether it is a direct form I, which goes back two samples at most."""
+        return self.is_single and self.transfer.denominator.degree() <= 2 and self._holds(self.total)
+
+    def looks_ahead(self, distance: int) -> bool:
+        """Whether its loop holds the output alone, of up to twice so many samples ago, and goes back that far."""
+        powers = {k for k, value in enumerate(self.transfer.denominator.coeffs()) if value}
+        roots = {self.transfer.undelayed(self.transfer.states[k])[0] for k in self.loop}
+        return distance > 1 and powers <= {0, distance, 2 * distance} and roots <= {self.output}
 
     @cached_property
     def error_feedback(self) -> tuple[int, ...] | None:
@@ -187,8 +193,7 @@ def _is(name: str, part: Recursion) -> bool:
     nodes = part.stage.nodes
     match = _LOOK_AHEAD.fullmatch(name)
     if match is not None:
-        powers = {k for k, value in enumerate(part.transfer.denominator.coeffs()) if value}
-        return not part.is_direct and powers <= {0, int(match[1]), 2 * int(match[1])}
+        return part.looks_ahead(int(match[1]))
     if name in _FEEDBACK and part.loop:
         most, weights = _FEEDBACK[name], part.error_feedback or (0, 0)
         return part.is_direct and all(abs(weight) <= limit for weight, limit in zip(weights, most, strict=True))

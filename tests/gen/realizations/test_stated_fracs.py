@@ -9,7 +9,7 @@ import pytest
 from tests.gen.word_lengths.filters import butterworth
 
 from sosmith.gen.proof.linear_model import quantizers
-from sosmith.gen.realizations.registry import CASCADES, REALIZATIONS, Section
+from sosmith.gen.realizations.registry import CASCADES, Section, realization_of
 from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
 from sosmith.gen.word_lengths.cascade import stages_of
 from sosmith.model.dataflow.graph import Op, Range
@@ -34,7 +34,7 @@ def in_random_formats(kind: str, order: int, cutoff: float, realization: str) ->
         x = unknown_range(rng.randint(0, 9)) if rng.random() < 0.5 else Range(rng.randint(0, 9), -1000, 999)
         try:
             formats = [SectionFormat(coefficient_bits=rng.randint(8, 30))] * len(
-                REALIZATIONS[realization].parts(ideal.rows)
+                realization_of(realization).parts(ideal.rows)
             )
             stages = stages_of(ideal, realization, formats, x)
             for k, (form, stage) in enumerate(zip(formats, stages, strict=True)):
@@ -46,7 +46,7 @@ def in_random_formats(kind: str, order: int, cutoff: float, realization: str) ->
     return made
 
 
-@pytest.mark.parametrize("realization", CASCADES)
+@pytest.mark.parametrize("realization", [*CASCADES, "look_ahead_4", "look_ahead_6"])
 def test_they_are_those_of_the_graph(realization: str) -> None:
     sections = [section for case in FILTERS for section in in_random_formats(*case, realization)]
     assert len(sections) > TRIES

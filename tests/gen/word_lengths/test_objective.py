@@ -11,7 +11,7 @@ from tests.gen.designs import ALL, example_design, parallel_design
 from sosmith.gen.architectures.registry import ARCHITECTURES
 from sosmith.gen.fpga.boards import find_board
 from sosmith.gen.word_lengths import objective
-from sosmith.gen.word_lengths.objective import SMALL_AREA, Objective, ShortProgram
+from sosmith.gen.word_lengths.objective import SMALL_AREA, FewSums, Objective, ShortProgram
 from sosmith.gen.word_lengths.online_units import OnlineUnits
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.folding import fold
@@ -99,6 +99,15 @@ def test_what_cannot_be_on_line() -> None:
     )
     with pytest.raises(ShortfallError, match=f"^{re.escape(sentence)}$"):
         OnlineUnits().least([g.build([g.bound(g.previous(x, "x1"), -8, 7, "y")])])
+
+
+@pytest.mark.parametrize(("constant", "area"), [(4, 0), (5, 25), (75, 75), (43691, 121)])
+def test_a_product_with_look_ahead_takes_sums_where_these_are_smaller_than_blocks(constant: int, area: int) -> None:
+    """Of 23 bits, it takes two blocks, counted as 40 LUT4 each, and a sum of their pieces."""
+    g = GraphBuilder()
+    x = g.input("x", frac=0, low=-(1 << 22), high=(1 << 22) - 1)
+    graph = g.build([g.scale(x, constant, 17)])
+    assert FewSums(18).of_graph(graph) == area
 
 
 @pytest.mark.parametrize(

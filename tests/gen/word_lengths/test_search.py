@@ -21,6 +21,7 @@ from sosmith.gen.realizations.section_format import SectionFormat
 from sosmith.gen.word_lengths import quantize as quantize_module
 from sosmith.gen.word_lengths.cost import cost_of, cost_of_graphs
 from sosmith.gen.word_lengths.estimates import largest_magnitude
+from sosmith.gen.word_lengths.objective import FewSums
 from sosmith.gen.word_lengths.quantize import Plan, plan, prove
 from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.gen.word_lengths.search import Search
@@ -113,6 +114,28 @@ def test_what_is_estimated_is_what_is_proven(name: str, realization: str) -> Non
     # Of few bits dropped, the largest error is less than a unit; the estimate takes a unit.
     assert 0.999 < rounding / float(made.budget["filter rounding"]) < 1.08
     assert trimmed.size == pytest.approx(cost_of(made.datapath).area, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("order", "realization"), [(1, "look_ahead_8"), pytest.param(3, "look_ahead_6", marks=pytest.mark.slow)]
+)
+def test_products_of_look_ahead_keep_as_many_bits_as_the_others_of_their_sum(order: int, realization: str) -> None:
+    planned = filter_plan("lowpass", order, 0.1, realization).under(FewSums(18))
+    search, choice = search_of(planned.trimmed())
+    zeros, *recursions = (estimate.groups for estimate in search._estimates)
+    assert [group.total for group in zeros] == [""]  # of an FIR filter, whose sum drops nothing
+    assert [[group.total for group in groups] for groups in recursions] == [["u1", "v"]] * len(recursions)
+    kept = [
+        [{form.fracs[name] for name in group.products} for group in groups]
+        for form, groups in zip(choice.formats, (zeros, *recursions), strict=True)
+    ]
+    assert all(len(fracs) == 1 for groups in kept for fracs in groups)
+    made = prove(planned.trimmed())
+    assert 0.9 < search.error(choice) / float(sum(made.budget.values()) - made.budget["output rounding"]) < 1.1
+    whole = [
+        replace(form, fracs={n: f for n, f in form.fracs.items() if "product" not in n}) for form in choice.formats
+    ]
+    assert search.size(choice) < 0.8 * search.size(replace(choice, formats=tuple(whole)))
 
 
 @pytest.mark.parametrize("sign", [1, -1])

@@ -7,8 +7,9 @@ import pytest
 
 from sosmith.hdl.plan.look_ahead import Products, period, plans
 from sosmith.hdl.plan.regrouped_sums import regrouped
-from sosmith.model.dataflow.graph import Graph, GraphBuilder, Op, Wire
+from sosmith.model.dataflow.graph import Graph, GraphBuilder, Op, Range, Wire
 from sosmith.model.sections.horner import HornerStep
+from sosmith.model.sections.look_ahead import LookAhead, Tap
 
 
 def loop(seed: int, turns: int = 4) -> Graph:
@@ -82,3 +83,21 @@ def test_a_constant_longer_than_a_block_takes_no_longer_in_a_loop() -> None:
     products = Products((frozenset(),), 18)
     (plan,) = plans([stage], products)
     assert (plan.turns, plan.distance, period([stage], products)) == (4, 4, 5)
+
+
+def test_a_product_of_the_newest_state_waits_for_sums_that_are_there_as_early() -> None:
+    """Products drop bits; the older state's is added to what is there before, and not to the newest one's."""
+    section = LookAhead(
+        name="loop",
+        distance=3,
+        factors=(),
+        recursion=(Tap("A1", -1729795, 20, 3, 15), Tap("A2", 205769, 18, 6, 15)),
+        x=Range(14, -(1 << 23), 1 << 23),
+        fracs=(),
+        ranges=(),
+        y_frac=11,
+        v_range=(-(1 << 27), 1 << 27),
+    )
+    products = Products((frozenset(i for i, node in enumerate(section.graph.nodes) if abs(node.parameter) < 4),), 18)
+    (plan,) = plans([section], products)
+    assert (plan.turns, plan.distance, period([section], products)) == (3, 3, 10)

@@ -89,8 +89,8 @@ BREAKS = {
         rf"section1\.y_3_memory must hold {NODE}section1 and be written for the turn of the sample",
     ),
     "another word written": (
-        r"(y_3_memory\[turn2\] <= )v\[21:9\]",
-        r"\1v[20:8]",
+        r"(y_3_memory\[turn2\] <= )v\[14:2\]",
+        r"\1v[13:1]",
         rf"section1\.y_3_memory must hold {NODE}section1 and take over {NODE}section1 of 0 samples ago, not another "
         "value",
     ),
@@ -117,14 +117,16 @@ def test_each_kind_of_break_is_named(kind: str) -> None:
 
 
 WIDE = PLAIN.replace("bits = 8", "bits = 18")
-"""The products of its recursion take two multiplier blocks each."""
+"""The products of its recursion take two multiplier blocks each, and drop the bits below those of their sum."""
 
 PIECES = {
-    "a piece by another number": (r"(assign scale_11 = y_3_word\[16:0\] \* 15'h554)f", r"\g<1>e"),
-    "pieces of another cut": (r"y_3_word\[22:17\]", "y_3_word[21:16]"),
-    "a piece a place too low": (r"\{ scale_10_passed3, 20'h00000 \}", "{ scale_10_passed3, 19'h00000 }"),
-    "a lower piece with a sign": (r"\$signed\(\{ 1'h0, scale_11_passed3 \}\)", "$signed(scale_11_passed3)"),
-    "a piece of the sample behind": (r"(add_14 = .*1'h0, )scale_11_passed3", r"\1scale_11"),
+    "a piece by another number": (r"(assign scale_13 = y_3_word\[16:0\] \* 15'h554)f", r"\g<1>e"),
+    "pieces of another cut": (r"y_3_word\[24:17\]", "y_3_word[23:16]"),
+    "a piece a place too low": (r"\{ scale_12_passed3, 17'h00000 \}", "{ scale_12_passed3, 16'h0000 }"),
+    "a lower piece with a sign": (r"\$signed\(\{ 1'h0, scale_13_passed3 \}\)", "$signed(scale_13_passed3)"),
+    "a piece of the sample behind": (r"(product_A1 \} = .*1'h0, )scale_13_passed3", r"\1scale_13"),
+    "a product that is rounded up": (r"(product_A1 \} = .*, )17'h00000", r"\g<1>17'h1ffff"),
+    "a product that drops a bit more": (r"product_A1\[38:17\]", "{ product_A1[38:18], 1'h0 }"),
 }
 
 
