@@ -85,18 +85,6 @@ class Budget:
             f"{_in_full(self.clock, 12)} Hz{many} the sample rate must be at most {most} Hz, not {wanted} Hz"
         )
 
-    def check_blocks(self, architecture: Architecture) -> None:
-        """Check that `architecture` takes no more multiplier blocks than the specification names, or than one.
-
-        Raises
-        ------
-        ShortfallError
-            If it takes more.
-        """
-        most, needed = self.blocks.asked or 1, architecture.multiplier_blocks
-        if needed > most:
-            raise ShortfallError(f"hardware.multipliers must be at least {needed} for its products, not {most}")
-
 
 def _distinct_texts(most: Fraction, wanted: Fraction) -> tuple[str, str]:
     """Texts of two rates with enough digits to tell them apart; `most` is rounded down, so that it is achievable."""

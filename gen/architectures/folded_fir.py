@@ -59,21 +59,23 @@ class FoldedFir(Architecture):
         """Times that each result is handed out."""
         return self._down.factor if self.hold else 1
 
+    @cached_property
+    def in_turn(self) -> StepsInTurn:
+        """The steps as the multiplier takes them."""
+        return self._steps()
+
+    def _steps(self, *, block: int | None = None) -> StepsInTurn:
+        return StepsInTurn((self.plan,), self.datapath.inputs[0], block)
+
     @property
     def multiplier_blocks(self) -> int:
         """Multiplier blocks that it takes: several where a sum of two samples or a coefficient is too wide for one."""
-        return self.blocks_of(self.plan)
-
-    def blocks_of(self, plan: TapSteps | StepsInTurn) -> int:
-        """Count the multiplier blocks of steps."""
-        (port,) = self.datapath.inputs
-        data = Operand(plan.pair_bits(port), signed=True)
-        return Multiplication(data, Operand(plan.factor_bits, signed=True)).blocks_of(self.blocks.bits)
+        return blocks_of(self.in_turn, self.blocks.bits)
 
     @property
     def memory_bits(self) -> int:
         """Bits of the samples that it keeps of a channel, once."""
-        return self.plan.words * self.datapath.inputs[0].bits
+        return self.in_turn.words * self.datapath.inputs[0].bits
 
     @property
     def bank_size(self) -> tuple[int, int]:
@@ -92,15 +94,15 @@ class FoldedFir(Architecture):
 
     @property
     def _latency_cycles(self) -> int:
-        return self.plan.latency_cycles(self.channels)
+        return self.in_turn.latency_cycles(self.channels)
 
     @property
     def _cycles_per_sample(self) -> int:
-        return self.plan.cycles_per_result(self._down.factor, self.channels)
+        return self.in_turn.cycles_per_result(self._down.factor, self.channels)
 
     @property
     def _cleared_cycles(self) -> int:
-        return self.plan.reset_cycles(self.channels)
+        return self.in_turn.reset_cycles(self.channels)
 
     @property
     def cycles_per_result(self) -> int:
@@ -125,6 +127,7 @@ class FoldedFir(Architecture):
         return RingCore(
             self.datapath,
             self.channels,
+            block=self.in_turn.block,
             copies=self.copies_per_result,
             fingerprint=self.fingerprint,
             lock=self.reload_lock,
@@ -141,4 +144,17 @@ class FoldedFir(Architecture):
 
 @dataclass(frozen=True)
 class NarrowFir(FoldedFir):
-    """The same where each product fits one multiplier block, or as many as the specification names."""
+    """The same with one multiplier block, or no more than the specification names: wider factors have digits."""
+
+    @cached_property
+    def in_turn(self) -> StepsInTurn:
+        """The steps as the multiplier takes them; whole products if other coefficients can be loaded."""
+        whole = self._steps()
+        narrow = self.reload or blocks_of(whole, self.blocks.bits) <= (self.blocks.asked or 1)
+        return whole if narrow else self._steps(block=self.blocks.bits)
+
+
+def blocks_of(steps: StepsInTurn, bits: int) -> int:
+    """Count the multiplier blocks, whose operands have so many bits, that steps need."""
+    data, factor = (Operand(each, signed=True) for each in (steps.data_bits, steps.factor_bits))
+    return Multiplication(data, factor).blocks_of(bits)

@@ -31,8 +31,8 @@ def candidates(
 ) -> tuple[type[Architecture], ...]:
     """Architectures to try for the one that the specification asks for beside `options`, the smallest first.
 
-    `rings` says that the core is an FIR filter whose samples a ring of memory can hold. That takes fewer clocks than a
-    program in the folded architecture, but its products may need several multiplier blocks, where a program has digits.
+    `rings` says that the core is an FIR filter whose samples a ring of memory can hold, which takes fewer clocks than a
+    program in the folded architecture.
     """
     if FIR_DECIMATE in options:  # the terms leave no other
         return (FoldedFir,)
@@ -42,7 +42,7 @@ def candidates(
         kinds = tuple(each for each in SMALLEST_FIRST if each.is_tried(blocks) and each.terms.takes(options))
     if not rings:
         return kinds
-    folded = (NarrowFir, Folded, FoldedFir) if blocks.asked is None else (NarrowFir, Folded)
+    folded = (NarrowFir, FoldedFir) if blocks.asked is None else (NarrowFir,)
     return tuple(each for kind in kinds for each in (folded if kind is Folded else (kind,)))
 
 
@@ -79,8 +79,6 @@ def fitting(
         budget.reload_registers,
     )
     budget.check(architecture)
-    if isinstance(architecture, NarrowFir):
-        budget.check_blocks(architecture)
     if budget.reload:
         architecture.check_registers()
     return architecture

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from sosmith.gen.architectures.folded_fir import FoldedFir
-from sosmith.gen.architectures.shared_fir import SharedFir
 from sosmith.gen.estimate.graphs import clamp
 from sosmith.gen.estimate.memories import of_memory, of_rom
 from sosmith.gen.estimate.products import Product, of_product
@@ -23,7 +22,6 @@ from sosmith.gen.estimate.quantities import (
 from sosmith.gen.fpga.boards import Device
 from sosmith.gen.word_lengths.cost import Multiplication, Operand
 from sosmith.hdl.plan.streams import channel_bits
-from sosmith.hdl.plan.tap_steps import StepsInTurn
 from sosmith.model.dataflow.graph import Op
 
 _CONTROL, _STATES = 75, 19
@@ -69,13 +67,13 @@ class Rings(NamedTuple):
 def of_rings(architecture: FoldedFir, device: Device) -> Quantities:
     """Count the rings, the table of steps, the multiplier, the sum, and what moves samples."""
     datapath = architecture.datapath
-    plan = architecture.in_turn if isinstance(architecture, SharedFir) else StepsInTurn((architecture.plan,))
+    plan = architecture.in_turn
     (port,), graph = datapath.inputs, datapath.stages[-1].graph
     place, factor = (plan.words - 1).bit_length(), plan.factor_bits
     rings = Rings(
         words=plan.words,
         data_bits=port.bits,
-        pair_bits=plan.pair_bits(port),
+        pair_bits=plan.data_bits,
         pairs=plan.pairs,
         factor_bits=factor,
         sum_bits=graph.nodes[graph.inputs[0]].width + 1,

@@ -109,6 +109,9 @@ class RingCore(Shell):
     others : sequence of Datapath
         What it computes of each sample after that, one result after the other: filters alike but for their taps, with
         fixed coefficients.
+    block : int or None
+        Bits of an operand of a multiplier block that each product must fit, with fixed coefficients; None for whole
+        products.
     copies : int
         Times that each result leaves.
     fingerprint : int or None
@@ -130,6 +133,7 @@ class RingCore(Shell):
         channels: int = 1,
         *,
         others: Sequence[Datapath] = (),
+        block: int | None = None,
         copies: int = 1,
         fingerprint: int | None = None,
         lock: bool = False,
@@ -139,7 +143,8 @@ class RingCore(Shell):
             raise ValueError("datapath must have a downsampler")
         self._down: Downsampler = datapath.downsampler
         self._filters = (datapath, *others)
-        self._steps = StepsInTurn(tuple(tap_steps(each, loadable=fingerprint is not None) for each in self._filters))
+        steps = tuple(tap_steps(each, loadable=fingerprint is not None) for each in self._filters)
+        self._steps = StepsInTurn(steps, datapath.inputs[0], block)
         self._copies = copies
         # Flags are those of a result that can be limited, if any can.
         limited = [each for each in self._filters if _last_node(each).op is Op.CLAMP]
@@ -382,7 +387,6 @@ class RingCore(Shell):
     ) -> Signal:
         """Build the table of steps, the rings, and the multiplier; return the sum."""
         plan = self._steps
-        (port,) = self.datapath.inputs
         pairs = plan.pairs
         alone = pairs and any(step.second is None for steps in plan.rounds for step in steps)
         differs = any(step.sign < 0 for steps in plan.rounds for step in steps)
@@ -394,6 +398,8 @@ class RingCore(Shell):
                 "second": bits if pairs else 0,
                 "alone": int(alone),
                 "minus": int(differs),
+                "part": (plan.parts - 1).bit_length(),
+                "shift": plan.shifts.bit_length(),
                 **({"coefficient": signed(factor_bits)} if reload is None else {}),
             }
         )
@@ -404,6 +410,8 @@ class RingCore(Shell):
             second = step.first if step.second is None else step.second
             rows[k] |= step.first << at["first"] | (second << at["second"] if pairs else 0)
             rows[k + 1] |= (step.second is None) * alone << at["alone"] | (step.sign < 0) << at["minus"]
+            rows[k + 1] |= step.part << at["part"]
+            rows[k + _LATER + 1] |= step.shift << at["shift"]
             if reload is None:
                 rows[k + _LATER] |= (step.coefficient & ((1 << factor_bits) - 1)) << at["coefficient"]
         check = CheckBits(layout.size, self.protect)
@@ -411,7 +419,7 @@ class RingCore(Shell):
         m.submodules.steps_memory = table = Memory(shape=check.width, depth=len(rows), init=words)
         reader = read_port(table, "steps")
         m.d.comb += [reader.addr.eq(Cat(self._step, self._turn)), reader.en.eq(1)]
-        needed = self._in_steps(1, _LATER + most)
+        needed = self._in_steps(1, _LATER + most + (plan.shifts > 0))
         row = data.View(layout, self._checked(m, check, reader.data, "steps", needed))
         if reload is None:
             coefficient: Value = row.coefficient
@@ -424,13 +432,13 @@ class RingCore(Shell):
             self._ring(m, name, getattr(row, name), write, needs)
             for name, needs in (("first", needed), ("second", second_needed))[: 1 + pairs]
         ]
-        pair = Signal(signed(plan.pair_bits(port)), name="pair", reset_less=True)
+        pair = Signal(signed(plan.data_bits), name="pair", reset_less=True)
         first, second = taps[0], taps[-1]
         other: Value = Mux(row.alone, 0, second) if alone else second
         both: Value = first if not pairs else Mux(row.minus, first - other, first + other) if differs else first + other
         product = Signal(signed(len(pair) + factor_bits), name="product", reset_less=True)
         # On the grid of the sum, which may be finer by what an offset of the output needs.
-        m.d.sync += [pair.eq(both), product.eq(pair * coefficient)]
+        m.d.sync += [pair.eq(self._part(m, both, row.part)), product.eq(pair * coefficient)]
         grid, begin = self._rounding()
         filters = self._filters if reload is None else [with_room(each) for each in self._filters]
         ends = [end for each in map(_unlimited, filters) for end in (each.low, each.high)]
@@ -438,8 +446,25 @@ class RingCore(Shell):
         total = Signal(signed(max(map(_bits, ends)) + 1 + span), name="total", reset_less=True)
         shift = grid - max(map(_source_frac, self._filters))
         base = Mux(self._step == PIPELINE, Const(begin, signed(len(total))), total)
-        m.d.sync += total.eq(base + (product << shift))
+        shifted: Value = product << shift
+        for places in range(1, plan.shifts + 1):
+            shifted = Mux(row.shift == places, product << (shift + places * plan.digit_bits), shifted)
+        m.d.sync += total.eq(base + shifted)
         return total
+
+    def _part(self, m: Module, both: Value, part: Value) -> Value:
+        """Return a digit of a sum of two samples, or all of it if it has one."""
+        plan = self._steps
+        if plan.parts == 1:
+            return both
+        whole = Signal(signed(plan.pair_bits), name="pair_of_samples")
+        m.d.comb += whole.eq(both)
+        low = plan.digit_bits * (plan.parts - 1)
+        digit: Value = whole[low:].as_signed()
+        for place in range(plan.parts - 1):
+            start = plan.digit_bits * place
+            digit = Mux(part == place, whole[start : start + plan.digit_bits], digit)
+        return digit
 
     def _rounding(self) -> tuple[int, int]:
         """Return the fraction bits of the sum, and what it begins with: offset of the output, and half a step."""

@@ -32,12 +32,18 @@ class TapStep:
         That of the other one; None if there is none.
     sign : int
         Sign of the second one, 1 or -1.
+    part : int
+        Which digit of their sum is multiplied, 0 for all of it.
+    shift : int
+        Digits by which the product is moved up.
     """
 
     coefficient: int
     first: int
     second: int | None = None
     sign: int = 1
+    part: int = 0
+    shift: int = 0
 
 
 @dataclass(frozen=True)
@@ -107,54 +113,32 @@ class TapSteps:
         """Samples that the ring of a channel holds, a power of two from 2 on."""
         return max(2, 1 << (self.section.length - 1).bit_length())
 
-    @property
-    def last_step(self) -> int:
-        """Number of the clock at which the sum is complete, from the first step on."""
-        return len(self.steps) + PIPELINE
-
-    def cycles_per_result(self, factor: int, channels: int) -> int:
-        """Clocks between results of a channel at the highest rate; each takes `factor` samples."""
-        return factor * (1 + (channels > 1)) + self.last_step + 1
-
-    def latency_cycles(self, channels: int) -> int:
-        """Most clocks from the edge that accepts a sample to the edge that can output its result.
-
-        With several channels, that of the first sample of one, which fills the ring.
-        """
-        filled = self.words + 2 if channels > 1 else 0
-        return filled + self.last_step + 2
-
-    def reset_cycles(self, channels: int) -> int:
-        """Clocks after a reset until a sample on offer is accepted: while the ring is filled, or channels cleared."""
-        return channels if channels > 1 else self.words
-
 
 @dataclass(frozen=True)
 class StepsInTurn:
     """The steps of filters that one multiplier computes one after the other, from the same samples.
 
-    Coefficients are on the finest grid of all.
+    Coefficients are on the finest grid of all. Where a multiplier block is too narrow for a product, factors have
+    digits, and a tap takes a step for each two of them.
 
     Attributes
     ----------
     filters : tuple of TapSteps
         At least one.
+    port : Port
+        Format of the samples.
+    block : int or None
+        Bits of an operand of the block, with its sign, that each product must fit; None for whole products.
     """
 
     filters: tuple[TapSteps, ...]
+    port: Port
+    block: int | None = None
 
     @property
     def frac(self) -> int:
         """Fraction bits of all coefficients."""
         return max(each.frac for each in self.filters)
-
-    @cached_property
-    def rounds(self) -> tuple[tuple[TapStep, ...], ...]:
-        """The steps of each filter."""
-        return tuple(
-            tuple(replace(step, coefficient=step.coefficient << self.frac - each.frac) for step in each.steps)
-            for each in self.filters
-        )
 
     @property
     def pairs(self) -> bool:
@@ -162,13 +146,56 @@ class StepsInTurn:
         return any(each.pairs for each in self.filters)
 
     @property
-    def factor_bits(self) -> int:
-        """Bits of a coefficient, with its sign."""
-        return max(each.factor_bits + self.frac - each.frac for each in self.filters)
-
-    def pair_bits(self, port: Port) -> int:
+    def pair_bits(self) -> int:
         """Bits of a sum or a difference of two samples, or of one sample if no step adds two, with its sign."""
-        return max(each.pair_bits(port) for each in self.filters)
+        return max(each.pair_bits(self.port) for each in self.filters)
+
+    @property
+    def digit_bits(self) -> int:
+        """Bits of a digit but the top one, which has a sign too."""
+        return (self.block or self.pair_bits) - 1
+
+    @property
+    def parts(self) -> int:
+        """Digits of a sum of two samples."""
+        return 1 if self.block is None else max(1, -(-(self.pair_bits - 1) // self.digit_bits))
+
+    @cached_property
+    def rounds(self) -> tuple[tuple[TapStep, ...], ...]:
+        """The steps of each filter."""
+        return tuple(
+            tuple(
+                replace(step, coefficient=digit, part=part, shift=part + place)
+                for step in each.steps
+                for place, digit in enumerate(self._digits(step.coefficient << self.frac - each.frac))
+                for part in range(self.parts)
+            )
+            for each in self.filters
+        )
+
+    def _digits(self, coefficient: int) -> list[int]:
+        """Split a coefficient into as few digits as it needs, the lowest first; only the top one has a sign."""
+        digits = list[int]()
+        while self.block is not None and not -(1 << self.digit_bits) <= coefficient < 1 << self.digit_bits:
+            digits.append(coefficient & (1 << self.digit_bits) - 1)
+            coefficient >>= self.digit_bits
+        return [*digits, coefficient]
+
+    @property
+    def shifts(self) -> int:
+        """Digits by which a product is moved up at most."""
+        return max(step.shift for steps in self.rounds for step in steps)
+
+    @property
+    def factor_bits(self) -> int:
+        """Bits of a coefficient, or of a digit of one, with its sign; with those to spare where others are loaded."""
+        whole = max(each.factor_bits + self.frac - each.frac for each in self.filters)
+        return whole if self.block is None else min(whole, self.block)
+
+    @property
+    def data_bits(self) -> int:
+        """Bits of what a coefficient is multiplied by, with its sign."""
+        return self.pair_bits if self.parts == 1 else self.digit_bits + 1
 
     @property
     def words(self) -> int:
@@ -178,14 +205,17 @@ class StepsInTurn:
     @property
     def last_steps(self) -> tuple[int, ...]:
         """Number of the clock at which each sum is complete, from the first step of its filter on."""
-        return tuple(each.last_step for each in self.filters)
+        return tuple(len(steps) + PIPELINE for steps in self.rounds)
 
-    def cycles_per_sample(self, channels: int) -> int:
-        """Clocks between samples of a channel at the highest rate."""
-        return 1 + (channels > 1) + sum(last + 1 for last in self.last_steps)
+    def cycles_per_result(self, factor: int, channels: int) -> int:
+        """Clocks between results of a channel, or between all results of two samples, each of `factor` samples."""
+        return factor * (1 + (channels > 1)) + sum(last + 1 for last in self.last_steps)
 
-    def latency_cycles(self, channels: int, turn: int) -> int:
-        """Most clocks from the edge that accepts a sample to the edge that can output its result number `turn`."""
+    def latency_cycles(self, channels: int, turn: int = 0) -> int:
+        """Most clocks from the edge that accepts a sample to the edge that can output its result number `turn`.
+
+        With several channels, that of the first sample of one, which fills the ring.
+        """
         filled = self.words + 2 if channels > 1 else 0
         return filled + sum(last + 1 for last in self.last_steps[: turn + 1]) + 1
 

@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 
 import sosmith
-from sosmith.gen.architectures.folded_fir import FoldedFir, NarrowFir
+from sosmith.gen.architectures.folded_fir import FoldedFir
 from sosmith.gen.architectures.shared_fir import SharedFir, shared
-from sosmith.gen.architectures.shared_unit import SharedUnit
 from sosmith.gen.fpga.boards import find_board
 from sosmith.model.errors import ShortfallError, SpecificationError
 
@@ -90,38 +89,37 @@ def test_what_cannot_share_is_told() -> None:
     with pytest.raises(ShortfallError, match=r"^one multiplier must have 23 clocks a sample for all results, not 22$"):
         shared(steady, 22)
     few = [replace(each, blocks=each.blocks._replace(bits=3)) for each in steady]
+    assert [each.block for each in shared(few, 200)] == [3, 3, 3]
     sentence = "results that share a multiplier must take no more multiplier blocks than there are results"
     with pytest.raises(ShortfallError, match=f"^{re.escape(sentence)}$"):
-        shared(few, 100)
+        shared(few, 30)
 
 
 @pytest.mark.parametrize(
-    ("bits", "clock", "multipliers", "kind"),
+    ("clock", "multipliers", "blocks", "clocks"),
     [
-        (8, 1e6, None, NarrowFir),
-        (24, 10e6, None, SharedUnit),  # a product of 25 by 24 bits takes four blocks, a program one
-        (24, 0.2e6, None, FoldedFir),
-        (24, 10e6, 4, NarrowFir),
-        (24, 10e6, 3, SharedUnit),
+        (10e6, None, 1, 2 * 2 * 3 + 6),  # a product of 25 by 25 bits is one of two digits by two
+        (0.1e6, None, 4, 3 + 6),
+        (10e6, 4, 4, 3 + 6),
+        (10e6, 3, 1, 2 * 2 * 3 + 6),
     ],
 )
-def test_wide_products_are_those_of_a_program_where_there_is_time(
-    bits: int, clock: float, multipliers: int | None, kind: type
+def test_wide_products_have_digits_where_there_is_time(
+    clock: float, multipliers: int | None, blocks: int, clocks: int
 ) -> None:
     tree = {
         "name": "wide",
         "sample_rate": 8000.0,
-        "input": {"x": {"bits": bits, "range": [-1.0, 1.0], "signed": True}},
+        "input": {"x": {"bits": 24, "range": [-1.0, 1.0], "signed": True}},
         "filter": {"taps": [0.1, 0.2345678, 0.3456789, 0.2345678, 0.1]},
-        "output": {"bits": bits, "range": [-2.0, 2.0], "signed": True},
+        "output": {"bits": 24, "range": [-2.0, 2.0], "signed": True},
         "hardware": {"clock": clock, "architecture": "folded"}
         | ({} if multipliers is None else {"multipliers": multipliers}),
     }
     architecture = sosmith.design(sosmith.Specification.load(tree)).core.architecture
-    assert isinstance(architecture, kind)
-    if kind is FoldedFir:
-        assert not isinstance(architecture, NarrowFir)
-        assert architecture.multiplier_blocks == 4
+    assert isinstance(architecture, FoldedFir)
+    assert architecture.multiplier_blocks == blocks
+    assert architecture.cycles_per_sample == clocks
 
 
 def test_a_result_is_packed_with_its_chain(tmp_path: Path) -> None:

@@ -202,13 +202,13 @@ def _hardware_rows(architecture: Architecture) -> list[tuple[str, str]]:
     program, cost = architecture.program, architecture.cost
     latency = ("latency", f"{architecture.latency_cycles:,} clocks")
     if isinstance(architecture, FoldedFir):
-        port, plan, shared = architecture.datapath.inputs[0], architecture.plan, ""
+        port, plan, turn, shared = architecture.datapath.inputs[0], architecture.in_turn, 0, ""
         if isinstance(architecture, SharedFir):
-            shared = f", for all {len(architecture.results)} results of a sample"
-        steps = f"{len(plan.steps)} steps for a result{shared}"
+            turn, shared = architecture.turn, f", for all {len(architecture.results)} results of a sample"
+        steps = f"{len(plan.rounds[turn])} steps for a result{shared}"
         return [
             latency,
-            ("multipliers", f"1 of {plan.pair_bits(port)} x {plan.factor_bits}, {steps}"),
+            ("multipliers", f"1 of {plan.data_bits} x {plan.factor_bits}, {steps}"),
             ("memory", f"{plan.words:,} samples of {port.bits} bits a channel{', twice' * plan.pairs}"),
         ]
     if program is None:
