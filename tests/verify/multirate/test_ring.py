@@ -38,13 +38,30 @@ def made(channels: int = 1, start: str = "zero", *, hold: bool = False) -> Made:
         "output": {"bits": 7, "range": [-0.5, 0.5], "signed": True},
         "hardware": {"start": start, "clock": 1e6},
     }
-    design = sosmith.design(sosmith.Specification.load(tree))
+    return proven_alone(sosmith.design(sosmith.Specification.load(tree)))
+
+
+def proven_alone(design: sosmith.Design) -> Made:
     core = design.core
     text = core_verilog(core)
     own = certificate(core.quantized, core.spec.max_error, about(core, {}))
     assert own.about is not None
     assert own.about.item is not None
     return Made(design, text, own, own.about.item)
+
+
+@cache
+def wide() -> Made:
+    """Make a filter all of whose results leave, and whose sums of two samples have two digits for a multiplier block."""
+    tree = {
+        "name": "little",
+        "sample_rate": 1000.0,
+        "input": {"x": {"bits": 20, "range": [-1.0, 1.0], "signed": True}},
+        "filter": {"taps": [0.3, 0.17, -0.17, 0.3]},
+        "output": {"bits": 7, "range": [-1.0, 1.0], "signed": True},
+        "hardware": {"clock": 1e6, "architecture": "folded"},
+    }
+    return proven_alone(sosmith.design(sosmith.Specification.load(tree)))
 
 
 def check(core: Made, text: str = "") -> None:
@@ -138,3 +155,23 @@ def test_a_certificate_that_says_otherwise() -> None:
     short = steady.certificate.model_copy(update={"downsampling": DownsamplingEntry(factor=3, filled=3)})
     with pytest.raises(RejectedError, match=r"^a filter that decimates must be filled 4 times, not 3$"):
         verify(short)
+
+
+def test_digits_are_proven() -> None:
+    core = wide()
+    verdict = check_rings(core.text, core.certificate, core.item)
+    assert (verdict.interval, verdict.latency) == (10, 10)
+    assert (core.design.cycles_per_sample, core.design.latency_cycles) == (10, 10)
+
+
+@pytest.mark.sweep(3)
+@pytest.mark.parametrize(("row", "bit"), [(1, 5), (2, 5), (4, 5), (3, 6), (4, 6), (6, 6), (2, 7), (3, 13)])
+def test_no_digit_is_free(row: int, bit: int) -> None:
+    """Which digit a step takes, and by how much its product is moved up, stand one and three rows below it."""
+    core = wide()
+    at, width, value = re.findall(r"steps_memory\[(\d+)\] = (\d+)'h([0-9a-f]+);", core.text)[row]
+    wrong = int(value, 16) ^ 1 << bit
+    text = core.text.replace(f"steps_memory[{at}] = {width}'h{value};", f"steps_memory[{at}] = {width}'h{wrong:04x};")
+    assert text != core.text
+    with pytest.raises(RejectedError):
+        check(core, text)
