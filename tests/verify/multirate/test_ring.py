@@ -52,7 +52,7 @@ def proven_alone(design: sosmith.Design) -> Made:
 
 @cache
 def wide() -> Made:
-    """Make a filter all of whose results leave, and whose sums of two samples have two digits for a multiplier block."""
+    """Make a filter all of whose results leave, and whose sums of two samples have two digits for a block."""
     tree = {
         "name": "little",
         "sample_rate": 1000.0,
