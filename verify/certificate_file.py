@@ -302,7 +302,9 @@ class StreamEntry(Entry):
 _Architecture = Literal["parallel", "folded", "serial", "online"]
 _Code = Annotated[int, Field(strict=True, ge=-(1 << 31), lt=1 << 32)]
 _Codes = tuple[_Code, _Code]
-_Count = Annotated[int, Field(strict=True, ge=1, le=1 << 12)]
+_MOST_CHANNELS = 1 << 16
+_Channels = Annotated[int, Field(strict=True, ge=1, le=_MOST_CHANNELS)]
+_Samples = Annotated[int, Field(strict=True, ge=1, le=1 << 12)]
 
 
 class ItemEntry(Entry):
@@ -322,8 +324,8 @@ class ItemEntry(Entry):
     core: Literal["instrument", "filter", "calibration"]
     architecture: _Architecture
     ahead: _Architecture | None = None
-    channels: _Count
-    samples: _Count
+    channels: _Channels
+    samples: _Samples
     start: Literal["zero", "steady"]
     hold: Annotated[bool, Field(strict=True)]
     protect: Literal["none", "detect", "correct"]
@@ -334,7 +336,7 @@ class ItemEntry(Entry):
     shared: Annotated[bool, Field(strict=True)] = False
     flags: dict[Text, Annotated[int, Field(strict=True, ge=0, lt=64)]]
     calibrated: Annotated[tuple[_Codes, ...], Field(max_length=2)] = ()
-    wear: Annotated[tuple[_Codes, ...], Field(max_length=1 << 12)] = ()
+    wear: Annotated[tuple[_Codes, ...], Field(max_length=_MOST_CHANNELS)] = ()
     taken: StreamEntry
     given: StreamEntry
 

@@ -76,7 +76,8 @@ def _paint_delay(axes: Axes, facts: FilterFacts) -> None:
     factor, unit = scale(most, "s")
     for delay, (_, label, line) in zip(delays, _both(facts), strict=True):
         axes.plot(frequency, delay * factor, label=label, **line)
-    axes.set_ylim(min(0.0, 1.1 * float(np.nanmin(delays[0])) * factor), most * factor)
+    # A constant factor has no delay, which leaves the upper end to matplotlib.
+    axes.set_ylim(min(0.0, 1.1 * float(np.nanmin(delays[0])) * factor), most * factor if most else None)
     axes.set(xlabel="frequency", ylabel=f"group delay ({unit})")
     axes.set_title("Group delay", loc="left")
     frequency_axis(axes, frequency)

@@ -18,10 +18,12 @@ from tests.gen.designs import ALL, example_design, with_rows, zero_design
 from tests.gen.word_lengths.filters import OUT, SIGNED, butterworth, plain
 from tests.verify.certificate_edits import PLACE, all_edits, edited, is_rejected, proven, rejected, wrongly_accepted
 
+import sosmith
 from sosmith.cli import main
 from sosmith.gen.filter.design import design
-from sosmith.gen.output.certificate import certificate
+from sosmith.gen.output.certificate import about, certificate
 from sosmith.gen.realizations.registry import CASCADES, REALIZATIONS
+from sosmith.gen.specification.schema import MAX_CHANNELS
 from sosmith.gen.specification.specification import FilterSpec
 from sosmith.gen.word_lengths.quantize import quantize
 from sosmith.model.dataflow.graph import Op
@@ -523,6 +525,16 @@ def test_a_node_that_refers_to_a_later_one_without_operands(operands: list[int])
 
 
 # The file and the command.
+
+
+def test_as_many_channels_as_a_specification_takes() -> None:
+    keys: dict[str, Any] = {"channels": MAX_CHANNELS, "input_bits": 8, "clock": 1e9}
+    spec = sosmith.Specification.from_taps(
+        [0.5, 0.25], 100.0, realization="fir_direct", architecture="parallel", **keys
+    )
+    item = about(sosmith.design(spec).core, {}).item
+    assert item is not None
+    assert item.channels == MAX_CHANNELS
 
 
 def test_text_and_back(tmp_path: Path) -> None:
