@@ -2,6 +2,7 @@
 
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
+from typing import Any
 
 import pytest
 from amaranth.hdl import Assert, Module, Mux, Signal, signed
@@ -9,7 +10,7 @@ from amaranth.lib.wiring import Component, In, Out
 from tests.formal.prover import INDUCTION, Proof, broken, prove
 
 from sosmith.gen.architectures.architecture import DIGIT_BITS
-from sosmith.hdl.cores import folded
+from sosmith.hdl.cores import multiply_accumulate
 
 SHORT_DIGIT_BITS = 3
 
@@ -41,8 +42,10 @@ class SerialMultiplier(Component):
         with m.If(self.advance):
             m.d.sync += self.multiplies.eq(self.starts)
         added = Signal(self.total.shape())
-        unit, control = SimpleNamespace(_word=self.word), (self.advance, self.multiplies)
-        self.module.FoldedCore._multiply_serially(unit, m, (self.total, added), (self.data, self.factor), control)
+        unit: Any = SimpleNamespace(word=self.word)
+        control = self.advance, self.multiplies
+        multiply = self.module.MultiplyAccumulate._multiply_serially
+        multiply(unit, m, (self.total, added), (self.data, self.factor), control)
         with m.If(self.multiplies):
             m.d.sync += self.total.eq(added)
         with m.If(self.advance & self.clears):
@@ -109,7 +112,9 @@ class Multiplication(Proof):
             m.d.comb += Assert(d.total == product)
 
 
-def multiplication(module: ModuleType = folded, digit_bits: int = DIGIT_BITS, *, whole: bool = False) -> Proof:
+def multiplication(
+    module: ModuleType = multiply_accumulate, digit_bits: int = DIGIT_BITS, *, whole: bool = False
+) -> Proof:
     return Multiplication(SerialMultiplier(module, digit_bits), whole=whole)
 
 
@@ -136,4 +141,4 @@ def test_a_short_serial_multiplier_multiplies(tmp_path: Path) -> None:
 )
 def test_a_broken_multiplier_is_found_out(right: str, wrong: str, tmp_path: Path) -> None:
     # Short words, so that PDR sees the failure from reset on, and not only that a step does not follow.
-    assert prove(multiplication(broken(folded, right, wrong), SHORT_DIGIT_BITS), tmp_path) == "FAIL"
+    assert prove(multiplication(broken(multiply_accumulate, right, wrong), SHORT_DIGIT_BITS), tmp_path) == "FAIL"

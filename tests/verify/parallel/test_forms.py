@@ -204,3 +204,11 @@ def test_upper_bits_are_those_of_what_was_rounded_where_the_lower_ones_round_off
     assert not forms.keys(rounded) - {"change", "first"}
     for bits in (1, 9, 10, 11):
         assert forms.floor(shifted(total, -bits)) == forms.floor(shifted(rounded, -bits))
+
+
+@pytest.mark.parametrize(("high", "coarse"), [(7, True), (8, False)])
+def test_what_never_reaches_a_step_is_left_out(high: int, coarse: bool) -> None:
+    """``floor((8 i + r) / 16)`` is ``floor(i / 2)`` as long as r is below 8."""
+    forms = Forms()
+    i, r = forms.variable("i", 0, 1000), forms.variable("r", 0, high)
+    assert (forms.floor(plus(shifted(i, -1), shifted(r, -4))) == forms.floor(shifted(i, -1))) == coarse

@@ -11,6 +11,7 @@ from tests.verify.small_specifications import PLAIN
 
 from sosmith.verify.graph import RejectedError
 from sosmith.verify.reader.source import read_source
+from sosmith.verify.reader.tokens import Tokens
 
 OUTSIDE = "^the SystemVerilog must be made of its plain subset, not have "
 
@@ -326,3 +327,9 @@ def test_so_is_one_of_which_a_bit_takes_nothing_over() -> None:
     text = edited("held <= n1;", "held[2:0] <= n1[2:0];").replace("held <= table1[a[1:0]];", "held[2:0] <= a[2:0];")
     with pytest.raises(RejectedError, match=r"^each bit of held in top must be loaded at one place$"):
         read_source(text, "top")
+
+
+def test_what_stands_around_words_without_a_blank_is_shown() -> None:
+    sentence = '^the SystemVerilog must have blanks between words, not "ghi = 1\'h0other_name"$'
+    with pytest.raises(RejectedError, match=sentence):
+        Tokens("  assign abcdefghi = 1'h0other_names;")
