@@ -34,15 +34,15 @@ def candidates(
     `rings` says that the core is an FIR filter whose samples a ring of memory can hold, which takes fewer clocks than a
     program in the folded architecture.
     """
+    folded: tuple[type[Architecture], ...] = (NarrowFir, FoldedFir) if blocks.asked is None else (NarrowFir,)
     if FIR_DECIMATE in options:  # the terms leave no other
-        return (FoldedFir,)
+        return folded
     if wanted != AUTO:
         kinds: tuple[type[Architecture], ...] = (ARCHITECTURES[wanted],)
     else:
         kinds = tuple(each for each in SMALLEST_FIRST if each.is_tried(blocks) and each.terms.takes(options))
     if not rings:
         return kinds
-    folded = (NarrowFir, FoldedFir) if blocks.asked is None else (NarrowFir,)
     return tuple(each for kind in kinds for each in (folded if kind is Folded else (kind,)))
 
 
