@@ -24,7 +24,7 @@ UNSIGNED = Case(signed=False, output_bits=9, cutoff=20, error=0.02, hold=False)
     [
         (SIGNED, r"(?<=output_stage_code\[)10(?=\],)", "9", {11, 12, 13, 14, 15}),
         (SIGNED, r"(?<=reg \[18:0\] o_next = 19'h0)0(?=0)", "8", {15}),
-        (FOLDED, r"(?<=m_axis_tdata\[)15(?=\], m_axis_tdata\[15\]|\] \};)", "10", {12, 13, 14}),
+        (FOLDED, r"(?<=m_axis_tdata\[)15(?=\], m_axis_tdata\[15\])", "10", {12, 13, 14}),
         (UNSIGNED, r"(?<= <= 7'h)00", "40", {15}),
     ],
 )
