@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from amaranth.lib.wiring import Component
 
 from sosmith.gen.chain.design import ChainDesign, StageDesign
-from sosmith.gen.chain.rates import Pattern, pattern_of
+from sosmith.gen.chain.rates import Rate, results_of
 from sosmith.gen.chain.shared_hardware import shared_hardware
 from sosmith.gen.chain.top import chain_interface, registers_port, top_text
 from sosmith.gen.output.identity import BoardItem
@@ -32,7 +33,7 @@ def chain_item(design: ChainDesign) -> BoardItem:
     spec, loaded = design.spec.base, _loaded(design)
     channels = spec.channels
     first, last = design.stages[0].design.datapath, design.stages[-1].design.datapath
-    results, copies = results_and_copies(pattern_of(design.rates), channels, last.output.bytes, spec.path)
+    results, copies = results_and_copies(design.rates, channels, last.output.bytes, spec.path)
     face = chain_interface(design)
     in_turn = copies > 1 and channels > 1
     latency = face.latency_cycles + (CLOCKS if in_turn else 0)
@@ -71,13 +72,13 @@ def chain_item(design: ChainDesign) -> BoardItem:
     )
 
 
-def results_and_copies(pattern: Pattern, channels: int, result_bytes: int, path: object) -> tuple[int, int]:
+def results_and_copies(rates: Sequence[Rate], channels: int, result_bytes: int, path: object) -> tuple[int, int]:
     """Return the results of each sample on the link, and how often the board repeats each of the chain's.
 
     Parameters
     ----------
-    pattern : Pattern
-        Which samples bring results.
+    rates : sequence of Rate
+        By how much each stage interpolates and decimates.
     channels : int
         Number of channels.
     result_bytes : int
@@ -90,15 +91,15 @@ def results_and_copies(pattern: Pattern, channels: int, result_bytes: int, path:
     SpecificationError
         If there is no such number, or a message is too short.
     """
-    rise, factor = pattern.rise, pattern.factor
+    rise, factor = math.prod(rate.rise for rate in rates), math.prod(rate.factor for rate in rates)
     if rise % factor and factor % rise:
         raise SpecificationError(
             f"{path}: interpolate and decimate must make the rate a whole multiple or a whole part on a board, whose "
             f"link returns as many results for each sample, not {rise} / {factor} of it"
         )
-    if pattern.rises_last and factor > 1 and channels > 1:
+    if channels > 1 and any(results_of(rates, n) != -(-n * rise // factor) for n in range(factor)):
         raise SpecificationError(
-            f"{path}: interpolate must come before decimate on a board with several channels: behind it, a sample "
+            f"{path}: interpolate must not stand behind decimate on a board with several channels: a sample there "
             "brings results that leave with later samples, which may be those of another channel"
         )
     results, most = max(rise // factor, 1), (MAX_BODY - 1) // (result_bytes + 1)

@@ -14,14 +14,11 @@ Whatever else there is in the core may hold anything.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
-
 from sosmith.verify.certificate_file import PortEntry
 from sosmith.verify.graph import require
 from sosmith.verify.multirate.bit_logic import Bit, BitLogic
 from sosmith.verify.parallel.netlist import flattened
-from sosmith.verify.reader.syntax import Bits, Choice, Module, Statement
+from sosmith.verify.reader.syntax import Module
 
 _OUTPUT = "m_axis_tdata"
 
@@ -43,7 +40,7 @@ def check_signs(modules: dict[str, Module], port: PortEntry, clock: str) -> None
     RejectedError
         If a bit is another one, or this is not found.
     """
-    netlist = flattened({name: _without_parts(module) for name, module in modules.items()}, clock)
+    netlist = flattened(modules, clock)
     logic = BitLogic(netlist)
     width = netlist.widths[_OUTPUT]
     wanted = -(-port.bits // 8) * 8
@@ -53,26 +50,6 @@ def check_signs(modules: dict[str, Module], port: PortEntry, clock: str) -> None
         what = f"the sign, bit {sign}," if port.signed else "0"
         same = _same(logic, bits[place], bits[sign] if port.signed else 0)
         require(same, f"bit {place} of {_OUTPUT} must be {what} at every clock, not another value")
-
-
-def _without_parts(module: Module) -> Module:
-    """Let registers that are loaded in parts hold anything at any time."""
-
-    def parts(statements: Sequence[Statement]) -> set[str]:
-        targets = set()
-        for statement in statements:
-            if isinstance(statement, Choice):
-                targets |= parts((*statement.yes, *statement.no))
-            elif isinstance(statement.target, Bits) and statement.target.width is not None:
-                targets.add(statement.target.name)
-        return targets
-
-    names = set().union(*(parts(statements) for _, statements in module.clocked))
-    return replace(
-        module,
-        registers={name: first for name, first in module.registers.items() if name not in names},
-        clocked=[(clock, statements) for clock, statements in module.clocked if not parts(statements)],
-    )
 
 
 def _same(logic: BitLogic, a: Bit, b: Bit) -> bool:

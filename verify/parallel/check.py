@@ -35,8 +35,7 @@ from sosmith.verify.parallel.evaluation import Evaluation
 from sosmith.verify.parallel.fault import fault
 from sosmith.verify.parallel.flags import flags_of, wear_limits
 from sosmith.verify.parallel.forms import Forms
-from sosmith.verify.parallel.graph_codes import GraphCodes
-from sosmith.verify.parallel.input_fields import DATA
+from sosmith.verify.parallel.graph_codes import DATA, GraphCodes
 from sosmith.verify.parallel.netlist import Netlist, flattened
 from sosmith.verify.parallel.pipeline import Pipeline
 from sosmith.verify.parallel.register_words import with_memories

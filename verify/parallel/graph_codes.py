@@ -22,12 +22,15 @@ from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from types import MappingProxyType
+from typing import NamedTuple
 
 from sosmith.verify.certificate_file import Certificate, NodeEntry, Operation, StageEntry
 from sosmith.verify.graph import require
 from sosmith.verify.parallel.forms import Forms, shifted
 from sosmith.verify.parallel.lanes import LaneNode, in_lanes
 from sosmith.verify.program.normal_form import ONE, Form, Monomial, constant, plus
+
+DATA = "s_axis_tdata"
 
 _BEGUN = "begun"
 """Key of the variable that says whether there was a sample, or a beat, before."""
@@ -77,6 +80,14 @@ class LanePorts:
     inputs: tuple[int, ...]
     output: int
     settling: int | None
+
+
+class Field(NamedTuple):
+    """Bits of the input: their place, and what they hold as an unsigned word."""
+
+    offset: int
+    width: int
+    word: Form
 
 
 class GraphCodes:
@@ -343,6 +354,32 @@ class GraphCodes:
             raised = plus(of, forms.times(below, plus(low, of, -1)))
             return plus(raised, forms.times(above, plus(high, of, -1)))
         return of  # SHIFT, BOUND
+
+
+def fields_of(graph: GraphCodes, certificate: Certificate, width: int, input_flags: Sequence[Form]) -> list[Field]:
+    """Return the fields of the input and what is beside them; each begins a byte. Above them are flags of inputs.
+
+    Raises
+    ------
+    RejectedError
+        If they do not fill the input, which has `width` bits.
+    """
+    fields: list[Field] = []
+    offset = 0
+    for lane in graph.lanes:
+        for node, port in zip(lane.inputs, certificate.inputs, strict=True):
+            fields.append(Field(offset, port.bits, graph.forms.unsigned(graph.codes[node], port.bits)))
+            offset += port.bits
+            beside = -offset % 8
+            if beside:
+                padding = graph.forms.variable(("padding", node), 0, (1 << beside) - 1)
+                fields.append(Field(offset, beside, padding))
+            offset += beside
+    for flag in input_flags:
+        fields.append(Field(offset, 1, flag))
+        offset += 1
+    require(width == offset, f"the port {DATA} must have {offset} bits, not {width}")
+    return fields
 
 
 def _rest(word: Iterable[tuple[Monomial, int | Fraction]], width: int) -> _Key:

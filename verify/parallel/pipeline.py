@@ -40,8 +40,7 @@ from sosmith.verify.parallel.dependence import Dependence
 from sosmith.verify.parallel.equality import same_word
 from sosmith.verify.parallel.evaluation import Content, Evaluation, KnownBits, none_known
 from sosmith.verify.parallel.forms import Forms, shifted
-from sosmith.verify.parallel.graph_codes import GraphCodes
-from sosmith.verify.parallel.input_fields import DATA, fields_of
+from sosmith.verify.parallel.graph_codes import DATA, GraphCodes, fields_of
 from sosmith.verify.parallel.netlist import Netlist
 from sosmith.verify.parallel.state_memories import State, StateMemories
 from sosmith.verify.parallel.turn_memories import Counter, TurnMemories

@@ -16,7 +16,7 @@ from tests.gen.fpga.stubs import REPORT, Stub
 import sosmith
 from sosmith.gen.chain.board import chain_item, modules, results_and_copies
 from sosmith.gen.chain.generate import chain_texts
-from sosmith.gen.chain.rates import Rate, pattern_of
+from sosmith.gen.chain.rates import Rate
 from sosmith.gen.chain.top import chain_interface, top_text
 from sosmith.gen.fpga import bitstream
 from sosmith.gen.output.board_top import board_verilog
@@ -158,11 +158,13 @@ RISING = UP | {"stage": [UP["stage"][0], UP["stage"][2] | {"interpolate": 2}]}
         ([{"decimate": 2}, {"interpolate": 4}], 1, 2, 1),
         ([{"decimate": 4}, {"interpolate": 2}], 1, 1, 2),
         ([{"interpolate": 2}, {"decimate": 4}], 3, 1, 2),
+        ([{"interpolate": 2}, {"decimate": 4}, {"interpolate": 2}], 1, 1, 1),
+        ([{"decimate": 2}, {"decimate": 2}], 3, 1, 4),
     ],
 )
 def test_how_many_results_a_sample_has(stages: list[dict[str, int]], channels: int, results: int, factor: int) -> None:
     rates = [Rate(stage.get("interpolate", 1), stage.get("decimate", 1)) for stage in stages]
-    assert results_and_copies(pattern_of(rates), channels, 2, "x.toml") == (results, factor)
+    assert results_and_copies(rates, channels, 2, "x.toml") == (results, factor)
 
 
 @pytest.mark.parametrize(
@@ -177,7 +179,13 @@ def test_how_many_results_a_sample_has(stages: list[dict[str, int]], channels: i
         (
             [(1, 2), (4, 1)],
             2,
-            "x.toml: interpolate must come before decimate on a board with several channels: behind it, a sample "
+            "x.toml: interpolate must not stand behind decimate on a board with several channels: a sample there "
+            "brings results that leave with later samples, which may be those of another channel",
+        ),
+        (
+            [(2, 1), (1, 4), (2, 1)],
+            3,
+            "x.toml: interpolate must not stand behind decimate on a board with several channels: a sample there "
             "brings results that leave with later samples, which may be those of another channel",
         ),
         (
@@ -190,7 +198,7 @@ def test_how_many_results_a_sample_has(stages: list[dict[str, int]], channels: i
 )
 def test_chains_that_the_link_has_no_results_for(stages: list[tuple[int, int]], channels: int, sentence: str) -> None:
     with pytest.raises(SpecificationError) as refused:
-        results_and_copies(pattern_of([Rate(*stage) for stage in stages]), channels, 2, "x.toml")
+        results_and_copies([Rate(*stage) for stage in stages], channels, 2, "x.toml")
     assert str(refused.value) == sentence
 
 
