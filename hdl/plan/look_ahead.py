@@ -93,7 +93,8 @@ def plans(stages: Sequence[Stage], products: Products) -> tuple[TurnPlan, ...]:
 def in_pieces(graphs: Sequence[Graph], products: Products) -> list[tuple[Graph, frozenset[int]]]:
     """Return the graphs with products in pieces as multiplier blocks take them, and which nodes these are."""
     return [
-        _in_pieces(graph, adders, products.block_bits) for graph, adders in zip(graphs, products.adders, strict=True)
+        with_blocks(graph, _others(graph, adders), products.block_bits)
+        for graph, adders in zip(graphs, products.adders, strict=True)
     ]
 
 
@@ -133,10 +134,8 @@ def _reading(turns: int) -> int:
     return 1 if turns > 1 else 0
 
 
-def _in_pieces(graph: Graph, adders: Collection[int], bits: int) -> tuple[Graph, frozenset[int]]:
-    graph, places = with_places(graph)
-    made = {places[index] for index in adders}
-    return with_blocks(graph, [index for index in range(len(graph.nodes)) if index not in made], bits)
+def _others(graph: Graph, nodes: Collection[int]) -> list[int]:
+    return [index for index in range(len(graph.nodes)) if index not in nodes]
 
 
 @lru_cache(maxsize=64)
@@ -145,7 +144,8 @@ def _turned(graph: Graph, adders: frozenset[int], bits: int) -> _Turned:
 
     Its nodes are in the order of computation also where they depend on a DELAY of no loop.
     """
-    graph = regrouped(with_sums(*_in_pieces(graph, adders, bits)))
+    graph, places = with_places(graph)
+    graph = regrouped(with_sums(*with_blocks(graph, _others(graph, {places[index] for index in adders}), bits)))
     nodes, loops = graph.nodes, loop_delays(graph)
     roots = {i: graph.undelayed(i) for i in loops}
     used = {i for index, node in enumerate(nodes) if index not in loops for i in node.operands} | {*graph.outputs}
