@@ -295,18 +295,3 @@ def test_without_a_rate_no_time_to_settle_is_held(core: Callable[[str], Core]) -
     words = "\n".join(line for line in about.specification.splitlines() if not line.startswith("sample_rate"))
     other = certificate.model_copy(update={"about": about.model_copy(update={"specification": words})})
     assert manifest._specified(other, about.item)["settling"] is None
-
-
-def test_products_of_look_ahead_that_take_a_block_each_cost_what_the_certificate_says() -> None:
-    """Beside them, the hardware subtracts what the start holds in another order, which is no operator more."""
-    fast = 'hardware = { architecture = "parallel", clock = 100.0e6, pipeline = "look-ahead", multipliers = 9 }\n'
-    band = '"butterworth", kind = "bandpass", order = 1, cutoff = [8.0, 16.0]'
-    spec = STEADY.replace("bits = 8", "bits = 14").replace(
-        '"butterworth", kind = "lowpass", order = 2, cutoff = 20.0', band
-    )
-    core = Core(generated(design_core(from_text(spec + fast, Path("spec.toml")))))
-    adders = json.loads(core.manifest)["cost"]["adder_bits"]
-    assert "cost" not in core.read(core.manifest).open
-    sentence = rf"cost\.adder_bits in the manifest must be {adders}, as in the certificate, not {adders + 1}"
-    with pytest.raises(RejectedError, match=f"^{sentence}$"):
-        core.read(core.changed("cost.adder_bits", adders + 1))

@@ -31,7 +31,7 @@ from typing import NamedTuple
 
 from sosmith.verify.certificate_file import Certificate, ItemEntry
 from sosmith.verify.graph import RejectedError, require
-from sosmith.verify.multirate.ring.machine import UNKNOWN, Machine, State
+from sosmith.verify.multirate.ring.machine import UNKNOWN, Machine, Sink, State
 from sosmith.verify.multirate.ring.results import Result, Results
 from sosmith.verify.multirate.ring.verdict import RingVerdict
 from sosmith.verify.parallel.check import CLOCK, FLAGS, OUTPUT, OUTPUT_DEST
@@ -66,24 +66,6 @@ class _Fields(NamedTuple):
     phase: Form
     rail: Form
     counted: Form
-
-
-class _Sink(NamedTuple):
-    """A case of the sink: whether there is a result, how many copies of it follow, and whether it is taken."""
-
-    valid: int
-    copies: Form
-    ready: int
-
-    @property
-    def leaves(self) -> bool:
-        """Whether the last copy of a result leaves."""
-        return bool(self.valid and self.ready and not self.copies)
-
-    @property
-    def free(self) -> bool:
-        """Whether there is room for a result at the end of the clock."""
-        return not self.valid or self.leaves
 
 
 class _Way(NamedTuple):
@@ -250,13 +232,11 @@ class _Check:
         return [{}, constant(last), *([self.forms.variable("phase", 1, last - 1)] if last > 1 else [])]
 
     @property
-    def _sinks(self) -> list[_Sink]:
+    def _sinks(self) -> list[Sink]:
         """All cases of the sink, that without a result first."""
         most = self._hold - 1
         copies: list[Form] = [{}, *([self.forms.variable("copies", 1, most)] if most else [])]
-        return [_Sink(0, {}, ready) for ready in (0, 1)] + [
-            _Sink(1, left, ready) for left in copies for ready in (0, 1)
-        ]
+        return [Sink(0, {}, ready) for ready in (0, 1)] + [Sink(1, left, ready) for left in copies for ready in (0, 1)]
 
     # What is known of words.
 
@@ -329,14 +309,16 @@ class _Check:
 
     # Clocks.
 
-    def _clocks(self, state: State, inputs: Mapping[str, Form]) -> tuple[State, State | None, int]:
-        """Follow one clock for all cases of the sink.
+    def _clocks(
+        self, state: State, inputs: Mapping[str, Form], *, control: bool = False
+    ) -> tuple[State, State | None, int]:
+        """Follow one clock for all cases of the sink; of registers that these don't reach, `control` alone if asked.
 
         Return the state after it, as far as it does not depend on the sink; what a result that comes to the output is
         made of, if one does: it waits for the one before; and whether a sample is taken.
         """
         self._number += 1
-        cases: list[tuple[_Sink, State, int]] = []
+        cases: list[tuple[Sink, State, int]] = []
         for sink in self._sinks:
             before = state.copy()
             before.registers[VALID] = constant(sink.valid)
@@ -352,6 +334,7 @@ class _Check:
                 {
                     name: alike[name] if name in alike and name in self._apart else clock.register(name)
                     for name in self._netlist.registers
+                    if not control or name in self._reset_values or name not in self._apart
                 }
             )
             after.words = {name: clock.words(name) for name in state.words}
@@ -362,8 +345,8 @@ class _Check:
             waited = next(after for sink, after, _ in cases if not sink.free)
             stays = {name: word for name, word in state.registers.items() if waited.registers[name] == word}
             if len(stays) < len(state.registers):
-                return self._clocks(State(stays, state.words), inputs)
-        inner = [name for name in self._netlist.registers if name not in {VALID, "copies", *self._held}]
+                return self._clocks(State(stays, state.words), inputs, control=control)
+        inner = [name for name in first.registers if name not in {VALID, "copies", *self._held}]
         for sink, after, own in cases:
             require(own == ready, f"{READY} must not depend on the sink")
             if brings and not sink.free:
@@ -390,7 +373,7 @@ class _Check:
             require(right, f"{name} must stay while nothing happens")
         require(before.words == after.words, "no word must be written while nothing happens")
 
-    def _check_output(self, sink: _Sink, after: State, *, comes: bool) -> None:
+    def _check_output(self, sink: Sink, after: State, *, comes: bool) -> None:
         """Check whether there is a result after a clock, how many copies follow, and that it is the one before."""
         valid = int(comes or (sink.valid and not sink.leaves))
         require(after.registers[VALID] == constant(valid), f"{VALID} must be {valid} where a result {_OUTPUT[valid]}")
@@ -462,11 +445,11 @@ class _Check:
             require(state.registers["filling"] == constant(1), f"a ring must be filled in {self._words} clocks")
             state = self._known(state)
             if steady:
-                stays, result, ready = self._clocks(state, {SOURCE: {}, DATA: self._bus})
+                stays, result, ready = self._clocks(state, {SOURCE: {}, DATA: self._bus}, control=True)
                 require(result is None and not ready, "no sample must be taken while a ring is filled")
                 self._check_stays(state, stays)
             inputs = {DATA: self._bus, **({SOURCE: constant(1)} if steady else {})}
-            state, result, ready = self._clocks(state, inputs)
+            state, result, ready = self._clocks(state, inputs, control=True)
             require(result is None and not ready, "no sample must be taken while a ring is filled")
         self._check_filled(state)
         for name, value in self._reset_values.items():

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from typing import NamedTuple
 
 from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.parallel.control import about
@@ -46,6 +47,24 @@ class State:
     def copy(self) -> State:
         """Return a state that can change by itself."""
         return State(dict(self.registers), {name: dict(words) for name, words in self.words.items()})
+
+
+class Sink(NamedTuple):
+    """A case of the sink: whether there is a result, how many copies of it follow, and whether it is taken."""
+
+    valid: int
+    copies: Form
+    ready: int
+
+    @property
+    def leaves(self) -> bool:
+        """Whether the last copy of a result leaves."""
+        return bool(self.valid and self.ready and not self.copies)
+
+    @property
+    def free(self) -> bool:
+        """Whether there is room for a result at the end of the clock."""
+        return not self.valid or self.leaves
 
 
 class Machine:
