@@ -21,6 +21,7 @@ from sosmith.gen.estimate.rings import Rings, of_size
 from sosmith.gen.fpga.boards import Device
 from sosmith.gen.quantity import count, frequency
 from sosmith.gen.specification.choices import MAX_TAPS
+from sosmith.gen.word_lengths.cost import MULTIPLIER_BITS, Multiplication, Operand
 
 _SPENT = 0.97
 """Share of the pass-band loss that stages may take: proofs need a little of it."""
@@ -165,6 +166,10 @@ class Planned:
             return _CLOCKS_OF_ORDER * self.taps + _OTHER_CLOCKS
         return self.factor * (1 + (channels > 1)) + self.steps + 5
 
+    def available(self, wanted: Wanted) -> int:
+        """Clocks that there are for each result of a channel."""
+        return int(wanted.clock * self.factor / (self.rate * wanted.channels))
+
 
 @dataclass(kw_only=True)
 class Plan:
@@ -301,8 +306,7 @@ def _length(stage: Planned, wanted: Wanted) -> int:
 
 def _check_clocks(made: Plan, wanted: Wanted) -> None:
     for stage in made.stages:
-        needed = stage.clocks(wanted.channels)
-        there = int(wanted.clock * stage.factor / (stage.rate * wanted.channels))
+        needed, there = stage.clocks(wanted.channels), stage.available(wanted)
         if needed > there:
             clock = frequency(float(needed * stage.rate * wanted.channels / stage.factor))
             results = _hertz(stage.rate / stage.factor)
@@ -337,25 +341,39 @@ def _cost_of(stage: Planned, wanted: Wanted, device: Device, data: int, out: int
     if stage.kind == "cic":  # its weights are whole numbers
         bits = 1 + math.ceil(math.log2(largest * stage.factor**stage.order + 1))
     steps = [round(tap / largest * ((1 << bits - 1) - 1)) for tap in taps if tap][: stage.steps]
+    pair = data + 1
+    if digits := _digits(stage, wanted, device, pair, bits):
+        steps, block = steps * digits, device.factor_bits or MULTIPLIER_BITS
+        pair, bits = min(pair, block), min(bits, block)
     words = max(2, 1 << (stage.taps - 1).bit_length())
     place = (words - 1).bit_length()
     found = of_size(
         Rings(
             words=words,
             data_bits=data,
-            pair_bits=data + 1,
+            pair_bits=pair,
             pairs=stage.taps > 1,
             factor_bits=bits,
             sum_bits=data + bits + 2,
             output_bits=out,
             flags=_FLAGS,
             channels=wanted.channels,
-            last_step=stage.steps + 4,
+            last_step=stage.steps * max(digits, 1) + 4,
             codes=[(step & ((1 << bits) - 1)) << place | k for k, step in enumerate(steps)],
         ),
         device,
     )
     return Cost(luts_of(found, "folded", device.family), found["blocks"], found["memory_bits"])
+
+
+def _digits(stage: Planned, wanted: Wanted, device: Device, pair: int, factor: int) -> int:
+    """Return how many steps a tap takes whose product is too wide for a block; 0 if it is not, or there is no time."""
+    block = device.factor_bits or MULTIPLIER_BITS
+    if Multiplication(Operand(pair, signed=True), Operand(factor, signed=True)).blocks_of(block) == 1:
+        return 0
+    steps = math.ceil((pair - 1) / (block - 1)) * math.ceil((factor - 1) / (block - 1))
+    needed = stage.clocks(wanted.channels) + (steps - 1) * stage.steps
+    return steps if needed <= stage.available(wanted) else 0
 
 
 def usual_taps(stage: Planned) -> list[float]:
