@@ -195,7 +195,7 @@ def _fits_rings(spec: Specification, response: Response, asked: AskedRealization
         and response.polynomial is None
         and not needs_scaling(response.inputs[0], spec.output)
         and not (hardware.reload and (spec.wear is not None or not hardware.reload_registers))
-        and asked.name != "fir_transposed"
+        and (asked.name == AUTO or REALIZATIONS[asked.name].keeps_samples)
     )
 
 

@@ -66,6 +66,8 @@ class Realization:
     transfer : callable or None
         Returns numerator and denominator of a part, in rising powers of 1/z; None for rows, and where the word lengths
         of a filter that is no cascade are not searched.
+    keeps_samples : bool
+        Whether what it remembers are samples of the input, all of them, as an FIR filter can.
     not_decimated : str
         Why a filter that corrects a decimator's droop is not made so, half a sentence; empty if it is.
     """
@@ -75,6 +77,7 @@ class Realization:
     parts: Callable[[Sequence[Row]], Sequence[Any]] = tuple
     cascade: bool = True
     transfer: Callable[[Any], tuple[Sequence[Any], Sequence[Any]]] | None = None
+    keeps_samples: bool = False
     not_decimated: str = ""
 
     @property
@@ -169,6 +172,7 @@ FIR: dict[str, Realization] = {
         terms=each,
         build=partial(fir_section, structure=form),
         cascade=False,
+        keeps_samples=form is not Form.TRANSPOSED,
         not_decimated="filters behind a decimator have poles",
     )
     for each, form in zip(terms.FIR, Form, strict=True)
