@@ -53,6 +53,7 @@ from amaranth.lib.memory import Memory
 
 from sosmith.hdl.axi_stream import extended
 from sosmith.hdl.check_bits import CheckBits, Read
+from sosmith.hdl.cores.rounded_sum import finest, last_node, rounding, sum_bits
 from sosmith.hdl.memory_ports import read_port, write_port
 from sosmith.hdl.pipelined_logic import limits
 from sosmith.hdl.plan.streams import channel_bits
@@ -64,7 +65,7 @@ from sosmith.hdl.shell.shell import Shell
 from sosmith.hdl.status import NEVER, ResultStatus, at_rail, status_of_result, with_fault
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.downsampler import Downsampler
-from sosmith.model.dataflow.graph import Node, Op
+from sosmith.model.dataflow.graph import Op
 from sosmith.model.reload.constants import with_room
 
 _NO_COLLISIONS = {"no_rw_check": 1}
@@ -147,7 +148,7 @@ class RingCore(Shell):
         self._steps = StepsInTurn(steps, datapath.inputs[0], block)
         self._copies = copies
         # Flags are those of a result that can be limited, if any can.
-        limited = [each for each in self._filters if _last_node(each).op is Op.CLAMP]
+        limited = [each for each in self._filters if last_node(each).op is Op.CLAMP]
         super().__init__((*limited, datapath)[0], channels, fingerprint, lock=lock, protect=protect)
 
     def fill(self, m: Module) -> None:
@@ -439,12 +440,10 @@ class RingCore(Shell):
         product = Signal(signed(len(pair) + factor_bits), name="product", reset_less=True)
         # On the grid of the sum, which may be finer by what an offset of the output needs.
         m.d.sync += [pair.eq(self._part(m, both, row.part)), product.eq(pair * coefficient)]
-        grid, begin = self._rounding()
+        grid, begin = rounding(self._filters)
         filters = self._filters if reload is None else [with_room(each) for each in self._filters]
-        ends = [end for each in map(_unlimited, filters) for end in (each.low, each.high)]
-        span = max(grid, 0)
-        total = Signal(signed(max(map(_bits, ends)) + 1 + span), name="total", reset_less=True)
-        shift = grid - max(map(_source_frac, self._filters))
+        total = Signal(signed(sum_bits(filters, grid)), name="total", reset_less=True)
+        shift = grid - finest(self._filters)
         base = Mux(self._step == PIPELINE, Const(begin, signed(len(total))), total)
         shifted: Value = product << shift
         for places in range(1, plan.shifts + 1):
@@ -465,16 +464,6 @@ class RingCore(Shell):
             start = plan.digit_bits * place
             digit = Mux(part == place, whole[start : start + plan.digit_bits], digit)
         return digit
-
-    def _rounding(self) -> tuple[int, int]:
-        """Return the fraction bits of the sum, and what it begins with: offset of the output, and half a step."""
-        constants = [
-            [node for node in each.stages[-1].graph.nodes if node.op is Op.CONSTANT and node.name != "samples"]
-            for each in self._filters
-        ]
-        grid = max([*map(_source_frac, self._filters), *(node.frac for own in constants for node in own)])
-        # All results have the same output: half a step more changes none of those that need no rounding.
-        return grid, max(sum(node.parameter << grid - node.frac for node in own) for own in constants)
 
     def _ring(self, m: Module, name: str, offset: Value, write: tuple[Value, Value, Value], needed: Value) -> Value:
         """Make a memory of the samples of all channels; return what a tap of the sample before the pointer is."""
@@ -514,8 +503,8 @@ class RingCore(Shell):
         Of its last sample, it is `known` whether a code since the last result was at a rail, and the count.
         """
         output, (rail, counted) = self.datapath.output, known
-        last = _last_node(self.datapath)
-        grid, _ = self._rounding()
+        last = last_node(self.datapath)
+        grid, _ = rounding(self._filters)
         value: Value = total[grid:].as_signed() if grid > 0 else (total << -grid)
         code: Value = value
         saturated = Signal(name="output_saturated")
@@ -584,26 +573,3 @@ class RingCore(Shell):
         corrected, failed = Cat(each.corrected for each in found).any(), Cat(each.failed for each in found).any()
         self.report(m, guard, port, (corrected, failed), NEVER)
         return guard.fault | status.failed
-
-
-def _last_node(datapath: Datapath) -> Node:
-    """Return the node that leaves a datapath."""
-    graph = datapath.stages[-1].graph
-    return graph.nodes[graph.outputs[0]]
-
-
-def _unlimited(datapath: Datapath) -> Node:
-    """Return what leaves a datapath before it is limited."""
-    last = _last_node(datapath)
-    return datapath.stages[-1].graph.nodes[last.operands[0]] if last.op is Op.CLAMP else last
-
-
-def _source_frac(datapath: Datapath) -> int:
-    """Return the fraction bits of what the last stage of a datapath takes."""
-    graph = datapath.stages[-1].graph
-    return graph.nodes[graph.inputs[0]].frac
-
-
-def _bits(value: int) -> int:
-    """Count the bits of a number without its sign."""
-    return (-value - 1 if value < 0 else value).bit_length()
