@@ -444,9 +444,7 @@ audio_lowpass with order 6 and 18 bits in and out, one channel, proven to one LS
 
 {order_six_table(record)}
 
-A core with a multiplier for each section and 8 clocks a sample would lie between the first two. There is none: the
-filter's poles take products of 18 by 18 bits and sums of some 40 bits for an error of one LSB, and what chooses
-the operands of a shared sum takes about as many LUT4 as the sums that it saves.
+A core with a multiplier for each section and 8 clocks a sample would lie between them. There is none yet.
 
 ## Any filter inside a mask
 
