@@ -144,13 +144,16 @@ class FoldedFir(Architecture):
 
 @dataclass(frozen=True)
 class NarrowFir(FoldedFir):
-    """The same with one multiplier block, or no more than the specification names: wider factors have digits."""
+    """The same with one multiplier block, or no more than the specification names: wider factors have digits.
+
+    Not where other coefficients can be loaded, nor of samples without a sign: `verify` cannot follow their digits yet.
+    """
 
     @cached_property
     def in_turn(self) -> StepsInTurn:
-        """The steps as the multiplier takes them; whole products if other coefficients can be loaded."""
-        whole = self._steps()
-        narrow = self.reload or blocks_of(whole, self.blocks.bits) <= (self.blocks.asked or 1)
+        """The steps as the multiplier takes them."""
+        whole, fixed = self._steps(), not self.reload and self.datapath.inputs[0].signed
+        narrow = not fixed or blocks_of(whole, self.blocks.bits) <= (self.blocks.asked or 1)
         return whole if narrow else self._steps(block=self.blocks.bits)
 
 
