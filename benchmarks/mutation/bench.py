@@ -36,7 +36,7 @@ PACKAGES = (
 ALLOWANCE = 10.0
 """CPU seconds that every test may take more than `SLOWER` times its own."""
 SLOWER = 5.0
-SLOW = 8.0
+SLOW = 16.0
 """CPU seconds, lines being noted, beyond which a test is not run for mutants."""
 WALL = 900.0
 """Seconds after which a run is given up whatever it does: it may sleep, and then takes no CPU time."""

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.mutation.bench import Coverage
+from benchmarks.mutation.bench import SLOW, Coverage
 from benchmarks.mutation.mutants import Mutant, place_digests, short_digest
 from benchmarks.mutation.rooms import Room
 
@@ -135,11 +135,11 @@ class Cache:
         return self._texts[name]
 
     def _tests(self, room: Room) -> str:
-        return self._content(room.test_files(self._root))
+        return short_digest(str(SLOW), self._content(room.test_files(self._root)))
 
     def _state(self, room: Room, test: str) -> str:
         names = [test.partition("::")[0], *room.paths(self._root)]
-        return short_digest(test, *room.without, self._content(names))
+        return short_digest(str(SLOW), test, *room.without, self._content(names))
 
     def _content(self, names: Iterable[str]) -> str:
         return short_digest(*(f"{name}\0{self._text(name)}" for name in names))
