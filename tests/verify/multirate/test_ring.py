@@ -118,6 +118,15 @@ def changed(text: str, pattern: str, by: str) -> str:
     return other
 
 
+def _with_bit_flipped(text: str, row: int, bit: int) -> str:
+    """Return SystemVerilog with one bit of the program inverted."""
+    at, width, value = re.findall(r"steps_memory\[(\d+)\] = (\d+)'h([0-9a-f]+);", text)[row]
+    wrong = int(value, 16) ^ 1 << bit
+    flipped = text.replace(f"steps_memory[{at}] = {width}'h{value};", f"steps_memory[{at}] = {width}'h{wrong:04x};")
+    assert flipped != text
+    return flipped
+
+
 @pytest.mark.sweep(4)
 @pytest.mark.parametrize(
     ("row", "bit"), [(0, 0), (0, 3), (1, 2), (1, 5), (1, 6), (2, 6), (2, 7), (2, 15), (3, 7), (3, 14)]
@@ -125,12 +134,8 @@ def changed(text: str, pattern: str, by: str) -> str:
 def test_no_bit_of_a_step_is_free(row: int, bit: int) -> None:
     """Offsets, sign and coefficient of a step, which stand in three rows."""
     core = made()
-    at, width, value = re.findall(r"steps_memory\[(\d+)\] = (\d+)'h([0-9a-f]+);", core.text)[row]
-    wrong = int(value, 16) ^ 1 << bit
-    text = core.text.replace(f"steps_memory[{at}] = {width}'h{value};", f"steps_memory[{at}] = {width}'h{wrong:04x};")
-    assert text != core.text
     with pytest.raises(RejectedError):
-        check(core, text)
+        check(core, _with_bit_flipped(core.text, row, bit))
 
 
 @pytest.mark.sweep(9)
@@ -149,7 +154,7 @@ def test_a_certificate_that_says_otherwise() -> None:
         with pytest.raises(RejectedError):
             check_rings(core.text, other, core.item)
     filled = core.certificate.model_copy(update={"downsampling": DownsamplingEntry(factor=3, filled=5)})
-    with pytest.raises(RejectedError, match=r"must be filled before the first sample counts|must "):
+    with pytest.raises(RejectedError, match=r"^pointer must stay while nothing happens$"):
         check_rings(core.text, filled, core.item)
     steady = made(start="steady")
     short = steady.certificate.model_copy(update={"downsampling": DownsamplingEntry(factor=3, filled=3)})
@@ -169,9 +174,5 @@ def test_digits_are_proven() -> None:
 def test_no_digit_is_free(row: int, bit: int) -> None:
     """Which digit a step takes, and by how much its product is moved up, stand one and three rows below it."""
     core = wide()
-    at, width, value = re.findall(r"steps_memory\[(\d+)\] = (\d+)'h([0-9a-f]+);", core.text)[row]
-    wrong = int(value, 16) ^ 1 << bit
-    text = core.text.replace(f"steps_memory[{at}] = {width}'h{value};", f"steps_memory[{at}] = {width}'h{wrong:04x};")
-    assert text != core.text
     with pytest.raises(RejectedError):
-        check(core, text)
+        check(core, _with_bit_flipped(core.text, row, bit))
