@@ -88,6 +88,21 @@ def test_results_in_another_order_are_refused(written: Path) -> None:
         check_shared_hardware(*texts, "rx_up", [first], lambda *_: None)
 
 
+def test_results_that_count_differently_are_refused(tmp_path: Path) -> None:
+    tree = TREE | {"hardware": {"clock": 1e6, "start": "zero"}}
+    sosmith.design_chain(sosmith.ChainSpecification.load(tree)).generate(tmp_path)
+    texts = [(tmp_path / f"rx_up.{end}").read_text(encoding="utf-8") for end in ("sv", "il")]
+    first, second = (sosmith.Certificate.load(tmp_path / f"rx_up_p{k}.certificate.json").entries for k in (0, 1))
+    *stages, last = second.stages
+    nodes = [
+        node.model_copy(update={"high": 2}) if node.name in ("counted", "counted_next") else node for node in last.nodes
+    ]
+    assert nodes != list(last.nodes)
+    other = second.model_copy(update={"stages": [*stages, last.model_copy(update={"nodes": nodes})]})
+    with pytest.raises(RejectedError, match=r"^all results must count the samples since a start alike$"):
+        check_shared_hardware(*texts, "rx_up", [first, other], lambda *_: None)
+
+
 def test_other_rtlil_is_refused(folder: Path) -> None:
     replace_sealed(folder / "rx_up.il", "1'1", "1'0")
     with pytest.raises(ShortfallError, match=r"^stage up: "):
