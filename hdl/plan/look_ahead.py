@@ -8,7 +8,8 @@ pipeline stages as it likes; its delays are registers that move with every sampl
 Products by constants are sums (`sosmith.hdl.plan.constant_products`), between which pipeline stages may end, or pieces
 for multiplier blocks (`sosmith.hdl.plan.block_products`), each alone in a pipeline stage: registers of its block are on
 both sides. All stages of a core get pipeline stages of the time that its slowest loop needs: shorter ones would take
-registers for nothing.
+registers for nothing. Where a core has so many blocks that they lie all over the FPGA, a wire from one of them takes a
+pipeline stage of its own, up to a register near what adds up the pieces, if the loops have the clock for it.
 """
 
 from __future__ import annotations
@@ -99,9 +100,18 @@ def in_pieces(graphs: Sequence[Graph], products: Products) -> list[tuple[Graph, 
 
 
 def period(stages: Sequence[Stage], products: Products) -> int:
-    """Return the time of the pipeline stages in `plans`, in units of `operation_time`."""
-    return _period(_all_turned(tuple(stage.graph for stage in stages), products))
+    """Return the time of the pipeline stages in `plans`, with wires that are long, in units of `operation_time`."""
+    turned = _all_turned(tuple(stage.graph for stage in stages), products)
+    time, wired = _period(turned)
+    return time + _LONG_WIRE * (_is_far(turned) and not wired)
 
+
+_NEAR, _LONG_WIRE = 64, 7
+"""Multiplier blocks of a core up to which none is far from what takes its product; what the wire takes where they are
+more, in units of `operation_time`.
+
+With 156 of them on an ECP5-85F, the slowest path was a wire of 6.9 ns from a block, and two sums behind it: 82 MHz.
+"""
 
 _Turned = tuple[Graph, int, frozenset[int]]
 """A graph with sums, whose loops have one DELAY for all samples that take turns; their number; the DELAYs."""
@@ -110,8 +120,8 @@ _Turned = tuple[Graph, int, frozenset[int]]
 @lru_cache(maxsize=16)
 def _plans(graphs: tuple[Graph, ...], products: Products) -> tuple[TurnPlan, ...]:
     turned = _all_turned(graphs, products)
-    longest = _period(turned)
-    return tuple(_spread(*each, longest) for each in turned)
+    longest, wired = _period(turned)
+    return tuple(_spread(*each, longest, wired=wired) for each in turned)
 
 
 def _all_turned(graphs: tuple[Graph, ...], products: Products) -> tuple[_Turned, ...]:
@@ -120,13 +130,28 @@ def _all_turned(graphs: tuple[Graph, ...], products: Products) -> tuple[_Turned,
 
 
 @lru_cache(maxsize=16)
-def _period(all_turned: tuple[_Turned, ...]) -> int:
+def _period(all_turned: tuple[_Turned, ...]) -> tuple[int, bool]:
+    """Return the shortest time, and whether wires from blocks have pipeline stages: not if that takes longer."""
     longest = ADDITION
     for graph, turns, loops in all_turned:
         if loops:
             tried = itertools.count(longest)
-            longest = next(time for time in tried if _spread(graph, turns, loops, time).distance <= turns)
-    return longest
+            longest = next(time for time in tried if _fits(graph, turns, loops, time, wired=False))
+    if _is_far(all_turned):
+        for time in range(longest, longest + _LONG_WIRE):
+            if all(_fits(*each, time, wired=True) for each in all_turned):
+                return time, True
+    return longest, False
+
+
+def _fits(graph: Graph, turns: int, loops: frozenset[int], time: int, *, wired: bool) -> bool:
+    """Whether loops have the time they need with pipeline stages of so much."""
+    return not loops or _spread(graph, turns, loops, time, wired=wired).distance <= turns
+
+
+def _is_far(all_turned: tuple[_Turned, ...]) -> bool:
+    """Whether blocks lie all over the FPGA."""
+    return sum(is_product(node) for graph, _, _ in all_turned for node in graph.nodes) > _NEAR
 
 
 def _reading(turns: int) -> int:
@@ -195,15 +220,16 @@ _Moment = tuple[int, int]
 """Pipeline stage, and time within it."""
 
 
-def _spread(graph: Graph, turns: int, loops: frozenset[int], longest: int) -> TurnPlan:
+def _spread(graph: Graph, turns: int, loops: frozenset[int], longest: int, *, wired: bool) -> TurnPlan:
     """Plan with pipeline stages of the time `longest`; an operation that takes longer has one of its own.
 
-    Blocks have their registers, but in loops that have no clock for them.
+    Blocks have their registers, but in loops that have no clock for them; `wired` says whether the wires from them have
+    a pipeline stage besides.
     """
     products = frozenset(index for index, node in enumerate(graph.nodes) if is_product(node))
     plans = (
-        _spread_with(graph, turns, loops, longest, registered, lead)
-        for registered in (products, products - recursive(graph))
+        _spread_with(graph, turns, loops, longest, registered, lead, wired=wired)
+        for registered in ((products,) if wired else (products, products - recursive(graph)))
         for lead in range(max(turns - 1, 1))
     )
     return _first_in_time(plans, turns)
@@ -218,11 +244,19 @@ def _first_in_time(plans: Iterable[TurnPlan], turns: int) -> TurnPlan:
 
 
 def _spread_with(
-    graph: Graph, turns: int, loops: frozenset[int], longest: int, registered: frozenset[int], lead: int
+    graph: Graph,
+    turns: int,
+    loops: frozenset[int],
+    longest: int,
+    registered: frozenset[int],
+    lead: int,
+    *,
+    wired: bool,
 ) -> TurnPlan:
     """Plan with each product in `registered` alone in its pipeline stage: registers of its block are on both sides.
 
-    Such a product is faster than any other pipeline stage: 186 MHz on an ECP5 of speed grade 6 with the one behind it.
+    Such a product is faster than any other pipeline stage: 186 MHz on an ECP5 of speed grade 6 with the one behind it,
+    which if `wired` has nothing but a wire.
 
     As `sosmith.hdl.plan.interleaving.schedule`, it finds the earliest moment of each value first, and then computes
     each as late as the outputs and the states' next values allow. The pipeline stage of a delay in no loop is that of
@@ -233,9 +267,10 @@ def _spread_with(
         longest if index in registered else min(operation_time(graph, node, powers=True), longest)
         for index, node in enumerate(nodes)
     ]
-    early = _earliest(graph, loops, times, longest, _reading(turns), lead, registered)
+    distant = registered if wired else frozenset[int]()
+    early = _earliest(graph, loops, times, longest, _reading(turns), lead, registered, distant)
     depth = max(stage for stage, _ in early) + 1
-    planned = _latest(graph, loops, times, longest, early, depth)
+    planned = _latest(graph, loops, times, longest, early, depth, distant)
     for index, node in enumerate(nodes):
         if node.op in {Op.INPUT, Op.CONSTANT}:
             planned[index] = 0
@@ -253,10 +288,12 @@ def _earliest(
     reading: int,
     lead: int,
     registered: frozenset[int],
+    distant: frozenset[int],
 ) -> list[_Moment]:
     """Return the earliest moment at which each value can be there; that of older states, `lead` stages before.
 
-    What enters is registered once more before it goes to blocks: they are many, and far from each other.
+    Products in `distant` are there a pipeline stage later than they are computed. What enters is registered once more
+    before it goes to blocks: they are many, and far from each other.
     """
     early: list[_Moment] = []
     for index, node in enumerate(graph.nodes):
@@ -271,12 +308,19 @@ def _earliest(
             if index in registered:
                 stage, time = max((stage, time), (1, 0))
             took = times[index]
-            early.append((stage, time + took) if time + took <= longest else (stage + 1, took))
+            stage, time = (stage, time + took) if time + took <= longest else (stage + 1, took)
+            early.append((stage + (index in distant), time))
     return early
 
 
 def _latest(
-    graph: Graph, loops: frozenset[int], times: list[int], longest: int, early: list[_Moment], depth: int
+    graph: Graph,
+    loops: frozenset[int],
+    times: list[int],
+    longest: int,
+    early: list[_Moment],
+    depth: int,
+    distant: frozenset[int],
 ) -> list[int]:
     """Return the latest pipeline stage in which each value can begin to be computed."""
     nodes = graph.nodes
@@ -287,6 +331,7 @@ def _latest(
         if index in sources:
             late[index] = min(late[index], (early[index][0], longest))
         (stage, time), took = late[index], times[index]
+        stage -= index in distant
         start = (stage, time - took) if time >= took else (stage - 1, longest - took)
         planned[index] = start[0]
         if nodes[index].op is Op.DELAY:
