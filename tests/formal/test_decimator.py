@@ -189,7 +189,7 @@ def test_flags_lost_are_found_out(right: str, wrong: str, tmp_path: Path) -> Non
         ("before.eq(value)", "before.eq(difference)"),  # a comb of another delay
         ("total = Signal(cic.width,", "total = Signal(cic.width - 1,"),  # a register a bit short
         ("(1 << cic.dropped >> 1)", "0"),  # rounded down
-        ("filling = Signal(init=1)", "filling = Signal()"),  # a first sample that is there once only
+        ('Signal(init=1, name="filling")', 'Signal(name="filling")'),  # a first sample that is there once only
         ("waiting & completes", "0"),  # a result overwritten while it waits
         ("self.o_rail.eq(rail | at_end)", "self.o_rail.eq(at_end)"),  # a rail forgotten
     ],

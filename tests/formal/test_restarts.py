@@ -89,7 +89,7 @@ def test_a_parallel_core_that_keeps_states_or_lets_samples_in_is_found_out(
 @pytest.mark.sweep(1)
 @pytest.mark.parametrize("serial", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_a_folded_core_begins_anew(serial: bool, tmp_path: Path) -> None:
-    module = broken(folded, "waits = waits | pending", "waits = waits | pending")
+    module = broken(folded, "waits = waits | swaps.pending", "waits = waits | swaps.pending")
     assert prove(RestartRules(module, is_folded=True, serial=serial), tmp_path) == "PASS"
 
 
@@ -98,8 +98,8 @@ def test_a_folded_core_begins_anew(serial: bool, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [
-        ("reload.port.pending & reload.port.may_swap", "Const(0, 1)"),
-        pytest.param("waits = waits | pending", "waits = waits | Const(0, 1)", marks=pytest.mark.slow),
+        ("swaps.pending & swaps.may_swap", "Const(0, 1)"),
+        pytest.param("waits = waits | swaps.pending", "waits = waits | Const(0, 1)", marks=pytest.mark.slow),
         pytest.param("~control.busy & ~control.clearing if self.restarts else 1", "1", marks=pytest.mark.slow),
     ],
 )

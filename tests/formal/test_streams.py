@@ -183,7 +183,7 @@ def test_a_latency_that_is_too_short_is_found_out(make: Callable[[], StreamRules
 
 @pytest.mark.slow
 def test_a_limit_without_a_sign_is_found_out(tmp_path: Path) -> None:
-    module = broken(folded, "cut.as_signed() if output.signed else cut", "cut")
+    module = broken(folded, "[: self._result_bits].as_signed()", "[: self._result_bits]")
     assert prove(folded_rules(module, serial=True, datapath=limiter()), tmp_path) == "FAIL"
 
 

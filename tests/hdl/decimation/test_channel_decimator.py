@@ -147,7 +147,7 @@ def test_its_clocks_are_those_stated(factor: int, stages: int) -> None:
 
 
 BROKEN = [
-    ("a channel that stays as it was", "state.eq(Mux(started, read.data, 0))", "state.eq(read.data)"),
+    ("a channel that stays as it was", "state.eq(Mux(started, word.data, 0))", "state.eq(word.data)"),
     ("no first sample", "(extended(self._code(kept.first), cic.width) << cic.growth)[: cic.width]", "0"),
     ("flags that stay", "Mux(kept.completes, 0, kept.flags | gathered)", "kept.flags | gathered"),
     ("a comb of another delay", "Mux(combing, acc, total)", "total"),

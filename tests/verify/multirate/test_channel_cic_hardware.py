@@ -76,9 +76,9 @@ def test_every_edit_is_rejected(case: Case | Instrument) -> None:
 
 BROKEN = [
     ("a sum that is not written back", "write.en.eq(adds)", "write.en.eq(adds & combing)"),
-    ("a comb of another delay", "write.data.eq(Mux(combing, acc, total))", "write.data.eq(total)"),
+    ("a comb of another delay", "check.written(Mux(combing, acc, total))", "check.written(total)"),
     ("a sum that is taken away", "Mux(combing, ~state, state) + combing", "~state + 1"),
-    ("states of the channel before", "state.eq(Mux(started, read.data, 0))", "state.eq(read.data)"),
+    ("states of the channel before", "state.eq(Mux(started, word.data, 0))", "state.eq(word.data)"),
     ("states of another channel", "read.addr.eq(Cat(Mux(adds, step + 1, 0)[:steps], channel))", "read.addr.eq(step)"),
     ("a state too early", "Mux(adds, step + 1, 0)[:steps]", "step"),
     ("a first sample that is lost", "m.d.comb += kept.first.eq(sample)", "m.d.comb += kept.first.eq(0)"),

@@ -61,7 +61,7 @@ BROKEN = [
     ("a word that is not held", "self.i_ready.eq(~self.o_valid | (self.o_ready & ~left.any()))", "self.i_ready.eq(1)"),
     ("a reset that is not passed on", "core.aresetn.eq(self.aresetn)", "core.aresetn.eq(1)"),
     ("a reset the wrong way round", 'ResetSignal("front").eq(~self.aresetn)', 'ResetSignal("front").eq(self.aresetn)'),
-    ("a flag that gets lost", "or several else decimator.o_rail)", "or several else 0)"),
+    ("a flag that gets lost", "or several else decimator.o_rail", "or several else Const(0, 1)"),
     ("a sink that is not asked", "core.m_axis_tready.eq(ready)", "core.m_axis_tready.eq(1)"),
     ("results the wrong way round", "self.m_axis_tdata.eq(handed.data)", "self.m_axis_tdata.eq(handed.data[::-1])"),
 ]
