@@ -146,13 +146,13 @@ class FoldedFir(Architecture):
 class NarrowFir(FoldedFir):
     """The same with one multiplier block, or no more than the specification names: wider factors have digits.
 
-    Not where other coefficients can be loaded, nor of samples without a sign: `verify` cannot follow their digits yet.
+    Not where other coefficients can be loaded: they may have more digits.
     """
 
     @cached_property
     def in_turn(self) -> StepsInTurn:
         """The steps as the multiplier takes them."""
-        whole, fixed = self._steps(), not self.reload and self.datapath.inputs[0].signed
+        whole, fixed = self._steps(), not self.reload
         narrow = not fixed or blocks_of(whole, self.blocks.bits) <= (self.blocks.asked or 1)
         return whole if narrow else self._steps(block=self.blocks.bits)
 

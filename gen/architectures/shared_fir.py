@@ -101,8 +101,8 @@ def shared(architectures: Sequence[Architecture], available: int) -> list[Shared
         ]
         for block in (None, first.blocks.bits)
     )
-    whole, signed = wide[0].multiplier_blocks, results[0].inputs[0].signed
-    if whole > 1 and signed and narrow[0].cycles_per_result <= available:
+    whole = wide[0].multiplier_blocks
+    if whole > 1 and narrow[0].cycles_per_result <= available:
         return narrow
     if whole > max(len(results), first.blocks.asked or 0):
         raise ShortfallError(

@@ -95,6 +95,7 @@ def test_what_cannot_share_is_told() -> None:
         shared(few, 30)
 
 
+@pytest.mark.parametrize("signed", [True, False])
 @pytest.mark.parametrize(
     ("clock", "multipliers", "blocks", "clocks"),
     [
@@ -105,12 +106,12 @@ def test_what_cannot_share_is_told() -> None:
     ],
 )
 def test_wide_products_have_digits_where_there_is_time(
-    clock: float, multipliers: int | None, blocks: int, clocks: int
+    clock: float, multipliers: int | None, blocks: int, clocks: int, *, signed: bool
 ) -> None:
     tree = {
         "name": "wide",
         "sample_rate": 8000.0,
-        "input": {"x": {"bits": 24, "range": [-1.0, 1.0], "signed": True}},
+        "input": {"x": {"bits": 24, "range": [-1.0 * signed, 1.0], "signed": signed}},
         "filter": {"taps": [0.1, 0.2345678, 0.3456789, 0.2345678, 0.1]},
         "output": {"bits": 24, "range": [-2.0, 2.0], "signed": True},
         "hardware": {"clock": clock, "architecture": "folded"}

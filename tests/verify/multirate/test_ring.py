@@ -51,12 +51,12 @@ def proven_alone(design: sosmith.Design) -> Made:
 
 
 @cache
-def wide() -> Made:
+def wide(*, signed: bool = True) -> Made:
     """Make a filter all of whose results leave, and whose sums of two samples have two digits for a block."""
     tree = {
         "name": "little",
         "sample_rate": 1000.0,
-        "input": {"x": {"bits": 20, "range": [-1.0, 1.0], "signed": True}},
+        "input": {"x": {"bits": 20, "range": [-1.0 * signed, 1.0], "signed": signed}},
         "filter": {"taps": [0.3, 0.17, -0.17, 0.3]},
         "output": {"bits": 7, "range": [-1.0, 1.0], "signed": True},
         "hardware": {"clock": 1e6, "architecture": "folded"},
@@ -162,8 +162,9 @@ def test_a_certificate_that_says_otherwise() -> None:
         verify(short)
 
 
-def test_digits_are_proven() -> None:
-    core = wide()
+@pytest.mark.parametrize("signed", [True, False])
+def test_digits_are_proven(*, signed: bool) -> None:
+    core = wide(signed=signed)
     verdict = check_rings(core.text, core.certificate, core.item)
     assert (verdict.interval, verdict.latency) == (10, 10)
     assert (core.design.cycles_per_sample, core.design.latency_cycles) == (10, 10)

@@ -243,7 +243,7 @@ def _short(word: Form, width: int) -> Form:
 
 def _nearest(value: int | Fraction, size: int) -> int | Fraction:
     """Return what is nearest to 0 of a number and all that differ from it by multiples of `size`."""
-    if not isinstance(value, int):
+    if not isinstance(value, int) or 2 * abs(value) == size:  # of two as near, the one that it is
         return value
     rest = value % size
     return rest - size if rest > size >> 1 else rest
