@@ -41,13 +41,16 @@ class RestartRules(StreamRules):
     """The rules of the streams, and each result is that of the samples since the last reset or swap."""
 
     def __init__(self, module: ModuleType, *, is_folded: bool = False, serial: bool = False) -> None:
-        self.ports: list[AnySwap] = []
+        self.ports = ports = list[AnySwap]()
 
-        def port(*given: int, **named: int) -> AnySwap:
-            self.ports.append(AnySwap(*given, **named))
-            return self.ports[-1]
+        class Port(AnySwap):
+            """One that is remembered."""
 
-        module.ReloadPort = port
+            def __init__(self, depth: int, *, bits: int = 32, design: int, protected: bool, lock: bool) -> None:
+                super().__init__(depth, bits=bits, design=design, protected=protected, lock=lock)
+                ports.append(self)
+
+        module.ReloadPort = Port
         if is_folded:
             made = replace(limiter(), wear=((0, 1),))
             design = module.FoldedCore(made, program(made, DIGIT_BITS), serial=serial, fingerprint=1)

@@ -166,3 +166,20 @@ def test_a_port_that_is_too_narrow_for_the_channel_is_rejected() -> None:
     )
     with pytest.raises(RejectedError, match=r"^the port s_axis_tdest of behind must have 1 bits, not 8$"):
         check_decimator(text.replace(behind, narrow), certificate, 3)
+
+
+@pytest.mark.parametrize(
+    ("port", "whole", "part"),
+    [
+        ("s_axis_tdest", ".i_dest(s_axis_tdest)", ".i_dest({ 7'h00, s_axis_tdest })"),
+        ("m_axis_tdest", "  assign m_axis_tdest[15:9] = 7'h00;\n", ""),
+    ],
+)
+def test_more_channels_than_a_byte_tells_take_two(port: str, whole: str, part: str) -> None:
+    case = SMALL._replace(channels=300)
+    text = written(case)
+    start = text.index("\nmodule plain(")
+    end = text.index("endmodule", start)
+    assert text[start:end].count(whole) == 1
+    narrow = text[start:end].replace(f"[15:0] {port};", f"[8:0] {port};").replace(whole, part)
+    check_rejected(case, text[:start] + narrow + text[end:], f"{port} must have 16 bits, not 9")
