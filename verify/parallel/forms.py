@@ -44,8 +44,8 @@ _Key = frozenset[tuple[Monomial, int]]
 NOTHING: Mapping[Hashable, Form] = MappingProxyType({})
 
 
-_MOST_WORK = 1 << 20
-"""Terms that may be looked at in a proof; those of the examples take some thousands."""
+_MOST_WORK = 1 << 22
+"""Terms that may be looked at in a proof; the examples take some thousands, 128 pairs of taps of 24 bits a million."""
 
 
 class Atom(NamedTuple):

@@ -177,3 +177,21 @@ def test_no_digit_is_free(row: int, bit: int) -> None:
     core = wide()
     with pytest.raises(RejectedError):
         check(core, _with_bit_flipped(core.text, row, bit))
+
+
+@pytest.mark.slow
+def test_as_many_taps_as_a_filter_may_have_are_proven() -> None:
+    """Each of 128 pairs takes four steps, for any of several channels."""
+    half = [round((-1) ** k * 0.97**k + 1e-7 * k, 9) for k in range(128)]
+    tree = {
+        "name": "long",
+        "sample_rate": 48000.0,
+        "channels": 3,
+        "input": {"x": {"bits": 24, "range": [-1.0, 1.0], "signed": True}},
+        "filter": {"taps": [*half, *half[::-1]]},
+        "output": {"bits": 24, "range": [-128.0, 128.0], "signed": True, "max_error": 1.5e-5},
+        "hardware": {"clock": 100e6, "architecture": "folded"},
+    }
+    core = proven_alone(sosmith.design(sosmith.Specification.load(tree)))
+    verdict = check_rings(core.text, core.certificate, core.item)
+    assert verdict.interval == core.design.cycles_per_sample > 500
