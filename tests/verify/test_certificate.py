@@ -22,7 +22,7 @@ import sosmith
 from sosmith.cli import main
 from sosmith.gen.filter.design import design
 from sosmith.gen.output.certificate import about, certificate
-from sosmith.gen.realizations.registry import CASCADES, REALIZATIONS
+from sosmith.gen.realizations.registry import CASCADES, SECTIONS
 from sosmith.gen.specification.schema import MAX_CHANNELS
 from sosmith.gen.specification.specification import FilterSpec
 from sosmith.gen.word_lengths.quantize import quantize
@@ -58,7 +58,7 @@ def test_the_file_has_a_name_for_every_operation() -> None:
 
 
 @pytest.mark.sweep(2)
-@pytest.mark.parametrize("realization", REALIZATIONS)
+@pytest.mark.parametrize("realization", SECTIONS)
 @pytest.mark.parametrize(
     "name", [name if name != LOCOMOTIVE else pytest.param(name, marks=pytest.mark.slow) for name in ALL]
 )
@@ -223,7 +223,7 @@ def test_one_unit_off_in_a_graph_is_rejected_in_the_larger_examples() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "realization"),
-    [(BENCH, realization) for realization in REALIZATIONS] + [(name, "df1_ef2") for name in ALL if name != BENCH],
+    [(BENCH, realization) for realization in SECTIONS] + [(name, "df1_ef2") for name in ALL if name != BENCH],
 )
 def test_one_unit_off_in_every_number(name: str, realization: str) -> None:
     tree = tree_of(name, realization)

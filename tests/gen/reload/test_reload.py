@@ -15,7 +15,7 @@ from tests.model.reload.unpacking import unpacked
 
 from sosmith.gen.core import CoreDesign, design_core
 from sosmith.gen.filter.design import design
-from sosmith.gen.realizations.registry import REALIZATIONS
+from sosmith.gen.realizations.registry import SECTIONS
 from sosmith.gen.reload import reload
 from sosmith.gen.reload.other_constants import with_constants
 from sosmith.gen.reload.register_writes import register_writes, reload_json
@@ -30,7 +30,7 @@ from sosmith.model.polynomial import Polynomial
 from sosmith.model.reload.constants import constants
 from sosmith.model.reload.registers import CRC, DATA, VERSION
 
-EXACT = [name for name in REALIZATIONS if name != "state_space"]  # that one rounds its coefficients together
+EXACT = [name for name in SECTIONS if name != "state_space"]  # that one rounds its coefficients together
 
 
 @cache
