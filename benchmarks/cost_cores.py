@@ -249,7 +249,7 @@ def design(core: Core, objective: Objective, target: str = "") -> CoreDesign:
     spec = load(path)
     varied = spec.text.replace("bits = 16", f"bits = {bits}") if bits else spec.text
     varied = varied.replace("order = 5", f"order = {core.order}") if core.order else varied
-    varied = varied.replace("[filter]", f'[filter]\nstart = "{core.start}"') if core.start else varied
+    varied = varied.replace("[hardware]", f'[hardware]\nstart = "{core.start}"') if core.start else varied
     spec = from_text(varied, path)
     if core.freedom:
         mask = load(ROOT / "examples" / "recipes" / "inside_a_mask.toml").filter

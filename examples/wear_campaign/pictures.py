@@ -10,7 +10,7 @@ from examples.wear_campaign.methods_document import draw
 from matplotlib.figure import Figure
 
 from sosmith.gen.picture import picture
-from sosmith.gen.report.plots import envelope
+from sosmith.gen.report.figures.painting import envelope
 from sosmith.instrument.paper.figures import PaperFigures, read_paper_figures
 
 BLUE, RED, GREEN, GREY, INK = "#2563a8", "#b4432f", "#2f7d4f", "#9a9a9a", "#222222"

@@ -9,7 +9,7 @@ from sosmith.gen.chain.design import ChainDesign
 from sosmith.gen.chain.facts import limits
 from sosmith.gen.chain.ideal import chain_gain, frequencies, level, stage_gain
 from sosmith.gen.picture import legend_below, picture
-from sosmith.gen.report.plots import frequency_axis
+from sosmith.gen.report.figures.painting import frequency_axis
 
 _BLUE, _RED, _GREY = "#2563a8", "#b4432f", "#8a8f98"
 POINTS = 2000

@@ -18,7 +18,8 @@ from sosmith.gen.filter.response import (
 )
 from sosmith.gen.picture import picture
 from sosmith.gen.quantity import scale
-from sosmith.gen.report.plots import forbidden_areas, frequency_axis
+from sosmith.gen.report.figures.filter_plots import forbidden_areas
+from sosmith.gen.report.figures.painting import frequency_axis
 from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.model.port import Port
 

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sosmith.gen.picture import AMBER, BLUE, GREY, RED, legend_beside, picture
-from sosmith.gen.report.plots import envelope
+from sosmith.gen.report.figures.painting import envelope
 from sosmith.instrument.wear.assessment import WearReport, block_medians
 from sosmith.model.arrays import Values
 

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure as Drawing
 
 from sosmith.gen.quantity import decibels, number, quantity
 from sosmith.gen.report.figures.figure import Figure
-from sosmith.gen.report.plots import COLOUR, NARROW, SERIES, WIDE, decades, draw
+from sosmith.gen.report.figures.painting import COLOUR, NARROW, SERIES, WIDE, decades, draw
 from sosmith.model.templates import render
 from sosmith.sim.exploration.evaluation import Point
 from sosmith.sim.exploration.front import cost_kind

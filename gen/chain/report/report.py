@@ -22,7 +22,7 @@ from sosmith.gen.facts.table import Fact, Table
 from sosmith.gen.quantity import decibels, plain_number, quantity
 from sosmith.gen.report.curves import error_over_time, error_spectrum
 from sosmith.gen.report.figures.figure import Figure
-from sosmith.gen.report.plots import COLOUR, NARROW, PANEL_HEIGHT, draw, frequency_axis
+from sosmith.gen.report.figures.painting import COLOUR, NARROW, PANEL_HEIGHT, draw, frequency_axis
 from sosmith.gen.report.run import Instants
 from sosmith.gen.version import __version__
 from sosmith.model.reference.accuracy import error_statistics, sqnr_db

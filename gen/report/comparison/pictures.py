@@ -17,7 +17,7 @@ from sosmith.gen.quantity import scale
 from sosmith.gen.report.comparison.choice import SMALLEST_FIRST, Choice, cost_unit, hardware_cost
 from sosmith.gen.report.comparison.report_file import Report, fact
 from sosmith.gen.report.figures.figure import Figure
-from sosmith.gen.report.plots import COLOUR, NARROW, SERIES, WIDE, clip, decades, draw, frequency_axis
+from sosmith.gen.report.figures.painting import COLOUR, NARROW, SERIES, WIDE, clip, decades, draw, frequency_axis
 from sosmith.model.arithmetic.elementary import geometric
 
 Array = npt.NDArray[np.float64]

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sosmith.gen.quantity import MINUS
-from sosmith.gen.report.plots import COLOUR, NARROW, draw
+from sosmith.gen.report.figures.painting import COLOUR, NARROW, draw
 from sosmith.gen.report.recursion import Coefficient, Equation, Recursion, Term, gain_words
 
 _ROW, _GAP, _TOP = 32.0, 17.0, 12.0

@@ -11,9 +11,9 @@ from sosmith.gen.filter.step_response import SETTLED, StepResponse
 from sosmith.gen.output.core_facts import CoreFacts
 from sosmith.gen.output.decimation_facts import DecimationFacts
 from sosmith.gen.quantity import count, full_scale_level, plain_number, quantity
-from sosmith.gen.report import plots
 from sosmith.gen.report.behaviour import Behaviour
 from sosmith.gen.report.evidence import Evidence
+from sosmith.gen.report.figures import filter_plots, painting, run_plots
 from sosmith.gen.report.figures.diagram import diagram
 from sosmith.gen.report.figures.figure import Figure, Figures, Realized, amount, error_unit
 from sosmith.gen.report.figures.spectrum_plot import LEAST_SPECTRUM, spectrum_figure
@@ -77,8 +77,8 @@ def _trace_figure(evidence: Evidence, transient: int) -> Figure:
             "with the largest error; the figures above are of all channels."
         )
     return Figure(
-        drawing=plots.trace_figure(evidence, transient, plots.WIDE),
-        narrow=plots.trace_figure(evidence, transient, plots.NARROW),
+        drawing=run_plots.trace_figure(evidence, transient, painting.WIDE),
+        narrow=run_plots.trace_figure(evidence, transient, painting.NARROW),
         caption=caption,
         legend=legend,
     )
@@ -88,8 +88,8 @@ def _close_up_figure(evidence: Evidence) -> Figure:
     near = close_up(evidence)
     return Figure(
         title="Around the largest error",
-        drawing=plots.close_up_figure(evidence, plots.WIDE),
-        narrow=plots.close_up_figure(evidence, plots.NARROW),
+        drawing=run_plots.close_up_figure(evidence, painting.WIDE),
+        narrow=run_plots.close_up_figure(evidence, painting.NARROW),
         caption=f"{count(near.stop - near.start, 'sample')} of the same curves; the dotted line marks the largest "
         f"error. The output moves in steps of {amount(evidence.facts.lsb, evidence.facts.unit)}.",
         legend=[("golden", "broad", "exact calculation"), ("hardware", "dot", "hardware")],
@@ -99,8 +99,8 @@ def _close_up_figure(evidence: Evidence) -> Figure:
 def _spectrum_figure(evidence: Evidence) -> Figure:
     return Figure(
         title="Spectrum",
-        drawing=spectrum_figure(evidence, plots.WIDE),
-        narrow=spectrum_figure(evidence, plots.NARROW),
+        drawing=spectrum_figure(evidence, painting.WIDE),
+        narrow=spectrum_figure(evidence, painting.NARROW),
         caption="Mean over the run, by Welch's method: a sine over the whole scale reaches 0 dBFS. The level of noise "
         "goes with the width of a line; compare its shapes, and the curves with each other.",
         legend=[("hardware", "", "hardware"), ("golden", "", "hardware minus exact calculation")],
@@ -124,7 +124,7 @@ def _error_figure(evidence: Evidence) -> Figure:
         for limit in inside
     ]
     caption = "The curve must stay between the limits."
-    if len(evidence.run) > plots.WIDE // 2:
+    if len(evidence.run) > painting.WIDE // 2:
         caption = "Smallest and largest error of each stretch of time; both must stay between the limits."
     if outside:
         names = " and ".join(_limit_words(evidence, limit) for limit in outside)
@@ -136,8 +136,8 @@ def _error_figure(evidence: Evidence) -> Figure:
         )
     return Figure(
         title="Over time",
-        drawing=plots.error_figure(evidence, plots.WIDE),
-        narrow=plots.error_figure(evidence, plots.NARROW),
+        drawing=run_plots.error_figure(evidence, painting.WIDE),
+        narrow=run_plots.error_figure(evidence, painting.NARROW),
         caption=caption,
         legend=legend,
     )
@@ -162,7 +162,7 @@ def histogram_caption(evidence: Evidence) -> str:
 def _histogram_figure(evidence: Evidence) -> Figure:
     return Figure(
         title="How often each error occurs",
-        drawing=plots.histogram_figure(evidence),
+        drawing=run_plots.histogram_figure(evidence),
         caption=histogram_caption(evidence),
     )
 
@@ -170,7 +170,7 @@ def _histogram_figure(evidence: Evidence) -> Figure:
 def _alternatives_figure(evidence: Evidence) -> Figure:
     return Figure(
         title="What the realization is worth",
-        drawing=plots.alternatives_figure(evidence),
+        drawing=run_plots.alternatives_figure(evidence),
         caption="Same word lengths, same inputs; only what becomes of the rounding errors inside the sections "
         "differs. Mind the scale: each grid line is a step by the same factor.",
         legend=[("muted", "dotted", "one LSB"), ("asked", "dotted", "allowed by the specification")],
@@ -189,32 +189,32 @@ def _filter_figures(core: CoreFacts, facts: FilterFacts, decimation: DecimationF
     legend = [("golden", "broad", "ideal filter"), ("hardware", "dashed", "integer coefficients")]
     masked = (facts.passband_edge and facts.passband_loss) or (facts.stopband_edge and facts.stopband_loss)
     mask = [("limit", "area", "forbidden by the specification")] if masked else []
-    drawn = least > plots.lowest_gain_db(facts, least)
+    drawn = least > filter_plots.lowest_gain_db(facts, least)
     below = [("asked", "dotted", "the largest input leaves half an LSB")] if drawn else []
     alone = "" if decimation is None else " Of the filter alone, behind the decimator."
     later = "" if decimation is None else f" That adds {amount(decimation.own_delay, 's')}."
     return {
         "gain": Figure(
             title="Gain",
-            drawing=plots.magnitude_figure(facts, least),
+            drawing=filter_plots.magnitude_figure(facts, least),
             caption=f"Rounding the coefficients bends the ideal curve by the difference drawn below it.{alone}",
             legend=legend + mask + below,
         ),
         "phase": Figure(
             title="Phase",
-            drawing=plots.phase_figure(facts, least),
+            drawing=filter_plots.phase_figure(facts, least),
             caption=f"Where the gain is drawn. At a zero on the unit circle the phase jumps by 180°.{alone}",
             legend=legend,
         ),
         "delay": Figure(
             title="Group delay",
-            drawing=plots.delay_figure(facts),
+            drawing=filter_plots.delay_figure(facts),
             caption=f"How much later a slow change of each frequency appears at the output.{alone}{later}",
             legend=legend,
         ),
         "plane": Figure(
             title="Poles and zeros",
-            drawing=plots.pole_zero_figure(facts),
+            drawing=filter_plots.pole_zero_figure(facts),
             caption=f"{_marks(facts)} Where blue covers orange, rounding has not moved it.",
             legend=[("golden", "", "ideal filter"), ("hardware", "", "integer coefficients")],
         ),

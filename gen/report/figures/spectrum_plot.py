@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from sosmith.gen.report.curves import welch
 from sosmith.gen.report.evidence import Evidence
-from sosmith.gen.report.plots import COLOUR, Array, draw, frequency_axis
+from sosmith.gen.report.figures.painting import COLOUR, Array, draw, frequency_axis
 
 LEAST_SPECTRUM = 64
 """Samples below which nothing is to be seen."""

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from sosmith.gen.filter.step_response import SETTLED, StepResponse
 from sosmith.gen.quantity import scale
-from sosmith.gen.report.plots import COLOUR, NARROW, PANEL_HEIGHT, draw, envelope
+from sosmith.gen.report.figures.painting import COLOUR, NARROW, PANEL_HEIGHT, draw, envelope
 
 
 def step_figure(step: StepResponse) -> str:

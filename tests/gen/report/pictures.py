@@ -7,8 +7,8 @@ from unittest.mock import patch
 
 _EMPTY = "<svg>\n</svg>\n"
 
-without_pictures = patch("sosmith.gen.report.plots.svg_text", lambda _figure: _EMPTY)
+without_pictures = patch("sosmith.gen.report.figures.painting.svg_text", lambda _figure: _EMPTY)
 """Pictures are painted, but not laid out and written."""
 
-unpainted = patch("sosmith.gen.report.plots._painted", lambda *_: _EMPTY)
+unpainted = patch("sosmith.gen.report.figures.painting._painted", lambda *_: _EMPTY)
 """Nor are they painted: for tests that do not look at a page."""

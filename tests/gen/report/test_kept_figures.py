@@ -11,10 +11,9 @@ import numpy as np
 import pytest
 from tests.gen.report.evidences import changed, evidence, facts
 
-from sosmith.gen.report import plots
 from sosmith.gen.report.behaviour import Behaviour, behaviour
 from sosmith.gen.report.evidence import Alternative, Evidence
-from sosmith.gen.report.figures import kept
+from sosmith.gen.report.figures import kept, painting
 from sosmith.gen.report.figures.figure import Figure, Figures, Realized
 
 CACHE_FOLDER = kept.cache_folder
@@ -94,7 +93,7 @@ def test_what_cannot_be_told_apart_is_drawn_each_time(drawer: Drawer, tmp_path: 
 
 def test_a_picture_does_not_follow_a_users_own_style() -> None:
     def drawn() -> str:
-        return plots.draw("it", "It", 200, 100, lambda figure: figure.subplots().plot([1, 2]) and None)
+        return painting.draw("it", "It", 200, 100, lambda figure: figure.subplots().plot([1, 2]) and None)
 
     plain = drawn()
     style = {"lines.linewidth": 9.0, "axes.titlesize": 40, "xtick.direction": "in", "figure.facecolor": "red"}

@@ -42,8 +42,8 @@ from sosmith.gen.output.core_facts import (
     SectionFacts,
     SettlingFacts,
 )
-from sosmith.gen.report import plots
 from sosmith.gen.report.evidence import Alternative, Evidence
+from sosmith.gen.report.figures import filter_plots, painting, run_plots
 from sosmith.gen.report.largest_error import close_up, error_limits
 from sosmith.gen.report.mask import mask_shortfalls
 from sosmith.gen.report.page import render_page
@@ -393,8 +393,8 @@ def test_zeros_outside_of_the_unit_circle_are_drawn_or_counted(taps: list[float]
     """An FIR filter with linear phase has one at 1/z for each at z."""
     sos = np.array([[*taps, 1.0, 0.0, 0.0]])
     facts = response.FilterFacts(sample_rate=1.0, ideal_sos=sos, quantized_sos=sos)
-    assert plots.plane_frame(facts) == pytest.approx(frame)
-    assert (", 1 zero farther out" in plots.pole_zero_figure(facts)) == bool(frame[1])
+    assert filter_plots.plane_frame(facts) == pytest.approx(frame)
+    assert (", 1 zero farther out" in filter_plots.pole_zero_figure(facts)) == bool(frame[1])
 
 
 def test_poles_and_zeros_are_roots_the_larger_of_two_real_ones_first() -> None:
@@ -543,7 +543,7 @@ def test_every_colour_of_a_figure_follows_the_page(built: tuple[str, Path, dict[
     figures = "".join(re.findall(r"<svg.*?</svg>", content, flags=re.DOTALL))
     assert not re.search(r"#[0-9a-f]{6}\b(?!\))", re.sub(r'(href|id)="[^"]*"', "", figures))
     style = content[: content.index("</style>")]
-    for role in plots.ROLES:
+    for role in painting.ROLES:
         assert style.count(f"--{role}:") == 2
 
 
@@ -636,7 +636,9 @@ def test_a_delay_beyond_all_bounds_is_not_framed(off: float) -> None:
     ideal = signal.butter(1, 1000, fs=48000, output="sos")
     moved = ideal * [1, 1 + off, 1, 1, 1, 1]
     drawn, same = (
-        Page(plots.delay_figure(facts(ideal_sos=ideal, quantized_sos=sos, sample_rate=48000.0, cutoff=(1000.0,)))).words
+        Page(
+            filter_plots.delay_figure(facts(ideal_sos=ideal, quantized_sos=sos, sample_rate=48000.0, cutoff=(1000.0,)))
+        ).words
         for sos in (moved, ideal)
     )
     assert "group delay in µs" in drawn
@@ -679,7 +681,7 @@ def test_thinning_keeps_peaks() -> None:
     values = np.random.default_rng(3).standard_normal(100_003)
     values[77_777] = 100.0
     values[50_001] = -100.0
-    time, thin = plots.envelope(np.arange(100_003.0), values, 500)
+    time, thin = painting.envelope(np.arange(100_003.0), values, 500)
     assert len(thin) <= 1000
     assert thin.max() == 100.0
     assert thin.min() == -100.0
@@ -689,7 +691,7 @@ def test_thinning_keeps_peaks() -> None:
 
 def test_thinning_leaves_short_traces_alone() -> None:
     values = np.arange(1000.0)
-    assert plots.envelope(values, values, 500)[1] is values
+    assert painting.envelope(values, values, 500)[1] is values
 
 
 def test_close_up_holds_the_largest_error() -> None:
@@ -714,7 +716,7 @@ def test_a_page_that_fails_leaves_the_old_report(tmp_path: Path, monkeypatch: py
     def fail(*_: object) -> str:
         raise RuntimeError("no picture")
 
-    monkeypatch.setattr(plots, "trace_figure", fail)
+    monkeypatch.setattr(run_plots, "trace_figure", fail)
     with pytest.raises(RuntimeError, match=r"^no picture$"):
         write_report(evidence(seed=8), tmp_path)
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before

@@ -14,8 +14,8 @@ from tests.gen.report.evidences import words_of
 import sosmith
 from sosmith.gen.report.comparison.rows import compare
 from sosmith.gen.report.evidence import Evidence
+from sosmith.gen.report.figures.filter_plots import lowest_gain_db, phase, phase_figure
 from sosmith.gen.report.figures.spectrum_plot import levels
-from sosmith.gen.report.plots import lowest_gain_db, phase, phase_figure
 from sosmith.gen.report.report import summarise
 from sosmith.gen.report.run import run_of
 from sosmith.instrument.scenarios.traces import default_scenario, traces_for
