@@ -44,6 +44,17 @@ class State:
     registers: dict[str, Form] = field(default_factory=dict)
     words: dict[str, dict[int, Form]] = field(default_factory=dict)
 
+    def register(self, name: str) -> Form:
+        """Return what a register holds.
+
+        Raises
+        ------
+        RejectedError
+            If nothing is known of it.
+        """
+        require(name in self.registers, f"{name} must follow from the samples and the clocks, not be anything")
+        return self.registers[name]
+
     def copy(self) -> State:
         """Return a state that can change by itself."""
         return State(dict(self.registers), {name: dict(words) for name, words in self.words.items()})
