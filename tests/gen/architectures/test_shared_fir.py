@@ -64,6 +64,24 @@ def test_each_result_has_its_own_hardware_otherwise(clock: float, hardware: dict
     assert stage.modules == ("rx_up_p0", "rx_up_p1", "rx_up_p2")
 
 
+@pytest.mark.parametrize(
+    ("given", "architecture"),
+    [({"signed": False, "range": [0.0, 5.0]}, "folded"), ({"signed": False, "range": [-1.0, 3.0]}, "auto")],
+    ids=["other steps", "an offset"],
+)
+def test_samples_that_are_scaled_have_programs(given: dict[str, Any], architecture: str) -> None:
+    tree = {
+        "name": "rx",
+        "sample_rate": 8000.0,
+        "input": {"x": {"bits": 8, **given}},
+        "stage": [{"name": "up", "kind": "fir", "interpolate": 3, "taps": TAPS}],
+        "output": {"bits": 8, "range": [-16.0, 16.0], "signed": True},
+        "hardware": {"clock": 1e6, "architecture": architecture},
+    }
+    (stage,) = sosmith.design_chain(sosmith.ChainSpecification.load(tree)).core.stages
+    assert stage.modules == ("rx_up_p0", "rx_up_p1", "rx_up_p2")
+
+
 def test_results_are_those_of_the_filter() -> None:
     made = chain(bits=12)
     codes = np.random.default_rng(1).integers(-2048, 2048, (40, 1))
