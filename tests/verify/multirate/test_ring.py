@@ -158,9 +158,7 @@ def test_whatever_follows_the_clearing_is_known(name: str) -> None:
         r"  assign clearing_reset =",
         f"  assign late = clearing_reset & pair[0];\n  assign late_{name} = {name}_next | late;\n\\g<0>",
     )
-    with pytest.raises(
-        RejectedError, match=rf"^{name} must follow from the samples and the clocks, not be anything$"
-    ):
+    with pytest.raises(RejectedError, match=rf"^{name} must follow from the samples and the clocks, not be anything$"):
         check(core, text)
 
 
