@@ -162,6 +162,17 @@ def test_whatever_follows_the_clearing_is_known(name: str) -> None:
         check(core, text)
 
 
+@pytest.mark.parametrize("name", ["place_first", "place_second"])
+def test_an_address_of_no_word_is_refused(name: str) -> None:
+    """Of an address with one bit more, half are of no word: simulators read x there, synthesis another word."""
+    core = made()
+    text = changed(core.text, rf"wire \[2:0\] {name};", f"wire [3:0] {name};")
+    with pytest.raises(
+        RejectedError, match=r"^m_axis_tdata must be node \d+ \(clamp code\) of output_stage, not another value$"
+    ):
+        check(core, text)
+
+
 def test_a_count_of_what_nothing_says_is_told() -> None:
     core = made()
     text = changed(core.text, r"counted <= counted_next\[2:0\]", "counted <= pair[2:0]")
