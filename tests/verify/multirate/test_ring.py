@@ -180,6 +180,24 @@ def test_a_count_of_what_nothing_says_is_told() -> None:
         check(core, text)
 
 
+def test_a_count_that_changes_without_a_sample_is_told() -> None:
+    """Where no sample is on offer, it is made of one."""
+    core = made()
+    text = changed(core.text, r"  wire counted_below_5;", r"\g<0>\n  wire quiet;\n  wire idle;")
+    text = changed(
+        text,
+        r"  assign counted_below_5 =",
+        r"  assign quiet = ~ s_axis_tvalid;\n  assign idle = quiet & s_axis_tready;\n\g<0>",
+    )
+    text = changed(
+        text,
+        r"else if \(taken\) counted <= counted_next\[2:0\];",
+        r"\g<0>\n    else if (idle) counted <= s_axis_tdata[2:0];",
+    )
+    with pytest.raises(RejectedError, match=r"^counted must follow from the samples and the clocks, not be anything$"):
+        check(core, text)
+
+
 def test_a_certificate_that_says_otherwise() -> None:
     core = made()
     for factor in (2, 4):

@@ -368,7 +368,7 @@ class _Check:
         """Check that nothing that is known changes."""
         for name, word in before.registers.items():
             right = name in {VALID, "copies", *self._held} or self._is(
-                after.registers[name], word, self._netlist.widths[name]
+                after.register(name), word, self._netlist.widths[name]
             )
             require(right, f"{name} must stay while nothing happens")
         require(before.words == after.words, "no word must be written while nothing happens")
