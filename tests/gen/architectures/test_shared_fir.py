@@ -99,6 +99,22 @@ def test_all_results_settle_at_once() -> None:
     assert made.core.settling == 9
 
 
+@pytest.mark.parametrize("hardware", [{"architecture": "parallel"}, {"reload": True}], ids=["parallel", "reload"])
+def test_results_of_cores_side_by_side_settle_each_by_itself(hardware: dict[str, Any], tmp_path: Path) -> None:
+    made = chain(start="zero", **hardware)
+    (stage,) = made.core.stages
+    own = [core.quantized.settling for core in stage.cores]
+    assert own[0] > own[1]
+    _, status = made.core.compute_with_status(np.zeros((10, 1, 1), dtype=np.int64))
+    wanted = [32 * (n < each) for n in range(10) for each in own]
+    assert [int(flags) & 32 for flags in status[:, 0]] == wanted
+    assert made.core.settling == sum(own) == wanted.count(32)
+    made.generate(tmp_path)
+    certificate = sosmith.ChainCertificate.load(tmp_path / "rx.certificate.json")
+    certificate.verify(files=tmp_path)
+    assert certificate.entries.settling == wanted.count(32)
+
+
 def test_what_cannot_share_is_told() -> None:
     sentence = "results that share a multiplier must have fixed taps and no check bits"
     steady = [core.architecture for core in chain().core.stages[0].cores]
