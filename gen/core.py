@@ -96,14 +96,15 @@ def design_core(
     progress : callable
         Called with the name of each step.
     kinds : sequence of type of Architecture
-        Architectures to try in this order; those that the specification leaves open if empty.
+        Architectures to try in this order; those that the specification leaves open if empty. One with rings of samples
+        is only for a core whose samples these can hold.
 
     Raises
     ------
     SpecificationError
         If the specification has no such core, or its measurements are unsuitable.
     ShortfallError
-        If no formats meet the specification.
+        If no formats meet the specification, or a ring that is asked for cannot hold the samples.
     """
     kind = chosen_core(spec, core)
     source = "in the specification" if realization is None else "on the command line"
@@ -121,8 +122,11 @@ def design_core(
         progress=progress,
     )
     wanted = spec.hardware.architecture
+    rings = _fits_rings(spec, response, asked)
     if not kinds:
-        kinds = candidates(wanted, budget.blocks, asked_by(spec), rings=_fits_rings(spec, response, asked))
+        kinds = candidates(wanted, budget.blocks, asked_by(spec), rings=rings)
+    elif not rings and any(each.is_filled for each in kinds):
+        raise ShortfallError("a ring must keep the samples of an FIR filter as they come, and none that are scaled")
     (quantized, reason, architecture), refused = search.first_that_keeps_up(kinds)
     why = reason_for(architecture, budget, asked=wanted != AUTO, board=board, refused=refused)
     whole = quantized if response.pre_stage is None else response.pre_stage.counted(quantized)

@@ -266,9 +266,13 @@ class ChainDesign:
     def settling(self) -> int:
         """Results of a channel that are flagged as settling: until all stages have settled, one after the other.
 
-        All results that come with the same sample of the first stage's output are flagged, or none.
+        All results that come with the same sample of the first stage's output are flagged, or none. Of a single stage,
+        each result of a sample has the flag of its own core.
         """
-        return self._settled if len(self.stages) == 1 else self.pattern.entries(self._settled)[1]
+        if len(self.stages) > 1:
+            return self.pattern.entries(self._settled)[1]
+        cores = self.stages[0].cores
+        return self._settled if len(cores) == 1 else sum(core.quantized.settling for core in cores)
 
     @property
     def settling_entries(self) -> int:

@@ -286,7 +286,9 @@ def _forms(graph: Graph) -> list[_Form]:
         elif node.op is Op.SHIFT:
             form = of[0].times(fmpq(1 << max(node.parameter, 0), 1 << max(-node.parameter, 0)))
         elif node.op is Op.SCALE:
-            form = of[0].times(fmpq(node.parameter, 1 << node.parameter_frac))
+            # Coefficients that are multiples of a power of two have fewer than no fraction bits.
+            frac = node.parameter_frac
+            form = of[0].times(fmpq(node.parameter << max(-frac, 0), 1 << max(frac, 0)))
         elif node.op is Op.BOUND:
             form = of[0]
         else:

@@ -93,9 +93,10 @@ class ChainCertificate(Entry):
 
     The exact result is that of the stages' exact calculations one behind the other, limited to the output's range once,
     at the end. `settling` is the number of results of a channel that are flagged after a start from zero: those until
-    all stages have settled, one after the other. `specification` is the whole text, TOML, and `files` are those of the
-    whole: those of the stages stand in their own certificates. `certificate` is the SHA-256 of this file's own text
-    with 64 zeros in this place. `limited` is None where limits are those of all stages, or there are none.
+    all stages have settled, one after the other; of a single stage of several cores, each core flags its own.
+    `specification` is the whole text, TOML, and `files` are those of the whole: those of the stages stand in their own
+    certificates. `certificate` is the SHA-256 of this file's own text with 64 zeros in this place. `limited` is None
+    where limits are those of all stages, or there are none.
     """
 
     format: Literal["sosmith chain certificate 1"]

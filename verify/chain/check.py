@@ -327,6 +327,8 @@ def _flags(chain: ChainCertificate, groups: Groups, items: Sequence[Sequence[Ite
         settled += max((core.claims.settling or 0) * samples_of_filter(core) for core in cores)
         settled = -(-settled * rates[-1][0] // rates[-1][1])
     timing = timing_of(rates[1:])
+    if len(groups) == 1 and len(groups[0]) > 1:  # each result of a sample has the flag of its own core
+        settled = sum(core.claims.settling or 0 for core in groups[0])
     count, settling = timing.bringing(settled) if len(groups) > 1 else (settled, settled)
     require(chain.settling == settling, f"settling of the chain must be {settling} results, not {chain.settling}")
     if len(groups) == 1:

@@ -8,7 +8,7 @@ each half decided by itself.
 from __future__ import annotations
 
 from sosmith.verify.parallel.forms import Forms
-from sosmith.verify.program.normal_form import Form, plus
+from sosmith.verify.program.normal_form import Form, constant, plus
 
 _MOST_VALUES, _MOST_CASES = 64, 10
 """Most values of a floor that is halved, and how often that is done for one comparison, one inside the other."""
@@ -25,7 +25,7 @@ def _is_zero(forms: Forms, difference: Form, width: int, cases: int, *, finest: 
 
     The sign of a sum says that of its floor, but not the other way round.
     """
-    rest = {monomial: value for monomial, value in difference.items() if value % (1 << width)}
+    rest = {monomial: value for monomial, value in _pinned(forms, difference).items() if value % (1 << width)}
     if not rest:
         return True
     if not cases:
@@ -45,3 +45,19 @@ def _is_zero(forms: Forms, difference: Form, width: int, cases: int, *, finest: 
         if not _is_zero(case, case.settled(rest), width, cases - 1, finest=finest):
             return False
     return True
+
+
+def _pinned(forms: Forms, difference: Form) -> Form:
+    """Return a form with a number in place of a floor and the integers beside it where only one is left for them all.
+
+    By itself the floor may have many values: of a sum with large multiples of an integer, ``floor(a) + j`` is what is
+    known, and neither part.
+    """
+    for monomial, value in difference.items():
+        if len(monomial) != 1 or forms.atom(monomial[0]).inside is None:
+            continue
+        part = {m: other // value for m, other in difference.items() if m and not other % value}
+        low, high = forms.limits(part)
+        if low == high:
+            return _pinned(forms, plus(plus(difference, part, -value), constant(low * value)))
+    return difference

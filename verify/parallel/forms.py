@@ -125,20 +125,25 @@ class Forms:
         )
 
     def know(self, form: Form, low: int | Fraction, high: int | Fraction) -> None:
-        """Take it for known that `form` lies in low..high; of a floor, its argument is known too."""
+        """Take it for known that `form` lies in low..high; of a floor and an integer, the argument is known too."""
         primitive = _primitive(form)
         if primitive is None:
             return
-        ends = sorted(((low - primitive.offset) / primitive.scale, (high - primitive.offset) / primitive.scale))
-        before = self._known.get(primitive.key, (ends[0], ends[1]))
+        least, most = sorted(((low - primitive.offset) / primitive.scale, (high - primitive.offset) / primitive.scale))
+        ends = least.__ceil__(), most.__floor__()  # what is without a common divisor is an integer
+        before = self._known.get(primitive.key, ends)
         self._known[primitive.key] = max(ends[0], before[0]), min(ends[1], before[1])
         self._limits.clear()
-        if len(primitive.key) == 1:
-            ((monomial, _),) = primitive.key
-            inside = self._atoms[monomial[0]].inside if len(monomial) == 1 else None
-            if inside is not None:
-                step = Fraction(1, lcm(*(value.denominator for value in inside.values())))
-                self.know(inside, ends[0].__ceil__(), ends[1].__floor__() + 1 - step)
+        inner = [(m, value) for m, value in primitive.key if len(m) == 1 and self._atoms[m[0]].inside is not None]
+        if len(inner) == 1 and abs(inner[0][1]) == 1:
+            # What is beside the floor is an integer, so that it may as well be inside.
+            ((monomial, sign),) = inner
+            low, high = ends if sign > 0 else (-ends[1], -ends[0])
+            inside = self._atoms[monomial[0]].inside
+            assert inside is not None
+            whole = plus(inside, {m: value * sign for m, value in primitive.key if m != monomial})
+            step = Fraction(1, lcm(*(value.denominator for value in whole.values())))
+            self.know(whole, low, high + 1 - step)
 
     def _spend(self, terms: int) -> None:
         """Count terms that were looked at, all of a proof together: a short text must not ask for ever more."""

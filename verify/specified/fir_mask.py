@@ -42,6 +42,9 @@ def keeps_to_losses(taps: Sequence[Fraction], table: FilterTable) -> bool:
     UndecidedError
         If a gain is too close to its limit.
     """
+    # Zeros at the ends delay the filter, or nothing.
+    nonzero = [k for k, tap in enumerate(taps) if tap]
+    taps = taps[nonzero[0] : nonzero[-1] + 1] if nonzero else taps
     if list(taps) != list(taps)[::-1]:
         return False
     try:

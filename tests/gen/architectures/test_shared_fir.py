@@ -64,6 +64,24 @@ def test_each_result_has_its_own_hardware_otherwise(clock: float, hardware: dict
     assert stage.modules == ("rx_up_p0", "rx_up_p1", "rx_up_p2")
 
 
+@pytest.mark.parametrize(
+    ("given", "architecture"),
+    [({"signed": False, "range": [0.0, 5.0]}, "folded"), ({"signed": False, "range": [-1.0, 3.0]}, "auto")],
+    ids=["other steps", "an offset"],
+)
+def test_samples_that_are_scaled_have_programs(given: dict[str, Any], architecture: str) -> None:
+    tree = {
+        "name": "rx",
+        "sample_rate": 8000.0,
+        "input": {"x": {"bits": 8, **given}},
+        "stage": [{"name": "up", "kind": "fir", "interpolate": 3, "taps": TAPS}],
+        "output": {"bits": 8, "range": [-16.0, 16.0], "signed": True},
+        "hardware": {"clock": 1e6, "architecture": architecture},
+    }
+    (stage,) = sosmith.design_chain(sosmith.ChainSpecification.load(tree)).core.stages
+    assert stage.modules == ("rx_up_p0", "rx_up_p1", "rx_up_p2")
+
+
 def test_results_are_those_of_the_filter() -> None:
     made = chain(bits=12)
     codes = np.random.default_rng(1).integers(-2048, 2048, (40, 1))
@@ -79,6 +97,22 @@ def test_all_results_settle_at_once() -> None:
     assert stage.modules == ("rx_up",)
     assert [core.quantized.settling for core in stage.cores] == [3, 3, 3]
     assert made.core.settling == 9
+
+
+@pytest.mark.parametrize("hardware", [{"architecture": "parallel"}, {"reload": True}], ids=["parallel", "reload"])
+def test_results_of_cores_side_by_side_settle_each_by_itself(hardware: dict[str, Any], tmp_path: Path) -> None:
+    made = chain(start="zero", **hardware)
+    (stage,) = made.core.stages
+    own = [core.quantized.settling for core in stage.cores]
+    assert own[0] > own[1]
+    _, status = made.core.compute_with_status(np.zeros((10, 1, 1), dtype=np.int64))
+    wanted = [32 * (n < each) for n in range(10) for each in own]
+    assert [int(flags) & 32 for flags in status[:, 0]] == wanted
+    assert made.core.settling == sum(own) == wanted.count(32)
+    made.generate(tmp_path)
+    certificate = sosmith.ChainCertificate.load(tmp_path / "rx.certificate.json")
+    certificate.verify(files=tmp_path)
+    assert certificate.entries.settling == wanted.count(32)
 
 
 def test_what_cannot_share_is_told() -> None:

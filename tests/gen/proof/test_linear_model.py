@@ -46,6 +46,14 @@ def test_an_error_does_not_reach_what_was_computed_before_it() -> None:
     assert error.numerators == {bounded: (0,), model.output: (0, -4)}
 
 
+def test_a_coefficient_may_be_a_multiple_of_a_power_of_two() -> None:
+    """As taps of a filter whose output has far longer steps than its input have, where others can be loaded."""
+    g = GraphBuilder()
+    u = g.input("u", 0, -8, 7)
+    model = linear_model(g.build([g.add(g.scale(u, 3, -2), g.scale(u, 5, 0))]))
+    assert model.transfer == (17,)
+
+
 def two_outputs() -> Graph:
     g = GraphBuilder()
     u = g.input("u", 0, -8, 7)

@@ -51,6 +51,34 @@ def test_all_of_a_start_from_zero_is_proven(channels: int, tmp_path: Path) -> No
     assert not proven(tmp_path).missing
 
 
+@pytest.mark.parametrize(
+    ("taps", "given", "output"),
+    [
+        (
+            [0.5, -0.825865, 0.5, -0.825865],
+            {"range": [0.0, 16.0], "signed": False},
+            {"bits": 12, "range": [0.0, 128.0], "signed": False},
+        ),
+        (
+            [-0.00317, -725.86, 0.0003, -2903.44],
+            {"range": [-0.5, 0.5], "signed": True},
+            {"bits": 18, "range": [-128.0, 128.0], "signed": True},
+        ),
+    ],
+    ids=["a result that is never above 0", "steps of more than half of the range"],
+)
+def test_limits_by_the_upper_bits_of_a_wide_sum_are_proven(
+    taps: list[float], given: dict[str, Any], output: dict[str, Any], tmp_path: Path
+) -> None:
+    stage = {"name": "up", "kind": "fir", "interpolate": 2, "taps": taps}
+    tree = TREE | {"input": {"x": {"bits": 5, **given}}, "stage": [stage], "output": output}
+    chain = sosmith.design_chain(sosmith.ChainSpecification.load(tree))
+    chain.generate(tmp_path)
+    (tmp_path / "rx.toml").write_text(chain.specification.toml(), encoding="utf-8")
+    assert (tmp_path / "rx_up.sv").exists()
+    assert not proven(tmp_path).missing
+
+
 def test_all_of_it_is_proven(folder: Path) -> None:
     proof = proven(folder)
     assert not proof.missing

@@ -147,6 +147,57 @@ def test_what_is_changed_is_found(pattern: str, by: str) -> None:
         check(core, text)
 
 
+@pytest.mark.parametrize("name", ["waits", "filling"])
+def test_whatever_follows_the_clearing_is_known(name: str) -> None:
+    """At the last clock of the clearing, which no other clock of it follows, a register takes what nothing says."""
+    core = made(3)
+    text = changed(core.text, r"  wire clearing_reset;", f"\\g<0>\n  wire late;\n  wire late_{name};")
+    text = changed(text, rf"else {name} <= {name}_next;", f"else {name} <= late_{name};")
+    text = changed(
+        text,
+        r"  assign clearing_reset =",
+        f"  assign late = clearing_reset & pair[0];\n  assign late_{name} = {name}_next | late;\n\\g<0>",
+    )
+    with pytest.raises(RejectedError, match=rf"^{name} must follow from the samples and the clocks, not be anything$"):
+        check(core, text)
+
+
+@pytest.mark.parametrize("name", ["place_first", "place_second"])
+def test_an_address_of_no_word_is_refused(name: str) -> None:
+    """Of an address with one bit more, half are of no word: simulators read x there, synthesis another word."""
+    core = made()
+    text = changed(core.text, rf"wire \[2:0\] {name};", f"wire [3:0] {name};")
+    with pytest.raises(
+        RejectedError, match=r"^m_axis_tdata must be node \d+ \(clamp code\) of output_stage, not another value$"
+    ):
+        check(core, text)
+
+
+def test_a_count_of_what_nothing_says_is_told() -> None:
+    core = made()
+    text = changed(core.text, r"counted <= counted_next\[2:0\]", "counted <= pair[2:0]")
+    with pytest.raises(RejectedError, match=r"^counted must follow from the samples and the clocks, not be anything$"):
+        check(core, text)
+
+
+def test_a_count_that_changes_without_a_sample_is_told() -> None:
+    """Where no sample is on offer, it is made of one."""
+    core = made()
+    text = changed(core.text, r"  wire counted_below_5;", r"\g<0>\n  wire quiet;\n  wire idle;")
+    text = changed(
+        text,
+        r"  assign counted_below_5 =",
+        r"  assign quiet = ~ s_axis_tvalid;\n  assign idle = quiet & s_axis_tready;\n\g<0>",
+    )
+    text = changed(
+        text,
+        r"else if \(taken\) counted <= counted_next\[2:0\];",
+        r"\g<0>\n    else if (idle) counted <= s_axis_tdata[2:0];",
+    )
+    with pytest.raises(RejectedError, match=r"^counted must follow from the samples and the clocks, not be anything$"):
+        check(core, text)
+
+
 def test_a_certificate_that_says_otherwise() -> None:
     core = made()
     for factor in (2, 4):

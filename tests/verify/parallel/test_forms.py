@@ -212,3 +212,42 @@ def test_what_never_reaches_a_step_is_left_out(high: int, coarse: bool) -> None:
     forms = Forms()
     i, r = forms.variable("i", 0, 1000), forms.variable("r", 0, high)
     assert (forms.floor(plus(shifted(i, -1), shifted(r, -4))) == forms.floor(shifted(i, -1))) == coarse
+
+
+def test_a_limit_of_a_multiple_is_one_of_an_integer() -> None:
+    """Where ``16 - 423 n`` is not negative, n is not above 0, as it has no fraction."""
+    forms = Forms()
+    n = plus(forms.variable("x", 0, 31), forms.variable("z", 0, 31))
+    not_negative = forms.narrowed(plus(constant(16), n, -423), 0, 16)
+    assert not_negative.limits(n) == (0, 0)
+    assert not_negative.settled(forms.negative(plus({}, n, -1))) == {}
+
+
+def test_what_is_beside_a_floor_may_as_well_be_inside() -> None:
+    """``floor((5 x + z) / 16) - x`` is ``floor((z - 11 x) / 16)``."""
+    forms = Forms()
+    x, z = forms.variable("x", -16, 15), forms.variable("z", 0, 7)
+    floor = forms.floor(shifted(plus(z, x, 5), -4))
+    for sign in (1, -1):
+        form = plus(plus({}, floor, sign), x, -sign)
+        case = forms.narrowed(form, *sorted((-4 * sign, -sign)))
+        assert case.limits(plus(z, x, -11)) == (-64, -1)
+
+
+def test_a_word_that_one_integer_nearly_fills_is_limited_by_its_upper_bits() -> None:
+    """Limits by comparisons, and by the upper bits of a sum that a step of x moves by more than half of its range."""
+    forms = Forms()
+    x, z = forms.variable("x", -16, 15), forms.variable("z", 0, 7)
+    total = plus(z, x, -11)
+    upper = forms.floor(shifted(total, -3))
+
+    def limited(below: Form, above: Form, code: Form) -> Form:
+        between = plus(plus(constant(1), below, -1), above, -1)
+        return plus(plus(forms.times(between, code), below, -8), above, 7)
+
+    by_bits = limited(
+        forms.negative(plus(upper, constant(1))), forms.negative(plus({}, upper, -1)), forms.signed(total, 4)
+    )
+    for high, same in ((7, True), (6, False)):
+        below, above = forms.negative(plus(total, constant(8))), forms.negative(plus(constant(high), total, -1))
+        assert same_word(forms, limited(below, above, total), by_bits, 8) == same

@@ -41,6 +41,9 @@ def test_limits_a_hair_beyond_the_gains_are_kept_and_others_not(kind: str) -> No
     assert not keeps_to_losses(given, table(kind, (losses[0] - 0.001, losses[1] - 0.001)))
     assert not keeps_to_losses(given, table(kind, (losses[0] + 0.001, losses[1] + 0.001)))
     assert not keeps_to_losses([4 * tap for tap in given], table(kind, (losses[0] + 0.001, 0.001)))
+    # Zeros at the ends delay it, or nothing: as of every L-th tap of a filter, the last may be missing.
+    assert keeps_to_losses([Fraction(0), *given], table(kind, (losses[0] + 0.001, losses[1] - 0.001)))
+    assert not keeps_to_losses([Fraction(0), *given], table(kind, (losses[0] - 0.001, losses[1] - 0.001)))
 
 
 def test_a_band_is_not_judged_by_its_middle() -> None:

@@ -304,7 +304,7 @@ class _Check:
             require(right, f"{_CONTROL} must have what is kept of a channel behind its sample, not another word")
             return
         for name in self._names:
-            right = self._is(state.registers[name], getattr(wanted, name), self._netlist.widths[name])
+            right = self._is(state.register(name), getattr(wanted, name), self._netlist.widths[name])
             require(right, f"{name} must be what follows from the sample, not another value")
 
     # Clocks.
@@ -368,7 +368,7 @@ class _Check:
         """Check that nothing that is known changes."""
         for name, word in before.registers.items():
             right = name in {VALID, "copies", *self._held} or self._is(
-                after.registers[name], word, self._netlist.widths[name]
+                after.register(name), word, self._netlist.widths[name]
             )
             require(right, f"{name} must stay while nothing happens")
         require(before.words == after.words, "no word must be written while nothing happens")
@@ -418,15 +418,15 @@ class _Check:
                 self._netlist, self.forms, {**dict.fromkeys(self._rings, self._words), _CONTROL: 1}, constant(channel)
             )
             state.words = {_CONTROL: {}}
-            require(state.registers["clearing"] == constant(1), f"{_CONTROL} must be cleared for all channels")
+            require(state.register("clearing") == constant(1), f"{_CONTROL} must be cleared for all channels")
             state, result, ready = self._clocks(state, {})
             quiet = result is None and not ready and state.words[_CONTROL] == {0: {}}
             require(quiet, f"{_CONTROL} of channel {channel} must be cleared, and no sample taken")
         self._machine = machine
         for name, value in self._reset_values.items():
-            if name in state.registers and name != "channel":
+            if name not in {VALID, "channel"}:
                 wanted = 0 if name == "clearing" else value
-                require(state.registers[name] == constant(wanted), f"{name} must be {wanted} once all is cleared")
+                require(state.register(name) == constant(wanted), f"{name} must be {wanted} once all is cleared")
         return self._channels
 
     def _after_reset(self) -> State:
@@ -442,7 +442,7 @@ class _Check:
         state = self._after_reset()
         state.words = {name: {} for name in self._rings}
         for _ in range(self._words):
-            require(state.registers["filling"] == constant(1), f"a ring must be filled in {self._words} clocks")
+            require(state.register("filling") == constant(1), f"a ring must be filled in {self._words} clocks")
             state = self._known(state)
             if steady:
                 stays, result, ready = self._clocks(state, {SOURCE: {}, DATA: self._bus}, control=True)
@@ -453,7 +453,7 @@ class _Check:
             require(result is None and not ready, "no sample must be taken while a ring is filled")
         self._check_filled(state)
         for name, value in self._reset_values.items():
-            right = name == VALID or state.registers[name] == {}
+            right = name == VALID or state.register(name) == {}
             require(right, f"{name} must be 0 once the ring is filled, as {value} was after a reset")
         return _Way(0, [0] * len(self._results.all))
 
@@ -529,7 +529,7 @@ class _Check:
             state, result, ready = self._clocks(state, {})
             require(not ready, f"{READY} must not depend on the sink")
             clocks += 1
-            if fills and state.registers["filling"] == {} and all(state.words[name] for name in self._rings):
+            if fills and state.register("filling") == {} and all(state.words[name] for name in self._rings):
                 self._check_filled(state)
                 state.words |= {name: self._waiting(fields).words[name] for name in self._rings}
                 fills = False
@@ -561,7 +561,7 @@ class _Check:
                 require(right, f"{name} must have the last {self._remembered} samples behind a sample")
         waits = self._waiting(fields).registers
         for name in waits.keys() - {*self._names}:
-            require(state.registers[name] == {}, f"{name} must be 0 while the core waits for a sample")
+            require(state.register(name) == {}, f"{name} must be 0 while the core waits for a sample")
         return _Way(clocks, latencies)
 
     def _counting(self, form: Form, fields: _Fields) -> Form:

@@ -44,6 +44,17 @@ class State:
     registers: dict[str, Form] = field(default_factory=dict)
     words: dict[str, dict[int, Form]] = field(default_factory=dict)
 
+    def register(self, name: str) -> Form:
+        """Return what a register holds.
+
+        Raises
+        ------
+        RejectedError
+            If nothing is known of it.
+        """
+        require(name in self.registers, f"{name} must follow from the samples and the clocks, not be anything")
+        return self.registers[name]
+
     def copy(self) -> State:
         """Return a state that can change by itself."""
         return State(dict(self.registers), {name: dict(words) for name, words in self.words.items()})
@@ -121,9 +132,12 @@ class Machine:
             return None
         place = int(apart) % words
         wanted = plus(forms.unsigned(plus(self.pointer, constant(place)), bits), self.channel, words)
-        # Both are words of so many bits, which are the same if they are so modulo their number.
+        # Both are words of so many bits, which are the same if they are so modulo their number. One of more bits may
+        # be that of no word: reading it, simulators have x, and FPGAs another word.
         size = 1 << (len(self.netlist.memories[name].first) - 1).bit_length()
-        return None if any(value % size for value in plus(address, wanted, -1).values()) else place
+        low, high = forms.limits(address)
+        same = low >= 0 and high < size and not any(value % size for value in plus(address, wanted, -1).values())
+        return place if same else None
 
 
 class Clock:
