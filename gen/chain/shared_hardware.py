@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sosmith.gen.chain.design import StageDesign
-from sosmith.gen.output.verilog import to_rtlil, to_verilog
+from sosmith.gen.output.verilog import texts_of
 from sosmith.gen.version import __version__
 
 
@@ -18,8 +18,8 @@ def shared_hardware(stage: StageDesign) -> dict[str, str]:
     if stage.shared is None:
         return {}
     (name,) = stage.modules
-    rtlil = to_rtlil(stage.shared.whole(), name)
-    return {f"{name}.sv": _header(stage, name) + to_verilog(rtlil), f"{name}.il": rtlil}
+    verilog, rtlil = texts_of(stage.shared.whole(), name)
+    return {f"{name}.sv": _header(stage, name) + verilog, f"{name}.il": rtlil}
 
 
 def _header(stage: StageDesign, name: str) -> str:

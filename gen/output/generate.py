@@ -10,7 +10,7 @@ from sosmith.gen.output.certificate import about, certificate
 from sosmith.gen.output.core_facts import CoreFacts, core_facts
 from sosmith.gen.output.header import with_comments
 from sosmith.gen.output.manifest import manifest
-from sosmith.gen.output.verilog import core_rtlil, to_verilog
+from sosmith.gen.output.verilog import core_texts
 from sosmith.gen.reload.register_map import c_registers, systemrdl
 from sosmith.model.dataflow.c_model import c_header, c_source
 from sosmith.model.text_files import to_json, write_files
@@ -75,11 +75,10 @@ def _hardware(design: CoreDesign, known: CoreFacts, progress: Callable[[str], No
     """Return SystemVerilog and RTLIL of a core; nothing if its hardware stands with that of others."""
     if not design.architecture.has_module:
         return {}
-    progress("RTLIL")
-    rtlil_text = core_rtlil(design)
     progress("SystemVerilog")
+    verilog, rtlil = core_texts(design)
     name = design.spec.name
-    return {f"{name}.sv": with_comments(to_verilog(rtlil_text), design, known), f"{name}.il": rtlil_text}
+    return {f"{name}.sv": with_comments(verilog, design, known), f"{name}.il": rtlil}
 
 
 def _register_files(design: CoreDesign) -> dict[str, str]:

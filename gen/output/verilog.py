@@ -13,6 +13,7 @@ from sosmith.gen.core import CoreDesign
 from sosmith.gen.output.amaranth_yosys import run_script
 from sosmith.gen.output.core_facts import core_facts
 from sosmith.gen.output.header import with_comments
+from sosmith.gen.output.naming.kept_bits import rtlil_with_kept_bits, with_kept_bits
 from sosmith.gen.output.naming.net_names import plain_names
 from sosmith.gen.output.naming.rtlil_names import with_kept_names, with_named_ports, without_second_names
 from sosmith.model.errors import ToolError
@@ -42,10 +43,22 @@ _LOOP = 8
 """Equal words, one after the other, that are written as a loop."""
 
 
-def core_rtlil(design: CoreDesign) -> str:
-    """RTLIL text of a design's core."""
-    text = to_rtlil(design.architecture.component(), design.datapath.name)
-    return with_kept_names(text) if design.spec.hardware.keep else text
+def core_texts(design: CoreDesign) -> tuple[str, str]:
+    """Return SystemVerilog and RTLIL of a design's core, without comments.
+
+    With `hardware.keep`, all nets that have names are kept as a whole.
+    """
+    component, name = design.architecture.component(), design.datapath.name
+    if not design.spec.hardware.keep:
+        return texts_of(component, name)
+    kept = with_kept_names(to_rtlil(component, name))
+    return _renamed(kept), kept
+
+
+def texts_of(component: Component, name: str) -> tuple[str, str]:
+    """Return SystemVerilog and RTLIL of a component with the top module `name`."""
+    text = to_rtlil(component, name)
+    return to_verilog(text), rtlil_with_kept_bits(text)
 
 
 def to_rtlil(core: Component, name: str) -> str:
@@ -57,13 +70,17 @@ def to_rtlil(core: Component, name: str) -> str:
 
 
 def to_verilog(rtlil_text: str) -> str:
-    """SystemVerilog text of an RTLIL text, with names that need no escape.
+    """SystemVerilog text of an RTLIL text, with names that need no escape, and a bit kept of what must stay apart.
 
     Raises
     ------
     ToolError
         If Yosys fails.
     """
+    return with_kept_bits(_renamed(rtlil_text))
+
+
+def _renamed(rtlil_text: str) -> str:
     return _MODULE.sub(lambda module: plain_names(module[0]), converted(rtlil_text))
 
 
@@ -84,7 +101,7 @@ def converted(rtlil_text: str) -> str:
 
 def core_verilog(design: CoreDesign) -> str:
     """SystemVerilog text of a design's core, as `sosmith.gen.output.generate.generate` writes it."""
-    text = to_verilog(core_rtlil(design))
+    text, _ = core_texts(design)
     return with_comments(text, design, core_facts(design))
 
 

@@ -13,7 +13,7 @@ from sosmith.gen.fpga.yosys import run_yosys
 from sosmith.gen.output.generate import generated
 from sosmith.gen.output.naming.net_names import plain_names
 from sosmith.gen.output.naming.rtlil_names import with_kept_names, with_named_ports, without_second_names
-from sosmith.gen.output.verilog import core_rtlil
+from sosmith.gen.output.verilog import core_texts
 from sosmith.gen.specification.specification import from_text
 from sosmith.verify.graph import RejectedError
 from sosmith.verify.reader.inlined import FUNCTIONS
@@ -253,7 +253,7 @@ def test_no_other_attribute_and_none_elsewhere(right: str, wrong: str, sentence:
 def test_without_keep_the_texts_say_nothing_of_it() -> None:
     text = STEADY + 'hardware.architecture = "folded"\n'
     design = design_core(from_text(text, Path("spec.toml")))
-    assert "keep" not in core_rtlil(design)
+    assert "keep" not in core_texts(design)[1]
     assert '"keep"' not in generated(design)["plain.certificate.json"]
     assert '"keep": true' in kept("folded")["plain.certificate.json"]
 
