@@ -66,7 +66,8 @@ def test_a_stage_whose_results_are_in_another_order_is_seen(tmp_path: Path, monk
         return text.replace("is0 ? i0_tdata", "is0 ? i1_tdata")
 
     monkeypatch.setattr(simulation, "whole_text", crossed)
-    chain = sosmith.design_chain(rising.UP)
+    stages = [rising.UP["stage"][0] | {"architecture": "parallel"}, *rising.UP["stage"][1:]]
+    chain = sosmith.design_chain(rising.UP | {"stage": stages})
     codes = rising.stimulus(chain, 30, 1)
     (port,) = chain.core.spec.base.inputs
     report = chain.simulate({"x": port.decode(codes[:, 0])}, folder=tmp_path, simulator="icarus")
@@ -124,16 +125,19 @@ def test_a_fault_of_an_early_stage_reaches_every_result(tmp_path: Path, monkeypa
 def test_a_wrong_bit_in_a_core_of_several(
     protect: str, core: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A state changes in mid-stream: from a sample on all results have the flag, or it is corrected."""
+    """Samples in a ring change in mid-stream: from one on all results have the flag, or they are corrected."""
     whole, compared, seen = simulation.whole_text, simulation.run_of, dict[str, Any]()
 
     def upset(design: Any, directory: Path) -> str:
         text = whole(design, directory)
-        start = text.index(f"module rx_fill_p{core}_word_memory(")
-        memory = re.compile(r"reg \[\d+:0\] words0 \[7:0\];").search(text, start)
+        start = text.index(f"module rx_fill_p{core}(")
+        memory = re.compile(r"reg \[\d+:0\] ring_first_memory \[(\d+):0\];").search(text, start)
         assert memory is not None
-        change = "always @(posedge clk) begin clocks = clocks + 1; if (clocks == 9000) words0[0] = words0[0] ^ 1; end"
-        return f"{text[: memory.end()]} integer clocks = 0; {change}{text[memory.end() :]}"
+        change = "ring_first_memory[at] = ring_first_memory[at] ^ 1;"
+        loop = f"if (hits == 190) for (at = 0; at <= {memory[1]}; at = at + 1) {change}"
+        counter = f" integer hits = 0, at; always @(posedge aclk) if (taken) begin hits = hits + 1; {loop} end"
+        end = text.index("endmodule", start)
+        return f"{text[:end]}{counter}\n{text[end:]}"
 
     def run_of(design: Any, codes: Any, received: Any, status: Any) -> Any:
         seen["wrong"] = (design.compute_with_status(codes)[1] ^ status) >> 6

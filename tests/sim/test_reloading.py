@@ -13,7 +13,7 @@ from unittest.mock import patch
 
 import numpy as np
 import pytest
-from amaranth.hdl import Module, Signal
+from amaranth.hdl import Module
 from cocotb_tools.runner import Icarus, Verilator
 from tests.gen.designs import EXAMPLES
 from tests.model.reload.swapping import compute_swapping
@@ -28,7 +28,6 @@ from sosmith.gen.specification.specification import load
 from sosmith.gen.specification.wear_limits import WearSpec
 from sosmith.hdl.cores.folded import FoldedCore
 from sosmith.hdl.plan.streams import fields
-from sosmith.hdl.reload import ReloadPort
 from sosmith.model.polynomial import Polynomial
 from sosmith.sim.simulators import find_simulator
 
@@ -224,11 +223,10 @@ def test_reloads_at_any_moment(architecture: str, example: str, channels: int, c
 def test_a_sample_that_sees_two_banks_is_noticed(tmp_path: Path) -> None:
     """Break the core: what a sample uses follows the swap at once."""
 
-    def careless(core: FoldedCore, m: Module, *control: Signal) -> tuple[ReloadPort, Signal] | None:
+    def careless(core: FoldedCore, m: Module, *control: Any) -> Any:
         found = original(core, m, *control)
         assert found is not None
-        port, _ = found
-        return port, port.bank
+        return found._replace(bank=found.port.bank)
 
     original = FoldedCore._reload
     made = hardware_in("folded", "audio_lowpass")

@@ -62,11 +62,17 @@ def bench_files(design: CoreDesign, facts: PackageFacts) -> dict[str, str]:
         "inputs": into.fields,
         "output": datapath.output,
     }
-    return bench_texts([facts.name], hex_in, hex_out, values)
+    return bench_texts([facts.name], hex_in, hex_out, values, joins=datapath.decimator is not None)
 
 
 def bench_texts(
-    modules: Sequence[str], hex_in: str, hex_out: str, values: Mapping[str, Any], *, models: Sequence[str] = ()
+    modules: Sequence[str],
+    hex_in: str,
+    hex_out: str,
+    values: Mapping[str, Any],
+    *,
+    models: Sequence[str] = (),
+    joins: bool = False,
 ) -> dict[str, str]:
     """Return the texts of a bench for modules of a file each, the last of which is the top.
 
@@ -79,6 +85,8 @@ def bench_texts(
         Of the other placeholders of the templates.
     models : sequence of str
         Names of the C models, if they are not those of the modules.
+    joins : bool
+        Whether a single module joins a decimator and a core.
     """
     name = modules[-1]
     values = {"name": name, "modules": modules, "models": models or modules, **values}
@@ -88,5 +96,5 @@ def bench_texts(
         f"bench/{name}_stimuli.hex": hex_in,
         f"bench/{name}_responses.hex": hex_out,
         "bench/Makefile": render(__package__, "Makefile.jinja", **values),
-        f"verilator/{name}.vlt": verilator_waivers(modules),
+        f"verilator/{name}.vlt": verilator_waivers(modules, joins=len(modules) > 1 or joins),
     }

@@ -14,13 +14,16 @@ WAIVERS = {
 }
 """Warnings of Verilator's ``-Wall`` that generated cores cause, and why each is harmless."""
 
-_OF_A_CHAIN = {
-    "UNOPTFLAT": "upper bits of a stage's word are copies of its sign: the word is made of itself, but no bit of it is",
+_OF_JOINTS = {
+    "UNOPTFLAT": "upper bits of a word are copies of its sign: the word is made of itself, but no bit of it is",
 }
-"""The same of modules that join cores, where Verilator takes a word as one signal."""
+"""The same of modules that join cores, or a core and its decimator, where Verilator takes a word as one signal."""
 
 
-def verilator_waivers(modules: Sequence[str]) -> str:
-    """Return a configuration file for Verilator that waives them in the files of `modules`, the last the top."""
-    waivers = WAIVERS if len(modules) == 1 else WAIVERS | _OF_A_CHAIN
+def verilator_waivers(modules: Sequence[str], *, joins: bool) -> str:
+    """Return a configuration file for Verilator that waives them in the files of `modules`, the last the top.
+
+    `joins` says whether one of them joins cores.
+    """
+    waivers = WAIVERS | _OF_JOINTS if joins else WAIVERS
     return render(__package__, "waivers.vlt.jinja", name=modules[-1], modules=modules, waivers=waivers)
