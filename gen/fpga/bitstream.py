@@ -14,6 +14,7 @@ from typing import Any
 
 from sosmith.gen.fpga.block_registers import with_block_registers
 from sosmith.gen.fpga.boards import Board
+from sosmith.gen.fpga.lost_drivers import check_drivers
 from sosmith.gen.fpga.platform_plan import SEED, board_plan, text_of
 from sosmith.gen.fpga.tools import Tool, find_tool
 from sosmith.gen.fpga.wiring import PLAIN, Wiring
@@ -192,9 +193,11 @@ def build(
 
 
 def _pack(netlist: Path) -> None:
-    """Move registers into the blocks beside them, where Yosys leaves them outside."""
+    """Move registers into the blocks beside them, where Yosys leaves them outside; look for what it has lost."""
     if netlist.exists():  # none for what Amaranth hands on otherwise
-        packed = with_block_registers(json.loads(netlist.read_text(encoding="utf-8")))
+        mapped = json.loads(netlist.read_text(encoding="utf-8"))
+        check_drivers(mapped)
+        packed = with_block_registers(mapped)
         netlist.write_text(json.dumps(packed), encoding="utf-8")
 
 

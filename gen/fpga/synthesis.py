@@ -9,6 +9,7 @@ from pathlib import Path
 
 from sosmith.gen.fpga.block_registers import cells_of, with_block_registers
 from sosmith.gen.fpga.boards import Board
+from sosmith.gen.fpga.lost_drivers import check_drivers
 from sosmith.gen.fpga.yosys import run_yosys, yosys_version
 from sosmith.model.text_files import to_json, write_files
 
@@ -63,7 +64,7 @@ def synthesize(sv: Path, top: str, board: Board, folder: Path) -> Netlist:
     Raises
     ------
     ToolError
-        If Yosys is missing or fails; shows its last lines.
+        If Yosys is missing or fails, which shows its last lines, or loses a driver.
     """
     script = f"read_verilog -sv core.sv; {board.device.synthesis} -top {top}; write_json netlist.json"
     writing = "read_json netlist.json; write_verilog -noattr netlist.v"
@@ -78,7 +79,9 @@ def synthesize(sv: Path, top: str, board: Board, folder: Path) -> Netlist:
     record.unlink(missing_ok=True)  # leftovers of an interrupted run must not pass for a valid netlist
     write_files(folder, {"core.sv": text.decode()})
     run_yosys(script, folder)
-    packed = with_block_registers(json.loads((folder / "netlist.json").read_text(encoding="utf-8")))
+    mapped = json.loads((folder / "netlist.json").read_text(encoding="utf-8"))
+    check_drivers(mapped)
+    packed = with_block_registers(mapped)
     write_files(folder, {"netlist.json": json.dumps(packed)})
     run_yosys(writing, folder)
     cells = {kind: count for kind, count in sorted(cells_of(packed).items()) if not kind.startswith("$")}
