@@ -444,7 +444,7 @@ audio_lowpass with order 6 and 18 bits in and out, one channel, proven to one LS
 
 {order_six_table(record)}
 
-A core with a multiplier for each section and 8 clocks a sample would lie between them. There is none yet.
+A core with a multiplier for each section and 8 clocks a sample would be between folded and parallel: there is none yet.
 
 ## Any filter inside a mask
 

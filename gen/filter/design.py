@@ -305,7 +305,7 @@ def _kind_of(row: tuple[float, ...]) -> str:
 
 def _designed(spec: FilterSpec, fs: Fraction) -> tuple[Fraction, ...]:
     from sosmith.gen.filter.fir_design import designed_taps  # noqa: PLC0415 - slow to load
-    from sosmith.gen.filter.short_taps import short_taps  # noqa: PLC0415 - imports fir_design
+    from sosmith.gen.filter.short_taps import short_taps  # noqa: PLC0415 - imports fir_design, too
 
     return (short_taps if spec.freedom == "mask" else designed_taps)(spec.family, _mask(spec, fs))
 

@@ -93,14 +93,19 @@ def magnitude_figure(facts: FilterFacts, least: float) -> str:
         upper.set_ylabel("gain in dB")
         shown = ideal >= floor
         difference = np.where(shown, quantized - ideal, np.nan)
-        factor, unit = scale(float(np.nanmax(np.abs(difference))), "dB")
-        lower.plot(frequency, difference * factor, color=COLOUR["hardware"])
-        lower.set_ylabel(f"difference\nin {unit}")
-        lower.yaxis.set_major_locator(MaxNLocator(3))
-        lower.set_xlabel("frequency")
-        frequency_axis(lower, frequency)
+        _paint_difference(lower, frequency, difference, "dB")
 
     return draw("magnitude", "Gain against frequency", NARROW, PANEL_HEIGHT, paint)
+
+
+def _paint_difference(axes: Axes, frequency: Array, difference: Array, unit: str) -> None:
+    """Draw the lower panel: what rounding the coefficients has changed, over the frequency."""
+    factor, scaled = scale(float(np.nanmax(np.abs(difference))), unit)
+    axes.plot(frequency, difference * factor, color=COLOUR["hardware"])
+    axes.set_ylabel(f"difference\nin {scaled}")
+    axes.yaxis.set_major_locator(MaxNLocator(3))
+    axes.set_xlabel("frequency")
+    frequency_axis(axes, frequency)
 
 
 def phase_figure(facts: FilterFacts, least: float) -> str:
@@ -117,12 +122,7 @@ def phase_figure(facts: FilterFacts, least: float) -> str:
         upper.set_ylabel("phase in °")
         upper.yaxis.set_major_locator(MaxNLocator(6, steps=[1, 1.5, 3, 4.5, 9, 10]))
         difference = (quantized - ideal + 180) % 360 - 180
-        factor, unit = scale(float(np.nanmax(np.abs(difference))), "deg")
-        lower.plot(frequency, difference * factor, color=COLOUR["hardware"])
-        lower.set_ylabel(f"difference\nin {unit}")
-        lower.yaxis.set_major_locator(MaxNLocator(3))
-        lower.set_xlabel("frequency")
-        frequency_axis(lower, frequency)
+        _paint_difference(lower, frequency, difference, "deg")
 
     return draw("phase", "Phase against frequency", NARROW, PANEL_HEIGHT, paint)
 
