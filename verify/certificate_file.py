@@ -154,7 +154,7 @@ class SectionEntry(Entry):
     Only the first one may have a numerator of more than three: all of that of a sampled filter.
     """
 
-    numerator: Annotated[tuple[Rational, ...], Field(min_length=1, max_length=256)]
+    numerator: Annotated[tuple[Rational, ...], Field(min_length=1, max_length=512)]
     denominator: Annotated[tuple[Rational, ...], Field(min_length=1, max_length=3)]
 
 

@@ -238,16 +238,18 @@ class Transfer:
 
     @cached_property
     def denominator(self) -> fmpq_poly:
-        """``det(I - w A)`` for the state matrix A."""
-        return _reversed_characteristic(self.matrix)
+        """``det(I - w A)`` for the state matrix A; 1 without recursion."""
+        return _reversed_characteristic(self.matrix) if self._in_order is None else fmpq_poly([1])
 
     def numerator(self, source: Source, node: int) -> fmpq_poly:
         """Numerator from `source` to `node`, over `denominator`.
 
         With the states ``s = w (A s + b u)`` and the node ``c s + d u`` it is ``det(I - w A + w b c) + (d - 1)
         det(I - w A)``, by the matrix determinant lemma. A source that enters with several delays contributes one such
-        term for each.
+        term for each. Without recursion, each state has its own numerator, from those that it follows.
         """
+        if self._in_order is not None:
+            return self._from(source, self._forms[node], self._numerators(source))
         states = self.states
         c = [self._forms[node].get(state, fmpq(0)) for state in states]
         delays = {key[1] for form in self._forms for key in form if isinstance(key, tuple) and key[0] == source}
@@ -259,6 +261,39 @@ class Transfer:
             part = _reversed_characteristic(changed) + (d - 1) * self.denominator
             total += fmpq_poly([0] * delay + [1]) * part
         return total
+
+    def _numerators(self, source: Source) -> dict[_State, fmpq_poly]:
+        """Return the numerator from a source to each state, where there is no recursion."""
+        numerators: dict[_State, fmpq_poly] = {}
+        for state in self._in_order or ():
+            numerators[state] = fmpq_poly([0, 1]) * self._from(source, self._next(state), numerators)
+        return numerators
+
+    def _from(self, source: Source, form: _Form, numerators: Mapping[_State, fmpq_poly]) -> fmpq_poly:
+        """Return the numerator from a source to a form of states that have theirs."""
+        total = fmpq_poly([0])
+        for key, value in form.items():
+            if isinstance(key, int):
+                total += value * numerators[key] if value else 0
+            elif key[0] == source:
+                total += fmpq_poly([0] * key[1] + [value])
+        return total
+
+    @cached_property
+    def _in_order(self) -> list[_State] | None:
+        """The states, each behind those that it follows within a sample; None if any follows itself: recursion."""
+        followed = {state: self.weights(self.stage.nodes[state].operands[0]).keys() for state in self.states}
+        order: list[_State] = []
+        placed: set[_State] = set()
+        waiting = self.states
+        while waiting:
+            ready = [state for state in waiting if followed[state] <= placed]
+            if not ready:
+                return None
+            order += ready
+            placed.update(ready)
+            waiting = [state for state in waiting if state not in placed]
+        return order
 
     @cached_property
     def states(self) -> list[_State]:

@@ -381,6 +381,10 @@ class Architecture(ABC):
 
     # Words.
 
+    def title(self, realization: str | None) -> str:
+        """Return its name, with that of the `realization` if the hardware is built like it."""
+        return f"{self.name} {realization or ''}".rstrip()
+
     def reason(self, why: str, available: int) -> str:
         """Say in a sentence that it was chosen and `why`, with `available` clocks for each result."""
         per = "a sample" if self.decimator is None else f"for {self.decimator.factor} samples"

@@ -28,6 +28,7 @@ class FewSteps:
     negligible = 0.0
     few_digits = False
     floors_products = False
+    exact_taps = False
     factor_bits = None
 
     def of_graph(self, graph: Graph) -> float:
@@ -61,3 +62,14 @@ class FewSteps:
         """Return the number of steps in words."""
         count = int(self.of_datapath(datapath))
         return f"{count} step{'s' * (count > 1)} for each result"
+
+
+@dataclass(frozen=True)
+class ExactTaps(FewSteps):
+    """Taps as they are, for hardware that has no coefficients: of those, what takes software the fewest steps."""
+
+    exact_taps = True
+
+    def size_text(self, datapath: Datapath) -> str:
+        """Return the number of steps in software in words."""
+        return f"{super().size_text(datapath)} in software, none in hardware"

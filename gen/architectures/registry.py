@@ -9,6 +9,7 @@ from __future__ import annotations
 from sosmith.gen.architectures.architecture import Architecture
 from sosmith.gen.architectures.blocks import Blocks
 from sosmith.gen.architectures.budget import Budget
+from sosmith.gen.architectures.cic import Cic
 from sosmith.gen.architectures.folded import Folded
 from sosmith.gen.architectures.folded_fir import FoldedFir, NarrowFir
 from sosmith.gen.architectures.online import Online
@@ -16,7 +17,7 @@ from sosmith.gen.architectures.parallel import Parallel
 from sosmith.gen.architectures.serial import Serial
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.specification.choices import AUTO
-from sosmith.gen.specification.combinations import FIR_DECIMATE, Option
+from sosmith.gen.specification.combinations import CIC_DECIMATE, FIR_DECIMATE, FOLDED, PARALLEL, Option, Terms
 from sosmith.model.dataflow.datapath import Datapath
 
 SMALLEST_FIRST: tuple[type[Architecture], ...] = (Serial, Folded, Parallel, Online)
@@ -37,6 +38,11 @@ def candidates(
     folded: tuple[type[Architecture], ...] = (NarrowFir, FoldedFir) if blocks.asked is None else (NarrowFir,)
     if FIR_DECIMATE in options:  # the terms leave no other
         return folded
+    if CIC_DECIMATE in options:  # adders alone, without a multiplier or memory, before one multiplier and rings
+        ways: tuple[tuple[Terms, tuple[type[Architecture], ...]], ...] = ((PARALLEL, (Cic,)), (FOLDED, folded))
+        return tuple(
+            each for terms, own in ways if wanted in {AUTO, terms.name} and terms.takes(options) for each in own
+        )
     if wanted != AUTO:
         kinds: tuple[type[Architecture], ...] = (ARCHITECTURES[wanted],)
     else:

@@ -81,8 +81,7 @@ def _stages(design: ChainDesign) -> Table:
 
 
 def _hardware(core: CoreDesign) -> str:
-    realization = core.quantized.realization if core.quantized.sections else ""
-    return f"{core.architecture.name} {realization}".rstrip()
+    return core.architecture.title(core.quantized.realization if core.quantized.sections else None)
 
 
 def _budget(design: ChainDesign) -> Table:

@@ -8,7 +8,7 @@ from sosmith.gen.chain.design import ChainDesign, StageDesign
 from sosmith.gen.core import CoreDesign
 from sosmith.model.arithmetic.recursive_filters import dc_gain, sosfilt
 from sosmith.model.arrays import Codes, Values
-from sosmith.model.dataflow.decimator import impulse_response
+from sosmith.model.dataflow.cic import impulse_response
 from sosmith.model.reference.golden import calibrated
 
 

@@ -31,7 +31,7 @@ from sosmith.gen.proof.nodes import polynomial
 from sosmith.gen.proof.peak_gain import Drive, extent
 from sosmith.gen.proof.response import Response
 from sosmith.model.arithmetic.correct_rounding import ball
-from sosmith.model.dataflow.decimator import impulse_response
+from sosmith.model.dataflow.cic import impulse_response
 
 _ACCURACY = 128
 """Bits of gains, so that whoever computes them by another method rounds to the same multiple."""

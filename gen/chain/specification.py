@@ -17,7 +17,7 @@ from typing import Any
 from sosmith.gen.chain.automatic.asked import Place, check_factor, check_kinds, limits_in
 from sosmith.gen.chain.automatic.limits import KEYS, LIMITS, Limits
 from sosmith.gen.chain.automatic.structures import MAX_STAGES
-from sosmith.gen.specification.choices import AUTO, FIR_FAMILIES, MAX_DECIMATION, MAX_DOWNSAMPLING, MAX_TAPS
+from sosmith.gen.specification.choices import AUTO, FIR_FAMILIES, MAX_DECIMATION, MAX_DOWNSAMPLING, MAX_GIVEN_TAPS
 from sosmith.gen.specification.combinations import check_chain
 from sosmith.gen.specification.specification import STAGE, Specification, from_tree, parsed, text_of, to_json
 from sosmith.gen.specification.toml_text import toml_text
@@ -32,6 +32,7 @@ from sosmith.gen.specification.values import (
     together,
     whole,
 )
+from sosmith.model.dataflow.cic import impulse_response
 from sosmith.model.errors import SpecificationError
 from sosmith.model.port import Port
 from sosmith.model.suggestion import did_you_mean
@@ -569,17 +570,14 @@ def _cic(table: Mapping[str, Any], where: str, factor: int) -> list[Decimal]:
         raise UnfitError(
             "a power of two for a CIC filter, whose weights are then exact", literal(factor), where=f"{where}.{key}"
         )
-    if order * (factor - 1) + 1 > MAX_TAPS:
+    if order * (factor - 1) + 1 > MAX_GIVEN_TAPS:
         raise UnfitError(
-            f"such that order * ({key} - 1) is below {MAX_TAPS}, as a CIC filter is built as an FIR filter; two "
-            f"stages in series {'decimate' if key == 'decimate' else 'interpolate'} further",
+            f"such that order * ({key} - 1) is below {MAX_GIVEN_TAPS}, as it has so many taps; two stages in series "
+            f"{key} further",
             literal(factor),
             where=f"{where}.{key}",
         )
-    taps = [1]
-    for _ in range(order):
-        taps = [sum(taps[max(0, k - factor + 1) : k + 1]) for k in range(len(taps) + factor - 1)]
-    return [decimal(Fraction(tap, factor**order)) for tap in taps]
+    return [decimal(Fraction(tap, factor**order)) for tap in impulse_response(factor, order)]
 
 
 def _edge(table: Mapping[str, Any], kind: str) -> Fraction | None:

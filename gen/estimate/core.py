@@ -6,8 +6,10 @@ from collections import Counter
 from collections.abc import Sequence
 
 from sosmith.gen.architectures.architecture import Architecture
+from sosmith.gen.architectures.cic import Cic
 from sosmith.gen.architectures.folded_fir import FoldedFir
 from sosmith.gen.architectures.shared_fir import SharedFir
+from sosmith.gen.estimate.cic import of_cic
 from sosmith.gen.estimate.graphs import of_pipelined, of_start
 from sosmith.gen.estimate.memories import of_memory
 from sosmith.gen.estimate.online import of_units
@@ -42,6 +44,8 @@ def quantities_of(architecture: Architecture, device: Device) -> Quantities:
         made = of_units(architecture, device)
     elif isinstance(architecture, FoldedFir):
         made = of_rings(architecture, device)
+    elif isinstance(architecture, Cic):
+        made = of_cic(architecture)
     elif architecture.program is not None:
         made = of_program(architecture, device)
     else:

@@ -36,7 +36,8 @@ from sosmith.gen.filter.sections import Row
 from sosmith.gen.specification.choices import AUTO, MAX_DECIMATION, MAX_RATIO
 from sosmith.gen.specification.specification import FilterSpec
 from sosmith.model.arithmetic.correct_rounding import evaluate, nearest_double, nearest_multiple
-from sosmith.model.dataflow.decimator import MAX_WIDTH, impulse_response
+from sosmith.model.dataflow.cic import impulse_response
+from sosmith.model.dataflow.decimator import MAX_WIDTH
 from sosmith.model.errors import ShortfallError
 
 MAX_STAGES = 12

@@ -87,7 +87,7 @@ def _header(design: CoreDesign, facts: CoreFacts) -> str:
 def _title(design: CoreDesign, facts: CoreFacts) -> str:
     inputs = " and ".join(field.port.name for field in facts.interface.inputs.fields)
     (output,) = facts.interface.outputs.fields
-    hardware = " ".join(filter(None, (facts.architecture, facts.realization)))
+    hardware = design.architecture.title(facts.realization)
     channels = "1 channel" if facts.channels == 1 else f"{facts.channels} channels"
     rate = frequency(float(design.spec.sample_rate))
     if facts.lower_rate is not None:

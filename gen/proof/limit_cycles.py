@@ -22,7 +22,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
-from itertools import product
 
 from sosmith.gen.proof.linear_model import LinearModel, cone, linear_model, state_matrix
 from sosmith.gen.proof.peak_gain import Drive, extent
@@ -110,12 +109,11 @@ def _dead_band(model: LinearModel) -> Fraction:
 
 def loop_states(graph: Graph) -> tuple[int, ...]:
     """Positions, among the graph's delays, of those in a loop; the others decay to zero by themselves."""
-    matrix = state_matrix(graph)
-    size = len(matrix)
-    reach = [[bool(matrix[i][j]) for j in range(size)] for i in range(size)]
-    for k, i, j in product(range(size), repeat=3):
-        reach[i][j] = reach[i][j] or (reach[i][k] and reach[k][j])
-    return tuple(k for k in range(size) if reach[k][k])
+    # Bit j of row i: a path leads from state j to state i (S. Warshall, "A theorem on Boolean matrices", 1962).
+    rows = [sum(bool(entry) << j for j, entry in enumerate(row)) for row in state_matrix(graph)]
+    for k in range(len(rows)):
+        rows = [row | rows[k] if row >> k & 1 else row for row in rows]
+    return tuple(k for k, row in enumerate(rows) if row >> k & 1)
 
 
 def loop_matrix(graph: Graph) -> list[list[Fraction]]:

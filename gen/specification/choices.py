@@ -19,7 +19,10 @@ FIR_FAMILIES = ("equiripple", "least_squares", "kaiser", "halfband")
 """Methods by which an FIR filter is designed from its edges and losses."""
 
 MAX_TAPS = 256
-"""Most taps of an FIR filter."""
+"""Most taps of an FIR filter that is designed from its edges and losses."""
+
+MAX_GIVEN_TAPS = 512
+"""Most taps of one that is given by them."""
 
 FAMILY_HINTS = {
     **dict.fromkeys(("fir", "firwin", "remez", "window", "hamming"), " (did you mean equiripple or kaiser?)"),

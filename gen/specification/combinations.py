@@ -142,11 +142,20 @@ DECIMATE = Option(
 FIR_DECIMATE = Option(
     name="decimate by FIR",
     key="filter.decimate",
-    of=lambda d: d.filter.decimate if d.filter.is_fir else None,
+    of=lambda d: d.filter.decimate if d.filter.is_fir and not d.filter.is_cic else None,
     without="left out",
     asks=lambda value: value is not None,
     first=True,
     words="an FIR filter that decimates",
+)
+CIC_DECIMATE = Option(
+    name="decimate by CIC",
+    key="filter.decimate",
+    of=lambda d: d.filter.decimate if d.filter.is_cic else None,
+    without="left out",
+    asks=lambda value: value is not None,
+    first=True,
+    words="a CIC filter that decimates",
 )
 SEVERAL = Option(
     name="samples_per_clock",
@@ -193,6 +202,7 @@ OPTIONS = (
     PROTECT,
     DECIMATE,
     FIR_DECIMATE,
+    CIC_DECIMATE,
     SEVERAL,
     LOOK_AHEAD,
     ZERO,
@@ -232,13 +242,26 @@ _ONE_BLOCK = Refusal(Verdict.REFUSED, "its program needs one", only="'auto' or a
 
 _FIXED = Refusal(Verdict.REFUSED, "adders multiply by constants that are fixed")
 
-PARALLEL = Terms("parallel", {FIR_DECIMATE: LATER}, apart={(RELOAD, NO_MULTIPLIERS): _FIXED})
+_NO_TAPS = Refusal(Verdict.REFUSED, "its adders have no coefficients")
+
+PARALLEL = Terms(
+    "parallel",
+    {FIR_DECIMATE: LATER},
+    apart={
+        (RELOAD, NO_MULTIPLIERS): _FIXED,
+        (RELOAD, CIC_DECIMATE): _NO_TAPS,
+        (CHANNELS, CIC_DECIMATE): LATER,
+        (PROTECT, CIC_DECIMATE): LATER,
+    },
+)
 FOLDED = Terms("folded", {SEVERAL: _SLOW, LOOK_AHEAD: _SLOW, NO_MULTIPLIERS: _ONE_BLOCK})
-SERIAL = Terms("serial", {SEVERAL: _SLOW, LOOK_AHEAD: _SLOW, FIR_DECIMATE: LATER})
+SERIAL = Terms("serial", {SEVERAL: _SLOW, LOOK_AHEAD: _SLOW, FIR_DECIMATE: LATER, CIC_DECIMATE: LATER})
 ONLINE = Terms(
     "online",
     {SEVERAL: _SLOW, LOOK_AHEAD: _SLOW}
-    | dict.fromkeys((FIR, CHANNELS, RELOAD, PROTECT, DECIMATE, FIR_DECIMATE, NO_MULTIPLIERS, FEW_MULTIPLIERS), LATER),
+    | dict.fromkeys(
+        (FIR, CHANNELS, RELOAD, PROTECT, DECIMATE, FIR_DECIMATE, CIC_DECIMATE, NO_MULTIPLIERS, FEW_MULTIPLIERS), LATER
+    ),
 )
 
 TERMS = {terms.name: terms for terms in (PARALLEL, FOLDED, SERIAL, ONLINE)}
@@ -255,9 +278,13 @@ CHAIN = Terms(
 
 _APART: dict[tuple[Option, Option], Refusal] = {
     (FIR, LOOK_AHEAD): Refusal(Verdict.NO_USE, "it has no recursion, and registers between its sums without that"),
-    **dict.fromkeys(((SEVERAL, each) for each in (CHANNELS, RELOAD, PROTECT, DECIMATE, FIR_DECIMATE)), LATER),
+    **dict.fromkeys(
+        ((SEVERAL, each) for each in (CHANNELS, RELOAD, PROTECT, DECIMATE, FIR_DECIMATE, CIC_DECIMATE)), LATER
+    ),
     **dict.fromkeys(((LOOK_AHEAD, each) for each in (CHANNELS, PROTECT, DECIMATE)), LATER),
-    (FIR_DECIMATE, LOOK_AHEAD): Refusal(Verdict.NO_USE, "it has no recursion"),
+    **dict.fromkeys(
+        ((each, LOOK_AHEAD) for each in (FIR_DECIMATE, CIC_DECIMATE)), Refusal(Verdict.NO_USE, "it has no recursion")
+    ),
     (FIR_DECIMATE, NO_MULTIPLIERS): LATER,
     (LOOK_AHEAD, RELOAD): _FIXED,
     (RELOAD, FEW_MULTIPLIERS): Refusal(
@@ -294,7 +321,8 @@ def check_combinations(spec: Specified) -> None:
             raise _without_option(spec, terms, option, lacking)
     for (kept, other), refusal in (_APART | ({} if terms is None else dict(terms.apart))).items():
         if kept in asked and other in asked:
-            raise _unfit(refusal, other.without, kept.phrase(spec), other.key, literal(other.of(spec)))
+            in_it = f'hardware.architecture = "{terms.name}" and ' if terms and (kept, other) in terms.apart else ""
+            raise _unfit(refusal, other.without, in_it + kept.phrase(spec), other.key, literal(other.of(spec)))
 
 
 def check_chain(spec: Specified) -> None:

@@ -23,7 +23,7 @@ from sosmith.gen.specification.choices import (
     KINDS,
     MAX_DECIMATION,
     MAX_DOWNSAMPLING,
-    MAX_TAPS,
+    MAX_GIVEN_TAPS,
     METHODS,
     PIPELINES,
     REALIZATIONS,
@@ -55,6 +55,7 @@ from sosmith.gen.specification.values import (
 from sosmith.model.converters.i2s_converter import I2S_CONVERTERS
 from sosmith.model.converters.spi_converter import CONVERTERS, SUPPLIES
 from sosmith.model.converters.spi_dac import SPI_DACS
+from sosmith.model.dataflow.cic import order_of
 from sosmith.model.dataflow.protection import PROTECTIONS
 
 MAX_ORDER = 20
@@ -186,7 +187,7 @@ class FilterTable(Table):
         list_of(list_of(number, 6, 6), 1, MAX_ORDER // 2, "rows [b0, b1, b2, 1.0, a1, a2]"), default=None
     )
     sos_file: str | None = key(file_name, default=None)
-    taps: tuple[Fraction, ...] | None = key(list_of(number, 1, MAX_TAPS), default=None)
+    taps: tuple[Fraction, ...] | None = key(list_of(number, 1, MAX_GIVEN_TAPS), default=None)
     taps_file: str | None = key(file_name, default=None)
     decimate: int | str | None = key_after(read_decimate, default=None)
     hold: bool = key(flag, default=False)
@@ -195,6 +196,12 @@ class FilterTable(Table):
     def is_fir(self) -> bool:
         """Whether it asks for an FIR filter."""
         return self.taps is not None or self.taps_file is not None or self.family in FIR_FAMILIES
+
+    @property
+    def is_cic(self) -> bool:
+        """Whether it gives the taps of a CIC filter that decimates."""
+        factor = self.decimate if isinstance(self.decimate, int) else 1
+        return self.taps is not None and order_of(self.taps, factor) is not None
 
 
 class WearTable(Table):

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from fractions import Fraction
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from sosmith.gen.specification.uncertainty import CoefficientsSpec, UncertaintyS
 from sosmith.gen.specification.values import UnfitError, literal
 from sosmith.gen.specification.wear_limits import WearSpec
 from sosmith.model.converters.dac_writing import Writing
+from sosmith.model.dataflow.cic import order_of
 from sosmith.model.errors import SpecificationError
 from sosmith.model.foreign_files import read_text
 from sosmith.model.port import Port
@@ -84,7 +86,7 @@ class FilterSpec:
         1 to 10 stable rows (b0, b1, b2, a0, a1, a2) with a0 = 1 and the sign convention of scipy; of the
         specification or of its `sos_file`.
     taps : tuple of Fraction or None
-        1 to 256 coefficients of 1, 1/z and so on, not all 0; of the specification or of its `taps_file`.
+        1 to 512 coefficients of 1, 1/z and so on, not all 0; of the specification or of its `taps_file`.
     decimate : int, "auto" or None
         Factor of the decimator before a low-pass filter by order and cutoff, a power of two; None without one.
     hold : bool
@@ -116,6 +118,12 @@ class FilterSpec:
     def is_fir(self) -> bool:
         """Whether it is an FIR filter, whose realizations are others than those of second-order sections."""
         return self.taps is not None or self.family in FIR_FAMILIES
+
+    @cached_property
+    def is_cic(self) -> bool:
+        """Whether it decimates by as many samples as each of its moving sums takes: then adders alone can make it."""
+        factor = self.decimate if isinstance(self.decimate, int) else 1
+        return self.taps is not None and order_of(self.taps, factor) is not None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,7 +6,7 @@ from fractions import Fraction
 from pathlib import Path
 
 from sosmith.gen.quantity import count
-from sosmith.gen.specification.choices import MAX_TAPS
+from sosmith.gen.specification.choices import MAX_GIVEN_TAPS
 from sosmith.gen.specification.coefficients.content import TransferFunction
 from sosmith.gen.specification.coefficients.filter_file import read_filter_file
 from sosmith.model.errors import SpecificationError
@@ -18,7 +18,7 @@ def taps_of(path: Path) -> tuple[tuple[Fraction, ...], str]:
     Returns
     -------
     tuple of Fraction
-        1 to 256 numbers, not all 0.
+        1 to 512 numbers, not all 0.
     str
         The format of the file, a sentence.
 
@@ -30,8 +30,8 @@ def taps_of(path: Path) -> tuple[tuple[Fraction, ...], str]:
     read = read_filter_file(path)
     if not isinstance(read, TransferFunction) or read.taps is None:
         raise SpecificationError(f"{path}: filter.taps_file must hold the taps of an FIR filter, not {read.format}")
-    if len(read.taps) > MAX_TAPS:
-        raise SpecificationError(f"{path}: taps must be at most {MAX_TAPS}, not {len(read.taps)}")
+    if len(read.taps) > MAX_GIVEN_TAPS:
+        raise SpecificationError(f"{path}: taps must be at most {MAX_GIVEN_TAPS}, not {len(read.taps)}")
     if not any(read.taps):
         raise SpecificationError(f"{path}: taps must not all be 0")
     return read.taps, f"{count(len(read.taps), 'tap')} from {read.format}"

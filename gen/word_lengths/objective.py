@@ -78,6 +78,10 @@ class Objective(Protocol):
         """Whether a product may drop bits by itself, before it is added to others."""
 
     @property
+    def exact_taps(self) -> bool:
+        """Whether the hardware has no coefficients, so that taps of an FIR filter must be exact."""
+
+    @property
     def factor_bits(self) -> int | None:
         """Bits of a constant, with its sign, beyond which a product takes more; None if there is no such step."""
 
@@ -111,6 +115,7 @@ class SmallArea:
     negligible = 0.0
     few_digits = False
     floors_products = True
+    exact_taps = False
     factor_bits = MULTIPLIER_BITS
 
     def of_graph(self, graph: Graph) -> float:
@@ -149,6 +154,7 @@ class FewAdders:
     negligible = 0.0
     few_digits = True
     floors_products = True
+    exact_taps = False
     factor_bits = None
 
     def of_graph(self, graph: Graph) -> float:
@@ -191,6 +197,7 @@ class FewSums:
     negligible = 0.0
     few_digits = False
     floors_products = True
+    exact_taps = False
 
     @property
     def factor_bits(self) -> int:
@@ -248,6 +255,7 @@ class ShortProgram:
     negligible = 1 / 128  # bits of words that take no instruction
     few_digits = False
     floors_products = False  # products are added up with all their bits
+    exact_taps = False
     beyond = "longer even with one digit for each value"
     unsuited = "not to be folded"
     hopeless = 1.5  # trimming saved less than a fifth in every design seen

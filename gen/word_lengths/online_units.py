@@ -42,6 +42,7 @@ class OnlineUnits:
     hopeless = 2.5  # as for the parallel architecture
     few_digits = False
     floors_products = False
+    exact_taps = False
     factor_bits = None
 
     def of_graph(self, graph: Graph) -> float:

@@ -344,7 +344,7 @@ def _by_taps(planned: Plan) -> Quantized:
         ideal,
         planned.realization,
         before.output,
-        planned.allowed - spent,
+        Fraction(0) if planned.objective.exact_taps else planned.allowed - spent,
         steady=planned.steady,
         few_digits=planned.objective.few_digits,
         factor_bits=planned.objective.factor_bits,

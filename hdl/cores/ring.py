@@ -53,9 +53,9 @@ from amaranth.lib.memory import Memory
 
 from sosmith.hdl.axi_stream import extended
 from sosmith.hdl.check_bits import CheckBits, Read
-from sosmith.hdl.cores.rounded_sum import finest, last_node, rounding, sum_bits
 from sosmith.hdl.memory_ports import read_port, write_port
 from sosmith.hdl.pipelined_logic import limits
+from sosmith.hdl.plan.rounded_sum import finest, last_node, rounding, sum_bits
 from sosmith.hdl.plan.streams import channel_bits
 from sosmith.hdl.plan.tap_steps import PIPELINE, StepsInTurn, tap_steps
 from sosmith.hdl.reload import ReloadPort

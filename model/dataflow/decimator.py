@@ -18,13 +18,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from itertools import accumulate
 from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from sosmith.model.arrays import Codes, Values
+from sosmith.model.dataflow.cic import impulse_response
 from sosmith.model.dataflow.downsampler import gathered
 from sosmith.model.port import Port
 
@@ -32,15 +32,6 @@ _Flags = TypeVar("_Flags", np.bool_, np.uint8)
 
 MAX_WIDTH = 63
 """Widest register of a decimator, in bits: the models in software have words of 64."""
-
-
-def impulse_response(factor: int, stages: int) -> tuple[int, ...]:
-    """Impulse response, at the higher rate, of a CIC filter; the sum of its samples is ``factor**stages``."""
-    response = [1]
-    for _ in range(stages):
-        sums = list(accumulate([*response, *[0] * (factor - 1)]))
-        response = [a - b for a, b in zip(sums, [*[0] * factor, *sums], strict=False)]
-    return tuple(response)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from decimal import Decimal
 from fractions import Fraction
 from typing import Any
 
@@ -10,16 +11,27 @@ import numpy as np
 from tests.interface.fir_draws import SHAPES, FirDraw, taps_of
 
 import sosmith
+from sosmith.model.dataflow.cic import impulse_response
+
+OTHERS = 40
+"""Number of the first seed of CIC filters."""
 
 
 def draw(seed: int) -> FirDraw:
-    """Draw a filter of 2 to 64 taps that decimates by 2 to 64; every 5 seeds in a row have all shapes."""
+    """Draw a filter of 2 to 64 taps that decimates by 2 to 64; every 5 seeds in a row have all shapes.
+
+    From `OTHERS` on, it is a CIC filter, of up to 190 taps.
+    """
     rng = random.Random(f"decimating fir {seed}")
-    shape = SHAPES[seed % len(SHAPES)]
-    words = taps_of(rng, shape, rng.randint(2, 64))
+    shape = SHAPES[seed % len(SHAPES)] if seed < OTHERS else "cic"
+    words = taps_of(rng, shape, rng.randint(2, 64)) if seed < OTHERS else []
     bits, output_bits = rng.randint(8, 24), rng.randint(8, 24)
     channels = rng.choice([1, 1, 1, 2, 5, 8])
     factor = rng.choice([2, 2, 3, 4, 7, 16, 64])
+    if seed >= OTHERS:
+        order = rng.randint(1, 3 if factor == 64 else 6)
+        scale = Decimal(2) ** -rng.randint(0, 12)
+        words = [tap * scale for tap in impulse_response(factor, order)]
     low, high = rng.choice([(-1.0, 1.0), (-2.0, 2.0), (0.0, 4.0)])
     gain = float(sum(map(abs, words))) * max(-low, high)
     reach = 2.0 ** np.ceil(np.log2(gain)) / rng.choice([1, 1, 4])

@@ -2,7 +2,8 @@
 
 The sizes of multipliers, in the order of the graphs, leave out products by constants that are made of adders, whose
 sums are among the bits of adders. Which products these are, and what sums there are, is read in the hardware of a
-parallel core. A program has no hardware for each operator: there every product counts as a multiplier.
+parallel core. A program has no hardware for each operator: there every product counts as a multiplier. Integrators and
+combs count in place of the filter that they make.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from sosmith.verify.certificate_file import Certificate, ItemEntry, StageEntry
+from sosmith.verify.multirate.adders.check import CicVerdict
 from sosmith.verify.parallel.check import HardwareVerdict
 from sosmith.verify.verdict.operators import operators
 from sosmith.verify.verdict.products import products_of
@@ -27,6 +29,13 @@ def cost_of(certificate: Certificate, item: ItemEntry, proofs: Proofs, stated: M
     parts = _parts(certificate, item, proofs)
     if item.architecture == "online":
         return None
+    if isinstance(proofs.hardware, CicVerdict):
+        output = operators(certificate.stages[1:])
+        return {
+            "multipliers": output.products,
+            "adder_bits": proofs.hardware.adder_bits + output.adder_bits,
+            "register_bits": proofs.hardware.register_bits + output.register_bits,
+        }
     everything = operators([stage for stages, _ in parts for stage in stages])
     whole = {
         "multipliers": everything.products,

@@ -14,6 +14,7 @@ from sosmith.verify.c_model.check import check_c_model
 from sosmith.verify.certificate_file import Certificate, ItemEntry
 from sosmith.verify.decimation import at_lower_rate, behind_decimator, calibration_alone, module_in
 from sosmith.verify.graph import RejectedError, require
+from sosmith.verify.multirate.adders.check import check_cic
 from sosmith.verify.multirate.cic import DecimatorVerdict, check_decimator
 from sosmith.verify.multirate.parallel_core import check_ahead, check_behind
 from sosmith.verify.multirate.ring.check import check_rings
@@ -221,9 +222,8 @@ def _hardware_proven(
     hardware: HardwareVerdict | None = None
     unit: UnitVerdict | None = None
     if certificate.downsampling is not None:
-        require(item.architecture == "folded", f"an FIR filter that decimates must be folded, not {item.architecture}")
         progress("hardware", 0, 0)
-        hardware = check_rings(text, certificate, item)
+        hardware = _downsampled(text, certificate, item)
     elif item.architecture in {"folded", "serial"}:
         progress("program", 0, 0)
         behind = None if certificate.decimation is None else f"{certificate.name}_behind"
@@ -244,6 +244,17 @@ def _hardware_proven(
             else check_behind(text, certificate, item.channels)
         )
     return Proofs(program, hardware, _ahead(certificate, item, text, progress), unit=unit), decimator
+
+
+def _downsampled(text: str, certificate: Certificate, item: ItemEntry) -> HardwareVerdict:
+    """Prove an FIR filter of which every N-th result leaves."""
+    if item.architecture == "parallel":
+        return check_cic(text, certificate, item)
+    require(
+        item.architecture == "folded",
+        f"an FIR filter that decimates must be folded, or a CIC filter in parallel, not {item.architecture}",
+    )
+    return check_rings(text, certificate, item)
 
 
 def _ahead(

@@ -16,11 +16,12 @@ import numpy as np
 
 from sosmith.gen.chain.automatic.limits import Limits
 from sosmith.gen.chain.automatic.structures import Structure
+from sosmith.gen.estimate.cic import Ladder, of_ladder
 from sosmith.gen.estimate.estimate import luts_of
 from sosmith.gen.estimate.rings import Rings, of_size
 from sosmith.gen.fpga.boards import Device
 from sosmith.gen.quantity import count, frequency
-from sosmith.gen.specification.choices import MAX_TAPS
+from sosmith.gen.specification.choices import MAX_GIVEN_TAPS, MAX_TAPS
 from sosmith.gen.word_lengths.cost import MULTIPLIER_BITS, Multiplication, Operand
 
 _SPENT = 0.97
@@ -62,6 +63,8 @@ class Wanted:
     channels, input_bits, output_bits : int
     exact_bits, between_bits : int
         Bits of the output with steps as large as the error that is allowed, and of a port between two stages.
+    adders : bool
+        Whether CIC filters are made of adders; otherwise each has a multiplier and a ring of samples.
     """
 
     limits: Limits
@@ -73,6 +76,7 @@ class Wanted:
     output_bits: int
     exact_bits: int
     between_bits: int
+    adders: bool = False
 
     @property
     def last_rate(self) -> Fraction:
@@ -144,6 +148,8 @@ class Planned:
         Of its pass band, in dB.
     taps : int
         How many it is expected to have; of an IIR filter, its order.
+    adders : bool
+        Whether it is a CIC filter made of adders, which takes a sample at each clock.
     """
 
     kind: str
@@ -154,6 +160,7 @@ class Planned:
     stop: Fraction = Fraction(0)
     loss: float = 0.0
     taps: int = 1
+    adders: bool = False
 
     @property
     def steps(self) -> int:
@@ -164,6 +171,8 @@ class Planned:
         """Clocks for each result of a channel, expected."""
         if self.kind == "iir":
             return _CLOCKS_OF_ORDER * self.taps + _OTHER_CLOCKS
+        if self.adders:
+            return self.factor
         return self.factor * (1 + (channels > 1)) + self.steps + 5
 
     def available(self, wanted: Wanted) -> int:
@@ -204,7 +213,8 @@ def plan(structure: Structure, wanted: Wanted, device: Device) -> Plan:
     made = Plan(structure=structure, stages=[])
     rate = wanted.rate
     for step in structure.steps:
-        made.stages.append(Planned(kind=step.kind, factor=step.factor, rate=rate))
+        adders = wanted.adders and step.kind == "cic"
+        made.stages.append(Planned(kind=step.kind, factor=step.factor, rate=rate, adders=adders))
         rate /= step.factor
     droop = _plan_cic(made, wanted)
     _plan_filters(made, wanted, droop)
@@ -225,7 +235,7 @@ def _plan_cic(made: Plan, wanted: Wanted) -> float:
         needed = wanted.stopband_loss + _MOST_DROOP / 2
         stage.order = max(1, math.ceil(needed / -decibel(alias))) if alias < 1 else _MOST_ORDER + 1
         stage.taps = stage.order * (stage.factor - 1) + 1
-        most = min(_MOST_ORDER, (MAX_TAPS - 1) // (stage.factor - 1))
+        most = min(_MOST_ORDER, (MAX_GIVEN_TAPS - 1) // (stage.factor - 1))
         if stage.order > most:
             reached = -most * decibel(alias)
             made.against(
@@ -335,6 +345,10 @@ def _cost_of(stage: Planned, wanted: Wanted, device: Device, data: int, out: int
     if stage.kind == "iir":
         wide = max(1, math.ceil(data / max(device.factor_bits, 1)))
         return Cost(_ELLIPTIC_LUTS, wide**2 * (device.multipliers > 0), 60.0 * data)
+    if stage.adders:
+        width = data + math.ceil(stage.order * math.log2(stage.factor))
+        found = of_ladder(Ladder(stage.order, width, stage.factor, out + 1, out, _FLAGS))
+        return Cost(luts_of(found, "parallel", device.family), 0.0, 0.0)
     taps = usual_taps(stage)
     largest = max(abs(tap) for tap in taps)
     bits = wanted.exact_bits + _COEFFICIENT_BITS

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from sosmith.gen.specification.choices import MAX_TAPS
+from sosmith.gen.specification.choices import MAX_GIVEN_TAPS
 from sosmith.gen.specification.coefficients.arrays import read_array_file
 from sosmith.gen.specification.coefficients.content import Content, TransferFunction
 from sosmith.gen.specification.coefficients.prototype_file import read_prototype
@@ -36,8 +36,8 @@ def read_filter_file(path: Path) -> Content:
     """
     content = _content(path)
     taps = content.taps if isinstance(content, TransferFunction) else None
-    if taps is not None and len(taps) > MAX_TAPS:
-        raise SpecificationError(f"{path}: the filter must have at most {MAX_TAPS} taps, not {len(taps):,}")
+    if taps is not None and len(taps) > MAX_GIVEN_TAPS:
+        raise SpecificationError(f"{path}: the filter must have at most {MAX_GIVEN_TAPS} taps, not {len(taps):,}")
     return content
 
 

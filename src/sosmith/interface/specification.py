@@ -222,7 +222,7 @@ class Specification(View):
         Parameters
         ----------
         taps : array_like, shape (taps,)
-            1 to 256 coefficients of 1, 1/z, 1/z^2 and so on, not all 0, as returned by ``scipy.signal.remez``. Taps of
+            1 to 512 coefficients of 1, 1/z, 1/z^2 and so on, not all 0, as returned by ``scipy.signal.remez``. Taps of
             one magnitude share a multiplier, taps of 0 have none.
         sample_rate : float
             Samples per second of each channel, in Hz.

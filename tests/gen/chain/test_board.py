@@ -44,7 +44,7 @@ def guarded() -> sosmith.Chain:
 def test_the_identity_is_that_of_the_whole(chain: sosmith.Chain) -> None:
     item = chain_item(chain.core)
     told = identity(item, item.verilog, baud=1_000_000, clock=12e6)
-    assert (told.name, told.core, told.architecture) == ("rx", "chain", "folded_parallel")
+    assert (told.name, told.core, told.architecture) == ("rx", "chain", "parallel_folded")
     assert (told.sample_rate, told.channels, told.reload) == (8000.0, 1, None)
     assert [port.name for port in told.input_ports] == ["x"]
     assert told.output_port == chain.core.stages[-1].output
@@ -139,7 +139,7 @@ def test_a_build_says_what_the_chain_takes(
     monkeypatch.setattr(bitstream, "find_tool", lambda name: Stub(name, [], REPORT, None))
     made = chain.build("icestick", folder=tmp_path)
     assert made.bitstream.name == "rx_board_icestick.bin"
-    assert (made.summary["name"], made.summary["architecture"]) == ("rx", "folded_parallel")
+    assert (made.summary["name"], made.summary["architecture"]) == ("rx", "parallel_folded")
     assert made.summary["samples_per_second"] == 12e6 / chain_item(chain.core).cycles_per_sample
     assert (tmp_path / "rx_board.sv").read_text(encoding="ascii") == board_verilog(chain_item(chain.core), clock=CLOCK)
     project = chain.project("arty_a7", folder=tmp_path / "project")

@@ -142,9 +142,9 @@ REFUSED: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
         "stage[0].decimate must be a power of two for a CIC filter, whose weights are then exact, not 3",
     ),
     "long cic": (
-        stage(0, order=5, decimate=64),
-        "stage[0].decimate must be such that order * (decimate - 1) is below 256, as a CIC filter is built as an FIR "
-        "filter; two stages in series decimate further, not 64",
+        stage(0, order=9, decimate=64),
+        "stage[0].decimate must be such that order * (decimate - 1) is below 512, as it has so many taps; two stages "
+        "in series decimate further, not 64",
     ),
     "same name": (
         stage(1, name="slow"),
@@ -231,9 +231,9 @@ def test_what_a_chain_does_not_take_is_refused(name: str) -> None:
 
 def test_what_a_decimating_stage_does_not_take_is_refused_with_its_name() -> None:
     with pytest.raises(SpecificationError) as refused:
-        loaded(hardware(multipliers=0))
+        loaded(lambda tree: (hardware(multipliers=0)(tree), stage(1, decimate=2)(tree)))
     assert str(refused.value) == (
-        "specification: stage slow: not yet available: hardware.multipliers must be 'auto' with an FIR filter that "
+        "specification: stage half: not yet available: hardware.multipliers must be 'auto' with an FIR filter that "
         "decimates, not 0"
     )
 
@@ -273,6 +273,7 @@ def test_an_error_that_is_too_small_is_refused() -> None:
 def test_a_clock_that_is_too_slow_is_refused_with_the_stage() -> None:
     tree = copy.deepcopy(TREE)
     tree["hardware"] = {"clock": 9000.0}
+    tree["stage"][0]["architecture"] = "folded"
     with pytest.raises(sosmith.ShortfallError) as refused:
         sosmith.design_chain(tree)
     assert str(refused.value) == (

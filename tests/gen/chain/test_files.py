@@ -48,7 +48,7 @@ def test_two_runs_write_the_same_bytes(chain: sosmith.Chain, tmp_path: Path) -> 
 
 
 def test_stages_have_the_architecture_that_each_asks_for(chain: sosmith.Chain) -> None:
-    assert [stage.architecture for stage in chain.stages] == ["folded", "parallel", "folded"]
+    assert [stage.architecture for stage in chain.stages] == ["parallel", "parallel", "folded"]
 
 
 @pytest.mark.slow

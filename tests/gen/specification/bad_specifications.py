@@ -1001,7 +1001,8 @@ BAD = [
         "no multipliers for loadable constants",
         CLOCK,
         CLOCK + '\nreload = true\nmultipliers = 0\narchitecture = "parallel"',
-        "hardware.multipliers must be 'auto' with hardware.reload = true, as adders multiply by constants that are "
+        "hardware.multipliers must be 'auto' with hardware.architecture = \"parallel\" and hardware.reload = true, as "
+        "adders multiply by constants that are "
         "fixed, not 0",
     ),
     (

@@ -2,6 +2,7 @@
 
 import tomllib
 from decimal import Decimal
+from itertools import combinations as combinations_of
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +28,8 @@ ASKED: dict[str, tuple[str, str, Any]] = {
     "reload": ("hardware", "reload", True),
     "protect": ("hardware", "protect", "correct"),
     "decimate": ("filter", "decimate", 2),
-    "decimate by FIR": ("", "filter", {"taps": [Decimal("0.25"), Decimal("0.5"), Decimal("0.25")], "decimate": 2}),
+    "decimate by FIR": ("", "filter", {"taps": [Decimal("0.25"), Decimal("0.25"), Decimal("0.25")], "decimate": 2}),
+    "decimate by CIC": ("", "filter", {"taps": [Decimal("0.25"), Decimal("0.5"), Decimal("0.25")], "decimate": 2}),
     "samples_per_clock": ("hardware", "samples_per_clock", 2),
     "look-ahead": ("hardware", "pipeline", "look-ahead"),
     "start zero": ("hardware", "start", "zero"),
@@ -70,7 +72,8 @@ def test_every_option_and_every_architecture_is_there() -> None:
     pairs = {(each.row, each.option) for each in combinations()}
     assert pairs >= {(name, option) for name in (*TERMS, CHAIN.name) for option in ASKED}
     beside = [(one, other) for k, one in enumerate(ASKED) for other in [*ASKED][k + 1 :]]
-    same_key = {("multipliers 0", "multipliers 1 or more"), ("decimate", "decimate by FIR")}
+    decimating = ("decimate", "decimate by FIR", "decimate by CIC")
+    same_key = {("multipliers 0", "multipliers 1 or more"), *combinations_of(decimating, 2)}
     assert {pair for pair in beside if pair not in pairs} == same_key
 
 

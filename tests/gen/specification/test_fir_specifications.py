@@ -24,8 +24,8 @@ HALFBAND = 'family = "halfband"\nkind = "lowpass"\n'
 @pytest.mark.parametrize(
     ("table", "sentence"),
     [
-        ("taps = []", "filter.taps must be a list of 1 to 256 numbers, not []"),
-        (f"taps = {[1] * 257}", "filter.taps must be a list of 1 to 256 numbers, not a list of 257 values"),
+        ("taps = []", "filter.taps must be a list of 1 to 512 numbers, not []"),
+        (f"taps = {[1] * 513}", "filter.taps must be a list of 1 to 512 numbers, not a list of 513 values"),
         ("taps = [0, 0.0]", "filter.taps must be a list of numbers that are not all 0, not zeros only"),
         ('taps = [1, "2"]', "filter.taps[1] must be a number, not '2': write 2, without quotes and unit"),
         ("taps = [1]\norder = 3", "filter must be given by order and cutoff, .*, not by order and taps"),

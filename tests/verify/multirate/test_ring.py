@@ -4,26 +4,15 @@ from __future__ import annotations
 
 import re
 from functools import cache
-from typing import NamedTuple
 
 import pytest
+from tests.verify.multirate.single_cores import Made, changed, proven_alone
 
 import sosmith
-from sosmith.gen.output.certificate import about, certificate
-from sosmith.gen.output.verilog import core_verilog
-from sosmith.verify.certificate_file import Certificate, DownsamplingEntry, ItemEntry
+from sosmith.verify.certificate_file import DownsamplingEntry
 from sosmith.verify.graph import RejectedError
 from sosmith.verify.multirate.ring.check import check_rings
 from sosmith.verify.verification import verify
-
-
-class Made(NamedTuple):
-    """A core with its certificate."""
-
-    design: sosmith.Design
-    text: str
-    certificate: Certificate
-    item: ItemEntry
 
 
 @cache
@@ -39,15 +28,6 @@ def made(channels: int = 1, start: str = "zero", *, hold: bool = False) -> Made:
         "hardware": {"start": start, "clock": 1e6},
     }
     return proven_alone(sosmith.design(sosmith.Specification.load(tree)))
-
-
-def proven_alone(design: sosmith.Design) -> Made:
-    core = design.core
-    text = core_verilog(core)
-    own = certificate(core.quantized, core.spec.max_error, about(core, {}))
-    assert own.about is not None
-    assert own.about.item is not None
-    return Made(design, text, own, own.about.item)
 
 
 @cache
@@ -109,13 +89,6 @@ _ONE = {
     ),
     "a first value": (r"reg filling = 1'h1", "reg filling = 1'h0"),
 }
-
-
-def changed(text: str, pattern: str, by: str) -> str:
-    """Change the first match of a pattern."""
-    other, count = re.subn(pattern, by, text, count=1)
-    assert count == 1, f"there must be {pattern} in the text"
-    return other
 
 
 def _with_bit_flipped(text: str, row: int, bit: int) -> str:

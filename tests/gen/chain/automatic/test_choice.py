@@ -123,8 +123,9 @@ def clock(hertz: float) -> Callable[[], dict[str, Any]]:
             "the closest is FIR 3, too long: 466 taps at 8000 Hz, of at most 256, which stop some 20 dB",
         ),
         (
-            clock(20e3),
-            "the closest is FIR 8, too slow: 23 clocks for each result at 1000 Hz, of 20; a clock of 23000 Hz would do",
+            clock(9e3),
+            "the closest is CIC 4, FIR 2, too slow: 10 clocks for each result at 1000 Hz, of 9; a clock of 10000 Hz "
+            "would do",
         ),
     ],
 )

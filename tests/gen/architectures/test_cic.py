@@ -1,0 +1,98 @@
+"""CIC filters of adders: when they are chosen, and what they are not for."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+import sosmith
+from sosmith.gen.estimate.estimate import estimated
+from sosmith.gen.fpga.boards import find_board
+from sosmith.hdl.plan.cic import cic_plan
+
+
+def specification(taps: list[float], *, filter_: dict[str, Any] | None = None, **hardware: Any) -> Any:
+    return sosmith.Specification.load(
+        {
+            "name": "down",
+            "sample_rate": 1e6,
+            "input": {"x": {"bits": 8, "range": [-1.0, 1.0], "signed": True}},
+            "filter": {"taps": taps, "decimate": 4, **(filter_ or {})},
+            "output": {"bits": 12, "range": [-1.0, 1.0], "signed": True, "max_error": 0.001},
+            "hardware": {"clock": 1e6, **hardware},
+        }
+    )
+
+
+MEANS = [tap / 16 for tap in (1, 2, 3, 4, 3, 2, 1)]
+"""Two means of 4 samples in series."""
+
+
+def test_it_is_chosen_for_a_cic_filter() -> None:
+    made = sosmith.design(specification(MEANS))
+    assert made.reasons["architecture"] == (
+        "parallel: the smallest that keeps up; 2 integrators and as many combs of 12 bits, a sample a clock"
+    )
+    assert made.cycles_per_sample == 1
+    plan = made.core.architecture.plan
+    assert (plan.factor, plan.order, plan.width, plan.frac) == (4, 2, 12, 0)
+    cost = made.core.architecture.cost
+    assert (cost.multiplications, cost.adder_bits, cost.register_bits) == ((), 4 * 12, 6 * 12 + 12)
+
+
+@pytest.mark.parametrize(
+    ("taps", "filter_", "hardware"),
+    [
+        ([1 / 8, 2 / 8, 1 / 8], {}, {"clock": 1e7}),
+        (MEANS, {"hold": True}, {"clock": 1e7}),
+        (MEANS, {}, {"clock": 1e7, "reload": True}),
+        (MEANS, {}, {"clock": 1e7, "protect": "detect"}),
+        (MEANS, {}, {"clock": 1e7, "architecture": "folded"}),
+    ],
+)
+def test_a_ring_is_made_of_others(taps: list[float], filter_: dict[str, Any], hardware: dict[str, Any]) -> None:
+    made = sosmith.design(specification(taps, filter_=filter_, **hardware))
+    assert made.architecture == "folded"
+
+
+def test_results_are_not_held() -> None:
+    sentence = r"filter\.hold must be false in the parallel architecture, which gives a result once$"
+    with pytest.raises(sosmith.ShortfallError, match=sentence):
+        sosmith.design(specification(MEANS, filter_={"hold": True}, architecture="parallel"))
+
+
+def test_taps_must_be_exact() -> None:
+    """0.1 is no whole number of any power of two."""
+    taps = [0.1, 0.2, 0.3, 0.2, 0.1]
+    with pytest.raises(
+        sosmith.ShortfallError, match=r"the filter's coefficients must keep their error below 0 output LSB"
+    ):
+        sosmith.design(specification(taps, filter_={"decimate": 3}, architecture="parallel"))
+    made = sosmith.design(specification(taps, filter_={"decimate": 3}, clock=1e7))
+    assert made.architecture == "folded"
+
+
+def test_other_datapaths_have_no_plan() -> None:
+    other = sosmith.design(specification([0.25, 0.5, 0.125], clock=1e7)).core.datapath
+    with pytest.raises(ValueError, match=r"^taps must be those of moving sums, times a power of two$"):
+        cic_plan(other)
+    tree = specification([0.25, 0.5, 0.125]).as_dict()
+    del tree["filter"]["decimate"]
+    plain = sosmith.design(sosmith.Specification.load(tree)).core.datapath
+    with pytest.raises(ValueError, match=r"^stages must be an FIR filter that decimates, and the output$"):
+        cic_plan(plain)
+
+
+def test_it_is_estimated_without_multipliers() -> None:
+    """Synthesis for an ECP5 takes 243 LUT4 and 320 flip-flops for four means of 4 samples of 12 bits."""
+    taps = [tap / 256 for tap in (1, 4, 10, 20, 31, 40, 44, 40, 31, 20, 10, 4, 1)]
+    tree = specification(taps).as_dict()
+    tree["input"]["x"]["bits"], tree["output"]["bits"] = 12, 16
+    tree["output"]["max_error"] = 1e-4
+    made = sosmith.design(sosmith.Specification.load(tree))
+    found = estimated(made.core.architecture, find_board("ulx3s_25f"))
+    assert found is not None
+    assert (found.multiplier_blocks, found.memory_bits) == (0, 0)
+    assert found.luts == pytest.approx(243, rel=0.15)
+    assert found.flip_flops == pytest.approx(320, rel=0.15)

@@ -1,0 +1,139 @@
+"""What is proven of a CIC filter of adders, and that whatever is changed in its SystemVerilog is found."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import pytest
+from tests.verify.multirate.single_cores import Made, changed, proven_alone
+from tests.verify.parallel.edits import random_edits, swept
+from tests.verify.parallel.simulated import outputs
+
+import sosmith
+from sosmith.verify.certificate_file import DownsamplingEntry
+from sosmith.verify.graph import RejectedError
+from sosmith.verify.multirate.adders.check import check_cic
+from sosmith.verify.verification import verify
+
+CASES = {
+    "from zero, limited": ("zero", True, True),
+    "from zero": ("zero", False, True),
+    "steady, limited": ("steady", True, True),
+    "steady": ("steady", False, True),
+    "without a sign": ("steady", False, False),
+}
+
+
+@cache
+def made(start: str = "zero", limited: bool = True, signed: bool = True, middle: int = 3) -> Made:
+    """Make two moving sums of three samples, which decimate by 3; with another tap in the middle, they are products."""
+    most = 8.0 if limited else 16.0  # the largest result is 9
+    architecture = "parallel" if middle == 3 else "folded"
+    tree = {
+        "name": "little",
+        "sample_rate": 1000.0,
+        "input": {"x": {"bits": 5, "range": [-1.0 * signed, 1.0], "signed": signed}},
+        "filter": {"taps": [1, 2, middle, 2, 1], "decimate": 3},
+        "output": {"bits": 7, "range": [-most, most], "signed": True},
+        "hardware": {"start": start, "clock": 1e5, "architecture": architecture},
+    }
+    return proven_alone(sosmith.design(sosmith.Specification.load(tree)))
+
+
+def rejection(core: Made, text: str) -> str:
+    """Return the sentence of a rejection; nothing if a text is accepted."""
+    try:
+        check_cic(text, core.certificate, core.item)
+    except RejectedError as error:
+        return str(error)
+    return ""
+
+
+@pytest.mark.parametrize("case", CASES.values(), ids=CASES)
+def test_clocks_are_those_of_the_plan(case: tuple[str, bool, bool]) -> None:
+    core = made(*case)
+    verdict = check_cic(core.text, core.certificate, core.item)
+    architecture = core.design.core.architecture
+    assert verdict.clearing == architecture.reset_cycles == (6 if case[0] == "steady" else 0)
+    assert verdict.latency == architecture.latency_cycles == 6 + case[1]
+    assert verdict.result_clocks == architecture.cycles_per_result == 3
+    assert verdict.interval == architecture.cycles_per_sample == 1
+    assert (verdict.adder_bits, verdict.states) == (4 * architecture.plan.width, 4)
+    assert verify(core.certificate).bound == core.certificate.claims.bound
+
+
+_CHANGES = {
+    "a sum that forgets": (r"sum2_next = sum2 \+ sum1", "sum2_next = sum1"),
+    "a sum that moves without a sample": (
+        r"sum2_load = s_axis_tready & valid1",
+        "sum2_load = s_axis_tready & s_axis_tready",
+    ),
+    "a sum that moves while the pipeline stands": (
+        r"sum2_load = s_axis_tready & valid1",
+        "sum2_load = valid1 & valid1",
+    ),
+    "a comb that takes the wrong side": (r"difference2_next = difference1 - comb2", "difference2_next = comb2"),
+    "a comb that holds too long": (r"if \(comb2_load\) comb2 <= difference1", "if (comb2_load) comb2 <= comb2"),
+    "a phase": (r"phase == 2'h2", "phase == 2'h3"),
+    "a result that comes early": (r"moved2 <= moved1", "moved2 <= moved1_next"),
+    "a rail that is forgotten": (r"rail_now = rail \|", "rail_now = rail_now_part |"),
+    "a rail of the sample before": (r"rail3 <= rail2", "rail3 <= rail1"),
+    "a rail of another result": (r"rail5 <= rail4", "rail5 <= rail3"),
+    "a limit": (r"above \? 11'h03f", "above ? 11'h03e"),
+    "a count": (r"reg \[1:0\] left = 2'h2", "reg [1:0] left = 2'h1"),
+    "a count that does not end": (r"left_load = s_axis_tready_and_moved2 & any_left", "left_load = moved2 & any_left"),
+    "a sum that a reset leaves": (r"if \(!aresetn\) sum1 <= 9'h000;\n    else if", "if"),
+    "a result that is overwritten": (r"if \(o_valid_load\)", "if (o_ready)"),
+    "half a step": (r"\$signed\(\d+'h0*1\)", "$signed(2'h0)"),
+}
+
+
+@pytest.mark.parametrize(("pattern", "by"), _CHANGES.values(), ids=_CHANGES)
+def test_what_is_changed_is_found(pattern: str, by: str) -> None:
+    core = made()
+    assert rejection(core, core.text) == ""
+    assert rejection(core, changed(core.text, pattern, by))
+
+
+@pytest.mark.sweep(1)
+@pytest.mark.parametrize("case", CASES.values(), ids=CASES)
+@pytest.mark.parametrize("seed", range(4))
+def test_whatever_is_edited_is_found(case: tuple[str, bool, bool], seed: int) -> None:
+    """What is accepted all the same does the same in simulation."""
+    core = made(*case)
+
+    def seen(text: str) -> object:
+        return outputs(text, 400, seed)
+
+    found = swept(random_edits(core.text, 30, seed), lambda text: rejection(core, text), seen, core.text)
+    assert found["rejected"] > 15
+
+
+def test_a_certificate_that_says_otherwise() -> None:
+    core = made()
+    for factor, sentence in (
+        (2, r"^the core must have a register sum3$"),
+        (4, r"^a CIC filter must remember a multiple of 3 samples, not 4$"),
+        (5, r"^phase must have 3 bits, not 2$"),
+    ):
+        other = core.certificate.model_copy(update={"downsampling": DownsamplingEntry(factor=factor, filled=0)})
+        with pytest.raises(RejectedError, match=sentence):
+            check_cic(core.text, other, core.item)
+    filled = core.certificate.model_copy(update={"downsampling": DownsamplingEntry(factor=3, filled=4)})
+    with pytest.raises(RejectedError, match=r"^no result must be settling where the first sample fills the filter$"):
+        check_cic(core.text, filled, core.item)
+
+
+def test_a_certificate_of_other_taps() -> None:
+    """Integrators and combs have the taps of moving sums, whatever the graph says."""
+    other = made(middle=4)
+    with pytest.raises(RejectedError, match=r"^m_axis_tdata must be node \d+ .* of output_stage, not another value$"):
+        check_cic(made().text, other.certificate, other.item)
+
+
+@pytest.mark.parametrize("change", [{"channels": 2}, {"hold": True}])
+def test_what_it_is_not_for(change: dict[str, object]) -> None:
+    core = made()
+    sentence = r"^a CIC filter of adders must have one channel, and hold no results$"
+    with pytest.raises(RejectedError, match=sentence):
+        check_cic(core.text, core.certificate, core.item.model_copy(update=change))

@@ -1,0 +1,1 @@
+"""Proves a CIC filter that has an adder for each of its integrators and combs."""
