@@ -22,7 +22,7 @@ PLAIN: dict[str, Any] = {
     "stage": [
         {"name": "slow", "kind": "cic", "order": 2, "decimate": 2},
         {"name": "double", "kind": "fir", "taps": [0.5, 0.5], "architecture": "parallel"},
-        {"name": "out", "kind": "fir", "taps": [0.25, 0.25, 0.25], "decimate": 2},
+        {"name": "out", "kind": "fir", "taps": [0.25, 0.5, 0.25], "decimate": 2, "architecture": "folded"},
     ],
     "output": {"bits": 10, "range": [-1.0, 1.0], "signed": True},
 }

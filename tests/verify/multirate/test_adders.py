@@ -79,7 +79,7 @@ _CHANGES = {
     "a rail that is forgotten": (r"rail_now = rail \|", "rail_now = rail_now_part |"),
     "a rail of the sample before": (r"rail3 <= rail2", "rail3 <= rail1"),
     "a rail of another result": (r"rail5 <= rail4", "rail5 <= rail3"),
-    "a limit": (r"above \? 11'h03f", "above ? 11'h03e"),
+    "a limit": (r"above \? 8'h3f", "above ? 8'h3e"),
     "a count": (r"reg \[1:0\] left = 2'h2", "reg [1:0] left = 2'h1"),
     "a count that does not end": (r"left_load = s_axis_tready_and_moved2 & any_left", "left_load = moved2 & any_left"),
     "a sum that a reset leaves": (r"if \(!aresetn\) sum1 <= 9'h000;\n    else if", "if"),
