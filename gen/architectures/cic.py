@@ -6,45 +6,27 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from sosmith.gen.architectures.architecture import Architecture
-from sosmith.gen.architectures.blocks import NO_LIMIT, Blocks
+from sosmith.gen.architectures.decimating import AtEachClock
 from sosmith.gen.architectures.fir_steps import ExactTaps
-from sosmith.gen.fpga.boards import Board
-from sosmith.gen.specification.combinations import PARALLEL
 from sosmith.gen.word_lengths.cost import Cost, cost_of_graphs
-from sosmith.gen.word_lengths.objective import Objective
 from sosmith.hdl.plan.cic import CicPlan, cic_plan
-from sosmith.model.dataflow.downsampler import Downsampler
-from sosmith.model.errors import ShortfallError
 
 if TYPE_CHECKING:
     from amaranth.lib.wiring import Component
 
+    from sosmith.gen.architectures.blocks import Blocks
+    from sosmith.gen.fpga.boards import Board
+    from sosmith.gen.word_lengths.objective import Objective
+
 
 @dataclass(frozen=True)
-class Cic(Architecture):
+class Cic(AtEachClock):
     """Integrators take each sample, combs every N-th, without a product."""
 
-    terms = PARALLEL
-    is_filled = True
     checked = "integrators and combs give the results of the datapath's graphs, for all samples, stalls and resets"
 
-    def __post_init__(self) -> None:
-        if self.hold:
-            raise ShortfallError("filter.hold must be false in the parallel architecture, which gives a result once")
-        try:
-            _ = self.plan
-        except ValueError as error:
-            raise ShortfallError(f"a CIC filter of adders must be exact: its {error}") from None
-
     @classmethod
-    def is_tried(cls, blocks: Blocks) -> bool:
-        """Return True: it takes no multiplier block."""
-        del blocks
-        return True
-
-    @classmethod
-    def objective(cls, board: Board | None, *, adders: bool = False, blocks: Blocks = NO_LIMIT) -> Objective:
+    def objective(cls, board: Board | None, *, adders: bool = False, blocks: Blocks | None = None) -> Objective:
         """Return that of taps as they are."""
         del board, adders, blocks
         return ExactTaps()
@@ -53,12 +35,6 @@ class Cic(Architecture):
     def plan(self) -> CicPlan:
         """Integrators and combs, and their clocks."""
         return cic_plan(self.datapath)
-
-    @property
-    def _down(self) -> Downsampler:
-        down = self.datapath.downsampler
-        assert down is not None
-        return down
 
     @property
     def _own_cost(self) -> Cost:
@@ -72,33 +48,6 @@ class Cic(Architecture):
     def multiplier_blocks(self) -> int:
         """Return 0."""
         return 0
-
-    @property
-    def _latency_cycles(self) -> int:
-        return self.plan.latency_cycles
-
-    @property
-    def _cycles_per_sample(self) -> int:
-        return self.plan.factor
-
-    @property
-    def _cleared_cycles(self) -> int:
-        return self.plan.reset_cycles
-
-    @property
-    def cycles_per_result(self) -> int:
-        """Clocks between results at the highest rate."""
-        return self.plan.factor
-
-    @property
-    def cycles_per_sample(self) -> int:
-        """Return 1."""
-        return 1
-
-    @property
-    def clocks_per_sample(self) -> float:
-        """Return 1."""
-        return 1
 
     def _core(self, *, before: bool = False) -> Component:
         del before

@@ -14,6 +14,7 @@ from sosmith.gen.architectures.folded import Folded
 from sosmith.gen.architectures.folded_fir import FoldedFir, NarrowFir
 from sosmith.gen.architectures.online import Online
 from sosmith.gen.architectures.parallel import Parallel
+from sosmith.gen.architectures.polyphase import Polyphase
 from sosmith.gen.architectures.serial import Serial
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.specification.choices import AUTO
@@ -36,10 +37,12 @@ def candidates(
     program in the folded architecture.
     """
     folded: tuple[type[Architecture], ...] = (NarrowFir, FoldedFir) if blocks.asked is None else (NarrowFir,)
-    if FIR_DECIMATE in options:  # the terms leave no other
-        return folded
+    ways: tuple[tuple[Terms, tuple[type[Architecture], ...]], ...] = ()
     if CIC_DECIMATE in options:  # adders alone, without a multiplier or memory, before one multiplier and rings
-        ways: tuple[tuple[Terms, tuple[type[Architecture], ...]], ...] = ((PARALLEL, (Cic,)), (FOLDED, folded))
+        ways = ((PARALLEL, (Cic,)), (FOLDED, folded))
+    elif FIR_DECIMATE in options:
+        ways = ((FOLDED, folded), (PARALLEL, (Polyphase,)))
+    if ways:
         return tuple(
             each for terms, own in ways if wanted in {AUTO, terms.name} and terms.takes(options) for each in own
         )

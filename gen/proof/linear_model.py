@@ -254,11 +254,6 @@ class _Form(NamedTuple):
     def plus(self, other: _Form, sign: int = 1) -> _Form:
         return _Form(_sum(self.states, other.states, sign), _sum(self.sources, other.sources, sign))
 
-    def value(self, state: Sequence[fmpq], impulse: _Key, time: int) -> fmpq:
-        """Return the value at a state, at a time after the impulse of a source."""
-        driven = self.sources.get((impulse, time), fmpq(0))
-        return sum((weight * state[j] for j, weight in self.states.items()), start=driven)
-
 
 _Part = TypeVar("_Part")
 
@@ -302,14 +297,33 @@ def _forms(graph: Graph) -> list[_Form]:
 def _impulse_responses(
     graph: Graph, forms: Sequence[_Form], key: _Key, watched: Sequence[int], length: int
 ) -> dict[int, list[fmpq]]:
-    """Values of the nodes `watched` after a unit impulse of the source `key` at time 0, the others being 0."""
-    following = [forms[graph.nodes[i].operands[0]] for i in graph.delays]
-    state = [fmpq(0)] * len(following)
-    result: dict[int, list[fmpq]] = {i: [] for i in watched}
+    """Values of the nodes `watched` after a unit impulse of the source `key` at time 0, the others being 0.
+
+    Most states of a delay line are 0 at a time: only those that are not are followed, to the sums that they are part
+    of.
+    """
+    sums = {("state", k): forms[graph.nodes[i].operands[0]] for k, i in enumerate(graph.delays)}
+    sums |= {("node", i): forms[i] for i in watched}
+    parts: list[list[tuple[tuple[str, int], fmpq]]] = [[] for _ in graph.delays]
+    driven: dict[int, list[tuple[tuple[str, int], fmpq]]] = {}
+    for place, form in sums.items():
+        for state, weight in form.states.items():
+            parts[state].append((place, weight))
+        for (source, time), weight in form.sources.items():
+            if source == key:
+                driven.setdefault(time, []).append((place, weight))
+    zero = fmpq(0)
+    result = {i: [zero] * length for i in watched}
+    states: dict[int, fmpq] = {}
     for time in range(length):
-        for i in watched:
-            result[i].append(forms[i].value(state, key, time))
-        state = [form.value(state, key, time) for form in following]
+        now: dict[tuple[str, int], fmpq] = dict(driven.get(time, ()))
+        for state, value in states.items():
+            for place, weight in parts[state]:
+                now[place] = now.get(place, zero) + weight * value
+        for (kind, number), value in now.items():
+            if kind == "node":
+                result[number][time] = value
+        states = {number: value for (kind, number), value in now.items() if kind == "state" and value}
     return result
 
 
@@ -331,7 +345,11 @@ def _denominator(matrix: fmpq_mat) -> Polynomial:
 
 
 def _fractions(values: Sequence[fmpq]) -> list[Fraction]:
-    return [Fraction(int(value.p), int(value.q)) for value in values]
+    return [Fraction(int(value.p), int(value.q)) if value else _ZERO for value in values]
+
+
+_ZERO = Fraction(0)
+"""Most values of a delay line: made once."""
 
 
 def _trim(values: Sequence[Fraction]) -> Polynomial:

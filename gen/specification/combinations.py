@@ -246,12 +246,11 @@ _NO_TAPS = Refusal(Verdict.REFUSED, "its adders have no coefficients")
 
 PARALLEL = Terms(
     "parallel",
-    {FIR_DECIMATE: LATER},
     apart={
         (RELOAD, NO_MULTIPLIERS): _FIXED,
         (RELOAD, CIC_DECIMATE): _NO_TAPS,
-        (CHANNELS, CIC_DECIMATE): LATER,
-        (PROTECT, CIC_DECIMATE): LATER,
+        (RELOAD, FIR_DECIMATE): LATER,
+        **dict.fromkeys(((one, other) for one in (CHANNELS, PROTECT) for other in (FIR_DECIMATE, CIC_DECIMATE)), LATER),
     },
 )
 FOLDED = Terms("folded", {SEVERAL: _SLOW, LOOK_AHEAD: _SLOW, NO_MULTIPLIERS: _ONE_BLOCK})
@@ -323,6 +322,30 @@ def check_combinations(spec: Specified) -> None:
         if kept in asked and other in asked:
             in_it = f'hardware.architecture = "{terms.name}" and ' if terms and (kept, other) in terms.apart else ""
             raise _unfit(refusal, other.without, in_it + kept.phrase(spec), other.key, literal(other.of(spec)))
+    if terms is None:
+        _check_that_any_takes(spec, asked)
+
+
+def _check_that_any_takes(spec: Specified, asked: tuple[Option, ...]) -> None:
+    """Check that an architecture takes all options together, where none is asked for.
+
+    Raises
+    ------
+    UnfitError
+        Of the last one of those that none takes together.
+    """
+
+    def is_taken(options: tuple[Option, ...]) -> bool:
+        return any(terms.takes(options) for terms in TERMS.values())
+
+    apart = asked
+    for option in asked:
+        others = tuple(each for each in apart if each is not option)
+        apart = apart if is_taken(others) else others
+    if apart and not is_taken(apart):
+        *others_, last = apart
+        beside = " and ".join(each.phrase(spec) for each in others_)
+        raise _unfit(LATER, last.without, beside, last.key, literal(last.of(spec)))
 
 
 def check_chain(spec: Specified) -> None:

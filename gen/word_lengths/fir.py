@@ -91,6 +91,11 @@ def fir_stages(
             sections, proof = _proven(ideal, realization, shortest, x, steady=steady)
             if proof.coefficients.magnitude <= allowed:
                 return sections, proof
+    if not allowed:
+        raise ShortfallError(
+            f"the filter's taps must be whole numbers of up to {MAX_BITS} bits times a power of two to be made of "
+            "adders alone, and are not"
+        )
     raise ShortfallError(
         f"the filter's coefficients must keep their error below {float(allowed):.3g} output LSB with {MAX_BITS} bits, "
         "and do not: raise output.max_error or raise output.bits"

@@ -74,12 +74,12 @@ class CicCore(DecimatingCore):
                 m.d.sync += [difference.eq(value - before), before.eq(value)]
             value = difference
             moves = self.later(m, advance, moves, f"moved{k}")
-        rounded = self.result_register()
+        rounded = self.rounded()
         with m.If(advance):
-            m.d.sync += rounded.eq(self._rounded(value))
+            m.d.sync += rounded.eq(self._with_half(value))
         return Summed(rounded, moves)
 
-    def _rounded(self, value: Value) -> Value:
+    def _with_half(self, value: Value) -> Value:
         """Add to the last difference what rounds it, above the bits that stay as they are, and leave out the rest."""
         plan, (port,) = self._plan, self.datapath.inputs
         whole = value.as_signed() if port.signed else value

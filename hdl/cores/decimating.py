@@ -188,8 +188,8 @@ class DecimatingCore(Shell):
             m.d.sync += left.eq(left - 1)
         return (~any_left, Const(0, 0)) if pace.fills else (Const(1, 1), any_left)
 
-    def result_register(self) -> Signal:
-        """Return a register for results before they are limited: as wide as the output where they are not."""
+    def rounded(self) -> Signal:
+        """Return a signal for results before they are limited: as wide as the output where they are not."""
         output, last = self.datapath.output, last_node(self.datapath)
         node = self.datapath.stages[-1].graph.nodes[last.operands[0]] if self._pace.limits else None
         is_signed, bits = (output.signed, output.bits) if node is None else (node.signed, node.width)

@@ -16,7 +16,10 @@ from tests.interface.fir_draws import SHAPES, FirDraw, exact, stimulus
 import sosmith
 
 SEEDS = range(60)
-FEW = (1, 3, 8, 41)
+FEW = (1, 3, 8, 41, 44)
+SIMULATED = (3, 41)
+"""With multipliers that take turns, and with adders alone."""
+
 SAMPLES = 260
 CASES = [pytest.param(seed, marks=[] if seed in FEW else pytest.mark.slow) for seed in SEEDS]
 
@@ -53,17 +56,20 @@ def test_certificate_and_files_are_proven(seed: int, tmp_path: Path) -> None:
     made.generate(tmp_path)
     read = sosmith.Certificate.load(tmp_path / f"down{seed}.certificate.json")
     proof = read.verify(spec=tmp_path / "down.toml", files=tmp_path)
-    assert not proof.missing
-    assert {name: part.state.value for name, part in proof.scope.items()} == dict.fromkeys(proof.scope, "proven") | {
-        "calibration": "not_read"
-    }
+    assert not [part for part in proof.missing if part != "manifest"]
+    # Which products share a multiplier is not held against the cost in the manifest.
+    takes_turns = made.architecture == "parallel" and drawn.shape != "cic"
+    others = {"calibration": "not_read"} | ({"manifest": "partial"} if takes_turns else {})
+    assert {name: part.state.value for name, part in proof.scope.items()} == (
+        dict.fromkeys(proof.scope, "proven") | others
+    )
     assert float(proof.budget["filter rounding"]) * 2**40 < float(proof.lsb)  # nothing is rounded but the output
 
 
 @pytest.mark.parametrize(
     ("simulator", "seed"),
     [
-        pytest.param(simulator, seed, marks=[] if (simulator, seed) == ("icarus", 41) else pytest.mark.slow)
+        pytest.param(simulator, seed, marks=[] if simulator == "icarus" and seed in SIMULATED else pytest.mark.slow)
         for simulator in ("verilator", "icarus")
         for seed in SEEDS
     ],

@@ -164,7 +164,7 @@ def test_a_wrong_bit_in_the_netlist_is_found(break_it: Break, folder: Path, monk
 def test_a_flip_flop_without_its_reset_is_found(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def without_reset(text: str) -> str:
         broken, count = re.subn(r"(\.LSR\()[^)]*(\),\s*\.Q\(\\section0\.v1 )", r"\g<1>1'h0\g<2>", text)
-        assert count > 1
+        assert count
         return broken
 
     break_netlist(without_reset, monkeypatch)

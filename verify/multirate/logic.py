@@ -126,10 +126,11 @@ def check_parts(netlist: Netlist, parts: Sequence[Part], signals: Signals, remem
     """
     registers = {name: register_shape for part in parts for name, register_shape in part.registers.items()}
     memories: Mapping[str, MemoryShape] = {} if remembers is None else remembers.memories
+    written = {name for name, memory in netlist.memories.items() if memory.statements}
     require(
-        netlist.registers.keys() == registers.keys() and netlist.memories.keys() == memories.keys(),
+        netlist.registers.keys() == registers.keys() and written == memories.keys(),
         f"the registers around the core must be {', '.join(sorted({*registers, *memories}))}, not "
-        f"{', '.join(sorted({*netlist.registers, *netlist.memories}))}",
+        f"{', '.join(sorted({*netlist.registers, *written}))}",
     )
     for name, register_shape in registers.items():
         width, first = netlist.registers[name].width, netlist.registers[name].first

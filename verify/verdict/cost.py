@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from sosmith.verify.certificate_file import Certificate, ItemEntry, StageEntry
-from sosmith.verify.multirate.adders.check import CicVerdict
+from sosmith.verify.multirate.decimating.cic import CicVerdict
 from sosmith.verify.parallel.check import HardwareVerdict
 from sosmith.verify.verdict.operators import operators
 from sosmith.verify.verdict.products import products_of

@@ -14,8 +14,9 @@ from sosmith.verify.c_model.check import check_c_model
 from sosmith.verify.certificate_file import Certificate, ItemEntry
 from sosmith.verify.decimation import at_lower_rate, behind_decimator, calibration_alone, module_in
 from sosmith.verify.graph import RejectedError, require
-from sosmith.verify.multirate.adders.check import check_cic
 from sosmith.verify.multirate.cic import DecimatorVerdict, check_decimator
+from sosmith.verify.multirate.decimating.cic import check_cic, is_cic
+from sosmith.verify.multirate.decimating.polyphase import check_polyphase
 from sosmith.verify.multirate.parallel_core import check_ahead, check_behind
 from sosmith.verify.multirate.ring.check import check_rings
 from sosmith.verify.parallel.check import HardwareVerdict, check_hardware
@@ -249,10 +250,10 @@ def _hardware_proven(
 def _downsampled(text: str, certificate: Certificate, item: ItemEntry) -> HardwareVerdict:
     """Prove an FIR filter of which every N-th result leaves."""
     if item.architecture == "parallel":
-        return check_cic(text, certificate, item)
+        return (check_cic if is_cic(certificate) else check_polyphase)(text, certificate, item)
     require(
         item.architecture == "folded",
-        f"an FIR filter that decimates must be folded, or a CIC filter in parallel, not {item.architecture}",
+        f"an FIR filter that decimates must be folded or parallel, not {item.architecture}",
     )
     return check_rings(text, certificate, item)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import pytest
@@ -65,12 +66,28 @@ def test_results_are_not_held() -> None:
 def test_taps_must_be_exact() -> None:
     """0.1 is no whole number of any power of two."""
     taps = [0.1, 0.2, 0.3, 0.2, 0.1]
-    with pytest.raises(
-        sosmith.ShortfallError, match=r"the filter's coefficients must keep their error below 0 output LSB"
-    ):
+    with pytest.raises(sosmith.ShortfallError, match=r"the filter's taps must be whole numbers of up to 40 bits "):
         sosmith.design(specification(taps, filter_={"decimate": 3}, architecture="parallel"))
     made = sosmith.design(specification(taps, filter_={"decimate": 3}, clock=1e7))
     assert made.architecture == "folded"
+
+
+@pytest.mark.parametrize(
+    ("change", "beside"),
+    [
+        ({"protect": "detect"}, 'hardware.protect = "detect"'),
+        ({"reload": True}, "hardware.reload = true"),
+    ],
+)
+def test_nothing_takes_it_without_multipliers_beside_others(change: dict[str, Any], beside: str) -> None:
+    """Adders take no such option, and a ring has a multiplier."""
+    tree = specification(MEANS).as_dict() | {"hardware": {"clock": 1e7, "multipliers": 0, **change}}
+    sentence = (
+        f"specification: not yet available: hardware.multipliers must be 'auto' with {beside} and a CIC filter that "
+        "decimates, not 0"
+    )
+    with pytest.raises(sosmith.SpecificationError, match=f"^{re.escape(sentence)}$"):
+        sosmith.Specification.load(tree)
 
 
 def test_other_datapaths_have_no_plan() -> None:

@@ -34,8 +34,9 @@ WRONG: list[tuple[str, str, Any, str]] = [
     (
         "hardware",
         "architecture",
-        "parallel",
-        f"{LATER}hardware.architecture must be 'auto' or 'folded' with an FIR filter that decimates, not 'parallel'",
+        "serial",
+        f"{LATER}hardware.architecture must be one of 'auto', 'parallel', 'folded' with an FIR filter that decimates, "
+        "not 'serial'",
     ),
 ]
 

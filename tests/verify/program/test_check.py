@@ -359,7 +359,7 @@ def computed(core: Made, program: Program, codes: Sequence[Sequence[int]]) -> ob
     words = program.reset()
     try:
         return [program.step(row, words, [graph.nodes[i].frac for i in graph.inputs]) for row in codes]
-    except OverflowError as error:
+    except (OverflowError, ValueError) as error:  # a sum that is too large, or an instruction with no such target
         return str(error)
 
 

@@ -12,7 +12,7 @@ from tests.verify.parallel.simulated import outputs
 import sosmith
 from sosmith.verify.certificate_file import DownsamplingEntry
 from sosmith.verify.graph import RejectedError
-from sosmith.verify.multirate.adders.check import check_cic
+from sosmith.verify.multirate.decimating.cic import check_cic
 from sosmith.verify.verification import verify
 
 CASES = {
@@ -112,7 +112,7 @@ def test_whatever_is_edited_is_found(case: tuple[str, bool, bool], seed: int) ->
 def test_a_certificate_that_says_otherwise() -> None:
     core = made()
     for factor, sentence in (
-        (2, r"^the core must have a register sum3$"),
+        (2, r"^the core must have a register rail7$"),
         (4, r"^a CIC filter must remember a multiple of 3 samples, not 4$"),
         (5, r"^phase must have 3 bits, not 2$"),
     ):
@@ -122,6 +122,44 @@ def test_a_certificate_that_says_otherwise() -> None:
     filled = core.certificate.model_copy(update={"downsampling": DownsamplingEntry(factor=3, filled=4)})
     with pytest.raises(RejectedError, match=r"^no result must be settling where the first sample fills the filter$"):
         check_cic(core.text, filled, core.item)
+
+
+@pytest.mark.parametrize("change", ["moved2 & ~ any_left", "moved2 | any_left"])
+def test_no_result_is_lost_or_made_while_it_settles(change: str) -> None:
+    """With a start from zero, all results leave: those before it has settled, too, and nothing else."""
+    core = made()
+    name = "result_valid"
+    assert f"else if (s_axis_tready) {name} <= moved2;" in core.text
+    text = core.text.replace(f"else if (s_axis_tready) {name} <= moved2;", f"else if (s_axis_tready) {name} <= wrong;")
+    left, sign, right = change.split(" ", 2)
+    inverted = right.startswith("~")
+    added = "  wire wrong;\n  wire others;\n"
+    added += f"  assign others = {'~ ' if inverted else ''}any_left{'' if inverted else ' & any_left'};\n"
+    text = text.replace("  assign rst =", f"{added}  assign wrong = {left} {sign} others;\n  assign rst =", 1)
+    with pytest.raises(RejectedError, match=rf"^{name} must be 1 behind a result that counts, and 0 otherwise$"):
+        check_cic(text, core.certificate, core.item)
+
+
+def test_a_start_without_values_is_refused() -> None:
+    core = made("steady", limited=False)
+    text = changed(core.text, r"reg \[8:0\] sum1 = 9'h000;", "reg [8:0] sum1;")
+    with pytest.raises(RejectedError, match=r"^sum1 must have a value before the first clock$"):
+        check_cic(text, core.certificate, core.item)
+
+
+def test_another_way_to_count_samples_is_refused() -> None:
+    """A count that ends before its range does flags fewer samples than the range says."""
+    core = made()
+    *before, output = core.certificate.stages
+    nodes = [
+        node.model_copy(update={"parameter": 4, "low": 4, "high": 4}) if node.name == "samples" else node
+        for node in output.nodes
+    ]
+    other = output.model_copy(update={"nodes": tuple(nodes)})
+    assert other != output
+    forged = core.certificate.model_copy(update={"stages": (*before, other)})
+    with pytest.raises(RejectedError, match=r" must count samples one by one, up to as many as are flagged$"):
+        check_cic(core.text, forged, core.item)
 
 
 def test_a_certificate_of_other_taps() -> None:

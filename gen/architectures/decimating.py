@@ -1,0 +1,87 @@
+"""What the parallel architectures of an FIR filter that decimates have in common: a sample at every clock."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from sosmith.gen.architectures.architecture import Architecture
+from sosmith.gen.architectures.blocks import Blocks
+from sosmith.gen.specification.combinations import PARALLEL
+from sosmith.model.errors import ShortfallError
+
+
+class Pace(Protocol):
+    """A plan of clocks."""
+
+    @property
+    def factor(self) -> int:
+        """Samples for each result."""
+
+    @property
+    def latency_cycles(self) -> int:
+        """Clocks from the edge that accepts a sample to the one that can output its result."""
+
+    @property
+    def reset_cycles(self) -> int:
+        """Clocks after a reset until the first sample is accepted, which is on offer."""
+
+
+@dataclass(frozen=True)
+class AtEachClock(Architecture):
+    """Hardware that takes a sample at each clock, and gives a result once."""
+
+    terms = PARALLEL
+    is_filled = True
+
+    def __post_init__(self) -> None:
+        if self.hold:
+            raise ShortfallError("filter.hold must be false in the parallel architecture, which gives a result once")
+        try:
+            _ = self.plan
+        except ValueError as error:
+            raise ShortfallError(f"the parallel architecture must suit the filter: its {error}") from None
+
+    @classmethod
+    def is_tried(cls, blocks: Blocks) -> bool:
+        """Return True: it is the fastest."""
+        del blocks
+        return True
+
+    @property
+    def plan(self) -> Pace:
+        """Its plan of clocks.
+
+        Raises
+        ------
+        ValueError
+            If it does not suit the datapath.
+        """
+        raise NotImplementedError
+
+    @property
+    def _latency_cycles(self) -> int:
+        return self.plan.latency_cycles
+
+    @property
+    def _cycles_per_sample(self) -> int:
+        return self.plan.factor
+
+    @property
+    def _cleared_cycles(self) -> int:
+        return self.plan.reset_cycles
+
+    @property
+    def cycles_per_result(self) -> int:
+        """Clocks between results at the highest rate."""
+        return self.plan.factor
+
+    @property
+    def cycles_per_sample(self) -> int:
+        """Return 1."""
+        return 1
+
+    @property
+    def clocks_per_sample(self) -> float:
+        """Return 1."""
+        return 1

@@ -1,0 +1,88 @@
+"""The parallel architecture of an FIR filter that decimates: a sample at every clock, products shared by phases."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from sosmith.gen.architectures.decimating import AtEachClock
+from sosmith.gen.architectures.fir_steps import FewSteps
+from sosmith.gen.word_lengths.cost import Cost, Multiplication, Operand, cost_of_graphs
+from sosmith.hdl.plan.polyphase import PolyphasePlan, polyphase_plan
+from sosmith.model.errors import ShortfallError
+
+if TYPE_CHECKING:
+    from amaranth.lib.wiring import Component
+
+    from sosmith.gen.architectures.blocks import Blocks
+    from sosmith.gen.fpga.boards import Board
+    from sosmith.gen.word_lengths.objective import Objective
+
+
+@dataclass(frozen=True)
+class Polyphase(AtEachClock):
+    """A multiplier for every N products of a result, which takes another one with each of N samples."""
+
+    checked = "each multiplier takes the products of the datapath's graphs, for all samples, stalls and resets"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        asked, needed = self.blocks.asked, self.multiplier_blocks
+        if asked is not None and needed > asked:
+            raise ShortfallError(
+                f"hardware.multipliers must be at least {needed} for a sample at each clock, not {asked}"
+            )
+
+    @classmethod
+    def objective(cls, board: Board | None, *, adders: bool = False, blocks: Blocks | None = None) -> Objective:
+        """Return the number of products."""
+        del board, adders, blocks
+        return FewSteps()
+
+    @cached_property
+    def plan(self) -> PolyphasePlan:
+        """Which multiplier takes which product, and their clocks."""
+        return polyphase_plan(self.datapath)
+
+    @property
+    def multiplications(self) -> tuple[Multiplication, ...]:
+        """The multipliers."""
+        return (self._factors,) * self.plan.multipliers
+
+    @property
+    def _factors(self) -> Multiplication:
+        data = self.plan.steps.pair_bits(self.datapath.inputs[0])
+        return Multiplication(Operand(data, signed=True), Operand(self.plan.steps.factor_bits, signed=True))
+
+    @property
+    def _own_cost(self) -> Cost:
+        """Operators: the multipliers, sums of samples and of products, the line, and those of the output."""
+        plan, (port,) = self.plan, self.datapath.inputs
+        graph = self.datapath.stages[-1].graph
+        pairs = plan.multipliers * plan.steps.pairs
+        total = graph.nodes[graph.inputs[0]].width
+        own = Cost(
+            multiplications=self.multiplications,
+            adder_bits=pairs * self._factors.data.bits + plan.multipliers * total,
+            register_bits=plan.length * port.bits + total,
+        )
+        return own.beside(cost_of_graphs([graph]))
+
+    @property
+    def multiplier_blocks(self) -> int:
+        """Multiplier blocks that it takes."""
+        return self.plan.multipliers * self._factors.blocks_of(self.blocks.bits)
+
+    def _core(self, *, before: bool = False) -> Component:
+        del before
+        from sosmith.hdl.cores.polyphase import PolyphaseCore  # only what makes hardware loads Amaranth
+
+        return PolyphaseCore(self.datapath)
+
+    def reason(self, why: str, available: int) -> str:
+        """Say in a sentence that it was chosen and `why`."""
+        del available
+        count, plan = len(self.plan.steps.steps), self.plan
+        multipliers = f"{plan.multipliers} multiplier{'s' * (plan.multipliers > 1)}"
+        return f"{self.name}: {why}; {multipliers} for {count} products of a result, a sample a clock"

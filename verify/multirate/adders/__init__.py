@@ -1,1 +1,0 @@
-"""Proves a CIC filter that has an adder for each of its integrators and combs."""

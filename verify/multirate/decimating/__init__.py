@@ -1,0 +1,1 @@
+"""Proves FIR filters that decimate and take a sample at each clock."""

@@ -1,0 +1,176 @@
+"""Proves that multipliers which take turns with the phases of samples give every R-th result of a certificate's filter.
+
+::
+
+    sample --> [line0] --> [line1] --> ..                              moves with each sample
+                  |            |
+                  +-- chosen by phase, times coefficients of the phase --> sum --> + --> [total] --> result
+                                                                                   ^        |
+                                                       begins with each result ----+--------+
+
+The line, and what goes along with samples, is what `sosmith.verify.multirate.decimating.line` says: while there is a
+sample at position 1, line(k) is the one k samples before. What other registers hold of it at each position follows
+from there, for each phase: all of that is computed of registers of the position before, and moves with it. `total`
+takes over something when a sample is at the last position, and keeps it otherwise. So what it holds behind each of R
+samples in turn is a sum of products of the samples up to that, from the first of them on, for which nothing may count
+that was there before; behind the last one it is the result. With a start from zero, what a reset leaves in it must be
+what it holds where all samples before were 0, as a reset makes the line. Everything else is as for any core that
+decimates (`sosmith.verify.multirate.decimating.results`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterator, Mapping, Sequence, Set
+
+from sosmith.verify.certificate_file import Certificate, ItemEntry
+from sosmith.verify.graph import require
+from sosmith.verify.multirate.decimating.line import Line
+from sosmith.verify.multirate.decimating.results import ResultCheck
+from sosmith.verify.multirate.logic import Logic, Part
+from sosmith.verify.multirate.ring.verdict import RingVerdict
+from sosmith.verify.parallel.check import CLOCK
+from sosmith.verify.parallel.equality import same_word
+from sosmith.verify.parallel.netlist import Netlist, flattened
+from sosmith.verify.program.normal_form import ONE, Form, constant
+from sosmith.verify.progress import Progress
+from sosmith.verify.reader.recursion import deep_recursion
+from sosmith.verify.reader.source import read_source
+
+_TOTAL = "total"
+
+
+def check_polyphase(text: str, certificate: Certificate, item: ItemEntry) -> RingVerdict:
+    """Prove that a core whose multipliers take turns computes every R-th result of the graphs of a certificate.
+
+    Parameters
+    ----------
+    text : str
+        SystemVerilog of the core.
+    certificate : Certificate
+        Its certificate, which `verify` has accepted, with a downsampling.
+    item : ItemEntry
+        What it is about.
+
+    Raises
+    ------
+    RejectedError
+        If it computes anything else, or has anything that is not known here.
+    """
+    require(
+        item.channels == 1 and not item.hold,
+        "a filter that takes a sample at each clock must have one channel, and hold no results",
+    )
+    modules = read_source(text, certificate.name).modules
+    with deep_recursion():
+        return _Check(flattened(modules, CLOCK), certificate).checked()
+
+
+class _Check(ResultCheck):
+    """The check of a core."""
+
+    def __init__(self, netlist: Netlist, certificate: Certificate) -> None:
+        super().__init__(netlist, certificate)
+        positions = 0
+        while f"valid{positions + 1}" in self.netlist.registers:
+            positions += 1
+        require(positions > 0, "the core must have a register valid1")
+        require(_TOTAL in self.netlist.registers, f"the core must have a register {_TOTAL}")
+        first = self.netlist.registers[_TOTAL].first
+        require(first is not None, f"{_TOTAL} must have a value before the first clock")
+        length = 0
+        while f"line{length}" in self.netlist.registers:
+            length += 1
+        require(
+            length <= self.remembered + 1, f"the line must hold at most {self.remembered + 1} samples, not {length}"
+        )
+        self._line = Line(self.entrance, length, positions)
+
+    def fills_for(self, factor: int) -> int:
+        """Return how often R of the first sample must go in: until all of the line has it, and a total has begun."""
+        return max(1, -(-self.remembered // factor))
+
+    @property
+    def parts(self) -> Sequence[Part]:
+        """The line."""
+        return [self._line]
+
+    @property
+    def positions(self) -> int:
+        """Those that go along with samples."""
+        return self._line.positions
+
+    def comes(self, now: Logic) -> bool:
+        """Whether there is a sample at the last position that brings a result."""
+        last = self.positions
+        return bool(now.bit(f"valid{last}")) and now.limits(f"phase{last}") == (0, 0)
+
+    def coming(self) -> Iterator[tuple[Mapping[str, Form], bool]]:
+        """Yield whether there is a sample there, and whether it brings a result."""
+        valid, phase = f"valid{self.positions}", f"phase{self.positions}"
+        other = self.forms.variable("other phase", 1, (1 << self.netlist.widths[phase]) - 1)
+        for there in (0, 1):
+            for number, brings in (({}, True), (other, False)):
+                yield {valid: constant(there), phase: number}, bool(there) and brings
+
+    def last_position(self, inside: Set[str]) -> Mapping[str, Form]:
+        """Follow the samples of a result through all positions, one after the other; return what is at the last."""
+        last = f"valid{self.positions}"
+        self.check_kept_without(_TOTAL, last)
+        before: Mapping[str, Form] = {}
+        for phase in (*range(1, self.entrance.factor), 0):
+            known = {**self._at_last(inside - {_TOTAL}, phase), **before}
+            if phase == 0:
+                self._check_start(before)
+                return known
+            total = self.after({_TOTAL}, {**known, self.buffer.full: {}}).get(_TOTAL)
+            require(total is not None, f"{_TOTAL} must follow from the samples of a result alone")
+            assert total is not None
+            before = {_TOTAL: self._a_sample_later(total)}
+        raise AssertionError  # as one phase is 0
+
+    def _at_last(self, inside: Set[str], phase: int) -> dict[str, Form]:
+        """Return what registers hold of a sample with a phase at the last position."""
+        known: dict[str, Form] = {f"line{k}": self.sample(k) for k in range(self._line.length)}
+        for position in range(1, self.positions + 1):
+            if position > 1:
+                known = self.after(inside, {**known, self.buffer.full: {}})
+            known |= {f"valid{position}": constant(1), f"phase{position}": constant(phase)}
+        return known
+
+    def _a_sample_later(self, form: Form) -> Form:
+        """Return what a form of samples is to the next sample, for which each of them is one further back."""
+        names: dict[Hashable, Form] = {}
+        samples: dict[Hashable, Form] = {}
+        for ago in range(self.remembered):
+            key, sample = ("later", ago), self.sample(ago + 1)
+            low, high = (int(end) for end in self.forms.limits(sample))
+            names[self.input, ago], samples[key] = self.forms.variable(key, low, high), sample
+        # By way of other names, as each sample takes the place of the next one.
+        return self.forms.settled(self.forms.settled(form, names), samples)
+
+    def _check_start(self, before: Mapping[str, Form]) -> None:
+        """Check what a start from zero leaves in the total, which the first sample finds there."""
+        if self.entrance.fills:
+            return
+        width, register = self.netlist.widths[_TOTAL], self.netlist.registers[_TOTAL]
+        zero = self.forms.settled(before[_TOTAL], {(self.input, ago): {} for ago in range(self.remembered + 1)})
+        require(not zero.keys() - {ONE}, f"{_TOTAL} must be a number where all samples are 0")
+        number = int(zero.get(ONE, 0)) % (1 << width)
+        require(register.first == number, f"{_TOTAL} must be {number} before the first clock, not {register.first}")
+        right = same_word(self.forms, self.after_reset(_TOTAL), constant(number), width)
+        require(right, f"{_TOTAL} must be {number} after a reset, not another value")
+
+    def checked(self) -> RingVerdict:
+        """Check everything; return what is proven."""
+        latency = self.check()
+        return RingVerdict(
+            registers=len(self.netlist.registers),
+            memories=len(self.netlist.memories),
+            states=self._line.length + 1,
+            latency=latency,
+            waits=0,
+            clearing=self.cleared,
+            result_clocks=self.entrance.factor,
+            factor=self.entrance.factor,
+            pace=Progress(2, latency, self.cleared),
+        )

@@ -1,0 +1,364 @@
+"""What is proven of any core that decimates and takes a sample at each clock: its entrance, and the way of its results.
+
+::
+
+    s_axis --> entrance --> inside, position by position --> result --> limited --> buffer --> m_axis
+
+1. Each register of the entrance, and those that go along with samples, take over what
+   `sosmith.verify.multirate.decimating.entrance` says, for all values of all registers and inputs; so do those of the
+   inside that have names there.
+2. With a steady start, the first sample goes in so often before it is accepted that all that the inside remembers is
+   that sample. The results that it has by then are left out, as `left` counts them. With a start from zero, all that is
+   remembered is 0 after a reset, and results count from the first one on.
+3. From what the inside has at its last position, and the flag there, every register that a result is made of holds what
+   is computed of them while the result is at its position, and keeps it while the pipeline stands. The output buffer is
+   a queue of two. What leaves is the output of the certificate's graph, with its flags.
+
+Names of registers count in the first step: under a wrong name a proof is not found. The source must keep a sample on
+offer until it is accepted, as AXI4-Stream asks.
+"""
+
+from __future__ import annotations
+
+import re
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
+from dataclasses import dataclass
+
+from sosmith.verify.certificate_file import Certificate
+from sosmith.verify.graph import RejectedError, require
+from sosmith.verify.multirate.decimating.entrance import READY, Beside, Entrance, Others
+from sosmith.verify.multirate.logic import Logic, Part, check_parts
+from sosmith.verify.multirate.ring.machine import UNKNOWN, Machine, State
+from sosmith.verify.parallel.check import FLAGS, OUTPUT
+from sosmith.verify.parallel.control import RESET, SINK, Buffer, Search
+from sosmith.verify.parallel.dependence import Dependence
+from sosmith.verify.parallel.equality import same_word
+from sosmith.verify.parallel.flags import flags_of, wear_limits
+from sosmith.verify.parallel.forms import Forms
+from sosmith.verify.parallel.graph_codes import GraphCodes
+from sosmith.verify.parallel.netlist import Netlist
+from sosmith.verify.parallel.split import split
+from sosmith.verify.program.normal_form import Form, constant, plus
+
+_FLAG_BITS = 8
+_WHOLE = re.compile(r"(?:sum|comb|difference|line|phase)\d+|left|phase|filled|total")
+"""Registers that stay whole, whatever they take over."""
+
+_COUNT_BITS = 64
+"""Bits in which counts are compared: more than any has."""
+
+_MOST_OPENED = 4
+"""Most stages of the graph that are opened, one after the other, for one comparison."""
+
+_MOST_POSITIONS = 8
+"""Most positions behind the inside."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """What is known of a result: `left` with it, and how many samples the graph has counted, if it counts."""
+
+    left: Mapping[str, Form]
+    counted: Form | None
+
+
+class ResultCheck(ABC):
+    """The check of a core.
+
+    Parameters
+    ----------
+    netlist : Netlist
+    certificate : Certificate
+        Its certificate, with a downsampling.
+    """
+
+    def __init__(self, netlist: Netlist, certificate: Certificate) -> None:
+        down = certificate.downsampling
+        assert down is not None
+        self.certificate, (self.port,) = certificate, certificate.inputs
+        self.netlist = split(netlist, {name for name in netlist.registers if _WHOLE.fullmatch(name)})
+        self.forms = Forms()
+        self.graph = GraphCodes(certificate, self.forms)
+        (self.input,) = self.graph.lanes[0].inputs
+        self._counter: int | None = None
+        self.remembered = self._memory()
+        self._search = Search(self.netlist)
+        self.buffer = self._find_buffer()
+        require(down.factor > 1, f"a filter that decimates must leave results out, not {down.factor} of each")
+        counted = 0 if self._counter is None else self.graph.nodes[self._counter].entry.high
+        require(not (down.filled and counted), "no result must be settling where the first sample fills the filter")
+        fills = self.fills_for(down.factor) if down.filled else 0
+        self.entrance = Entrance(self.port, down.factor, fills, self.buffer.full)
+        self.left = fills or -(-counted // down.factor)
+        self._machine = Machine(self.netlist, self.forms, {}, {})
+        self._limits = wear_limits(self, self.netlist, certificate, "")
+        self._dependence = Dependence(self.netlist, frozenset())
+        self._number = 0
+
+    # What the inside is.
+
+    @abstractmethod
+    def fills_for(self, factor: int) -> int:
+        """Return how often so many of the first sample must go in until nothing else is remembered."""
+
+    @property
+    @abstractmethod
+    def parts(self) -> Sequence[Part]:
+        """Parts of the hardware inside."""
+
+    @property
+    @abstractmethod
+    def positions(self) -> int:
+        """Positions of a sample before the register of its result."""
+
+    @abstractmethod
+    def comes(self, now: Logic) -> bool:
+        """Whether a result leaves the last position."""
+
+    @abstractmethod
+    def coming(self) -> Iterable[tuple[Mapping[str, Form], bool]]:
+        """Yield what control registers at the last position may hold, and whether a result leaves it then."""
+
+    @abstractmethod
+    def last_position(self, inside: Set[str]) -> Mapping[str, Form]:
+        """Return what registers hold while a result is at the last position."""
+
+    # Samples.
+
+    def sample(self, ago: int) -> Form:
+        """Return the code of the sample so many before the one of the result."""
+        code = self.graph.past((self.input, ago)) if ago else self.graph.codes[self.input]
+        assert code is not None
+        return code
+
+    def constant_word(self, name: str) -> Form:
+        """Return the word of a memory that never changes."""
+        return self.forms.variable(("constant", name), 0, (1 << self.netlist.memories[name].width) - 1)
+
+    def _memory(self) -> int:
+        """Return how many samples the graph remembers; find the node that counts those since a start, if one does."""
+        remembered = 0
+        for index in self.graph.delays:
+            node, ago = self.graph.origin(index)
+            if node == self.input:
+                remembered = max(remembered, ago)
+            else:
+                require(self._counter is None and ago == 1, "the graph must remember samples alone, and their number")
+                self._counter = index
+        return remembered
+
+    def _find_buffer(self) -> Buffer:
+        """Find the control of the output buffer, and check that it is a queue of two."""
+        search = self._search
+        valid = search.register(search.net("m_axis_tvalid", {}), "m_axis_tvalid")
+        ready = search.inverted(search.net(READY, {"filling": 0}))
+        full = search.register(ready, f"not {READY}")
+        comes = search.loaded(valid, {RESET: 1, full: 0, valid: 0})
+        buffer = Buffer(valid, full, search.register(comes, f"what {valid} takes over"), SINK)
+        search.check_buffer(buffer)
+        return buffer
+
+    # All of it.
+
+    def check(self) -> int:
+        """Check everything; return the clocks from the edge that accepts a sample to the one that gives its result."""
+        beside = Beside(self.entrance, self.positions, self.left, self.comes)
+        parts: list[Part] = [self.entrance, beside, *self.parts]
+        named = dict.fromkeys(name for part in parts for name in part.registers)
+        for name in named:
+            register = self.netlist.registers.get(name)
+            if register is None:
+                raise RejectedError(f"the core must have a register {name}")
+            require(register.first is not None, f"{name} must have a value before the first clock")
+        valid = self._positions_of_results()
+        others = self.netlist.registers.keys() - named.keys()
+        check_parts(self.netlist, [*parts, Others(frozenset(others))], self.entrance.signals)
+        inside = others - {self.buffer.valid, self.buffer.full, *valid}
+        for case in self._cases():
+            self._check_result(case, valid, inside)
+        return self.positions + len(valid) + 1
+
+    @property
+    def cleared(self) -> int:
+        """Clocks after a reset until the first sample is accepted."""
+        return self.entrance.fills * self.entrance.factor
+
+    def _positions_of_results(self) -> list[str]:
+        """Return the registers that say whether there is a result behind the inside, one for each position.
+
+        Each follows the one before, and the first of them the inside; the last one is what comes to the output buffer.
+        """
+        search, full = self._search, self.buffer.full
+        chain = [self.buffer.coming]
+        inner = {name for case, _ in self.coming() for name in case}
+        counted = {"left": 0} if self.entrance.fills else {}
+        while len(chain) < _MOST_POSITIONS:
+            before = search.one_register(search.loaded(chain[0], {RESET: 1, full: 0, chain[0]: 0, **counted}))
+            if before is None or before in inner:
+                break
+            chain.insert(0, before)
+        search.check_chain(chain, full)
+        search.expect_empty(chain[0])
+        self._check_first_position(chain[0])
+        return chain
+
+    def _check_first_position(self, first: str) -> None:
+        """Check that the first position behind the inside takes over all results that count, and nothing else.
+
+        With a start from zero, all of them do, whatever is left of those that are flagged.
+        """
+        full = self.buffer.full
+        self._check_kept({first}, {full: constant(1)}, "while the pipeline stands")
+        some = self.forms.variable("some left", 1, (1 << self.left.bit_length()) - 1) if self.left else {}
+        skips = self.entrance.fills > 0
+        for left, counts in (({}, True), *([(some, not skips)] if self.left else [])):
+            count: Mapping[str, Form] = {"left": left} if self.left else {}
+            for inside, comes in self.coming():
+                word = self.after({first}, {**inside, **count, full: {}}).get(first)
+                right = word is not None and self.is_same(word, constant(int(comes and counts)), 1)
+                require(right, f"{first} must be 1 behind a result that counts, and 0 otherwise")
+
+    def _cases(self) -> list[Case]:
+        """Return what is known of a result that counts: that it has settled, or that it has not."""
+        left: Mapping[str, Form] = {"left": {}} if self.left else {}
+        if self._counter is None:
+            return [Case(left, None)]
+        most, some = self._counted(), self.forms.variable("left", 1, self.left)
+        return [Case(left, constant(most)), Case({"left": some}, self.forms.variable("counted", 0, most - 1))]
+
+    def _counted(self) -> int:
+        """Return how many samples the graph counts, one by one, and flags while it does.
+
+        Of any other way to count them, the samples that are flagged are not told from what is counted.
+        """
+        assert self._counter is not None
+        node, origin = self.graph.nodes[self._counter], self.graph.origin(self._counter)
+        (operand,), settling = node.operands, self.graph.lanes[0].settling
+        most, counted = node.entry.high, self.forms.variable("counted", 0, node.entry.high - 1)
+        right = most > 0 and settling is not None
+        for before, after, flagged in ((counted, plus(counted, constant(1)), 1), (constant(most), constant(most), 0)):
+            codes = [self.graph.codes[index] for index in (operand, settling) if index is not None]
+            counts, flag = (self.forms.settled(code, {origin: before}) for code in codes) if right else ({}, {})
+            flag = self.forms.negative(flag)
+            right = right and self.is_same(counts, after, _COUNT_BITS) and self.is_same(flag, constant(flagged), 1)
+        require(right, f"{node.label} must count samples one by one, up to as many as are flagged")
+        return most
+
+    # A result.
+
+    def _check_result(self, case: Case, valid: Sequence[str], registers: Set[str]) -> None:
+        """Follow a result from the last position of the inside to the output."""
+        full = self.buffer.full
+        rail = self.forms.variable("rail", 0, 1)
+        inside = registers - self._payload()
+        self._check_kept(inside, {full: constant(1)}, "while the pipeline stands")
+        known = {**self.last_position(inside), f"rail{self.positions}": rail, **case.left}
+        for name in valid:
+            known = self.after(inside, {**known, full: {}}) | {name: constant(1)}
+        first = self._first_of_two(registers, known)
+        clock = self._machine.clock(State(dict(first)), {}, self._next())
+        self._check_output(clock.net, case, rail)
+
+    def _first_of_two(self, registers: Set[str], known: Mapping[str, Form]) -> dict[str, Form]:
+        """Return what registers hold of the result that leaves the output buffer next, whichever way it came there."""
+        valid, full, ready = self.buffer.valid, self.buffer.full, self.buffer.ready
+        heads = self._payload()
+        require(heads <= registers, f"a result must be made of registers of the output, not of {sorted(heads)}")
+        comes: dict[str, Form] = {**known, full: {}, self.buffer.coming: constant(1)}
+        at_once = [
+            self.after(heads, comes | {valid: constant(there)}, {ready: constant(leaves)})
+            for there, leaves in ((0, 0), (0, 1), (1, 1))
+        ]
+        for name in sorted(heads):
+            same = all(name in each and each[name] == at_once[0][name] for each in at_once)
+            require(same, f"{name} must take over a result whenever there is room for it")
+        waits: dict[str, Form] = {ready: {}}
+        seconds = self.after(registers - heads, comes | {valid: constant(1)}, waits)
+        moved = self.after(heads, seconds | {valid: constant(1), full: constant(1)}, {ready: constant(1)})
+        for name in sorted(heads):
+            same = name in moved and self.is_same(moved[name], at_once[0][name], self.netlist.widths[name])
+            require(same, f"{name} must take over the second result when the first leaves")
+        for number in (0, 1):
+            waiting = {valid: constant(1), full: constant(number)}
+            self._check_kept(heads, waiting, "while a result waits for the sink", waits)
+        second = {name for head in heads for name in self._sources(head)}
+        both = {valid: constant(1), full: constant(1)}
+        self._check_kept(second & seconds.keys(), both, "while two results wait for the sink", waits)
+        return {name: at_once[0][name] for name in heads}
+
+    def _payload(self) -> Set[str]:
+        """Return the registers that a result is made of at the output."""
+        return {name for port in (OUTPUT, FLAGS) for name in self._dependence.of_net(port)}
+
+    def _sources(self, name: str) -> frozenset[str]:
+        """Return the registers and inputs that a register takes over something of."""
+        statements = self.netlist.registers[name].statements
+        return self._dependence.of_loads(statements) | self._dependence.of_conditions(statements)
+
+    def after(
+        self, names: Set[str], registers: Mapping[str, Form], inputs: Mapping[str, Form] | None = None
+    ) -> dict[str, Form]:
+        """Return what registers hold after a clock, of those where it follows from what is known."""
+        clock = self._machine.clock(State(dict(registers)), {RESET: constant(1), **(inputs or {})}, self._next())
+        sources = {name: self._sources(name) for name in names}
+        near = {name for name, own in sources.items() if own & registers.keys() or not own}
+        words = {name: clock.register(name) for name in sorted(near)}
+        return {name: word for name, word in words.items() if self._is_known(word)}
+
+    def after_reset(self, name: str) -> Form:
+        """Return what a register holds after a reset."""
+        return self._machine.clock(State(), {RESET: {}}, self._next()).register(name)
+
+    def _check_kept(
+        self,
+        names: Set[str],
+        registers: Mapping[str, Form],
+        when: str,
+        inputs: Mapping[str, Form] | None = None,
+    ) -> None:
+        """Check that registers keep what they hold."""
+        own = {name: self.forms.variable(("kept", name), 0, (1 << self.netlist.widths[name]) - 1) for name in names}
+        clock = self._machine.clock(State({**own, **registers}), {RESET: constant(1), **(inputs or {})}, self._next())
+        for name in sorted(names):
+            right = self.is_same(clock.register(name), own[name], self.netlist.widths[name])
+            require(right, f"{name} must keep what it holds {when}")
+
+    def check_kept_without(self, name: str, valid: str) -> None:
+        """Check that a register keeps what it holds while no sample is at its position."""
+        self._check_kept({name}, {self.buffer.full: {}, valid: {}}, "while no sample comes to it")
+
+    def _check_output(self, net: Callable[..., Form], case: Case, rail: Form) -> None:
+        """Check the code and the flags of a result."""
+        graph, lane = self.graph, self.graph.lanes[0]
+        whole = -(-self.certificate.output.bits // 8) * 8
+        for name, width in ((OUTPUT, whole), (FLAGS, _FLAG_BITS)):
+            require(self.netlist.widths[name] == width, f"the port {name} must have {width} bits")
+        code, label = graph.seen(lane.output, ""), graph.nodes[lane.output].label
+        require(self.is_same(net(OUTPUT), code, whole), f"{OUTPUT} must be {label}, not another value")
+        for flag in flags_of(graph, lane, self.certificate, (rail,), self._limits):
+            value = flag.value
+            if self._counter is not None and case.counted is not None:
+                value = self.forms.settled(value, {graph.origin(self._counter): case.counted})
+            what = flag.name or "0, as there is no such flag"
+            right = self.is_same(net(FLAGS, flag.place, 1), value, 1)
+            require(right, f"bit {flag.place} of {FLAGS} must be {what}, not another value")
+
+    def is_same(self, word: Form, wanted: Form, width: int) -> bool:
+        """Whether two words are the same, if need be by opening what stages of the graph hand on."""
+        pair: tuple[Form, Form] | None = word, wanted
+        for _ in range(_MOST_OPENED):
+            if pair is None or same_word(self.forms, *pair, width):
+                break
+            pair = self.graph.opened(*pair)
+        else:
+            return False
+        return pair is not None
+
+    def _is_known(self, word: Form) -> bool:
+        return not any(isinstance(key, tuple) and key[0] == UNKNOWN for key in self.forms.keys(word))
+
+    def _next(self) -> int:
+        """Return a number of its own for a clock."""
+        self._number += 1
+        return self._number
