@@ -22,7 +22,7 @@ from sosmith.gen.chain.specification import ChainSpec, chain_from_tree
 from sosmith.gen.estimate.estimate import TITLES, USUAL, estimated
 from sosmith.gen.fpga.boards import Board, Device, find_board
 from sosmith.gen.specification.choices import AUTO
-from sosmith.gen.specification.combinations import CIC_DECIMATE, PARALLEL, asked_by
+from sosmith.gen.specification.combinations import CIC_DECIMATE, FIR_DECIMATE, PARALLEL, asked_by
 from sosmith.gen.specification.specification import Specification
 from sosmith.gen.specification.toml_text import toml_text
 from sosmith.model.errors import ShortfallError, SpecificationError
@@ -114,10 +114,12 @@ def choose_stages(spec: ChainSpec, *, board: Board | None = None, progress: Prog
     return _Search(spec, board, progress).chosen()
 
 
-def _takes_adders(spec: Specification) -> bool:
-    """Say whether CIC filters are made of adders, without multipliers, beside what a specification asks for."""
-    wanted = spec.hardware.architecture
-    return wanted in {AUTO, PARALLEL.name} and PARALLEL.takes((*asked_by(spec), CIC_DECIMATE))
+def _takes_each_clock(spec: Specification) -> bool:
+    """Say whether filters that decimate may take a sample at each clock beside what a specification asks for."""
+    wanted, asked = spec.hardware.architecture, asked_by(spec)
+    return wanted in {AUTO, PARALLEL.name} and all(
+        PARALLEL.takes((*asked, each)) for each in (CIC_DECIMATE, FIR_DECIMATE)
+    )
 
 
 class _Search:
@@ -141,7 +143,7 @@ class _Search:
             output_bits=_between(spec) if behind else base.output.bits,
             between_bits=_between(spec),
             exact_bits=max(1, base.output.bits - math.floor(math.log2(base.max_error / base.output.lsb))),
-            adders=_takes_adders(base),
+            each_clock=_takes_each_clock(base),
         )
 
     @property

@@ -63,8 +63,9 @@ class Wanted:
     channels, input_bits, output_bits : int
     exact_bits, between_bits : int
         Bits of the output with steps as large as the error that is allowed, and of a port between two stages.
-    adders : bool
-        Whether CIC filters are made of adders; otherwise each has a multiplier and a ring of samples.
+    each_clock : bool
+        Whether filters that decimate may take a sample at each clock: CIC filters of adders, others with multipliers
+        that take turns. Otherwise each has a multiplier and a ring of samples.
     """
 
     limits: Limits
@@ -76,7 +77,7 @@ class Wanted:
     output_bits: int
     exact_bits: int
     between_bits: int
-    adders: bool = False
+    each_clock: bool = False
 
     @property
     def last_rate(self) -> Fraction:
@@ -148,8 +149,8 @@ class Planned:
         Of its pass band, in dB.
     taps : int
         How many it is expected to have; of an IIR filter, its order.
-    adders : bool
-        Whether it is a CIC filter made of adders, which takes a sample at each clock.
+    each_clock : bool
+        Whether it takes a sample at each clock.
     """
 
     kind: str
@@ -160,7 +161,7 @@ class Planned:
     stop: Fraction = Fraction(0)
     loss: float = 0.0
     taps: int = 1
-    adders: bool = False
+    each_clock: bool = False
 
     @property
     def steps(self) -> int:
@@ -171,7 +172,7 @@ class Planned:
         """Clocks for each result of a channel, expected."""
         if self.kind == "iir":
             return _CLOCKS_OF_ORDER * self.taps + _OTHER_CLOCKS
-        if self.adders:
+        if self.each_clock:
             return self.factor
         return self.factor * (1 + (channels > 1)) + self.steps + 5
 
@@ -213,8 +214,8 @@ def plan(structure: Structure, wanted: Wanted, device: Device) -> Plan:
     made = Plan(structure=structure, stages=[])
     rate = wanted.rate
     for step in structure.steps:
-        adders = wanted.adders and step.kind == "cic"
-        made.stages.append(Planned(kind=step.kind, factor=step.factor, rate=rate, adders=adders))
+        each_clock = wanted.each_clock and step.kind == "cic"
+        made.stages.append(Planned(kind=step.kind, factor=step.factor, rate=rate, each_clock=each_clock))
         rate /= step.factor
     droop = _plan_cic(made, wanted)
     _plan_filters(made, wanted, droop)
@@ -315,7 +316,10 @@ def _length(stage: Planned, wanted: Wanted) -> int:
 
 
 def _check_clocks(made: Plan, wanted: Wanted) -> None:
+    """Let filters that decimate take a sample at each clock where a ring is too slow; say of what is too slow still."""
     for stage in made.stages:
+        if stage.factor > 1 and stage.kind != "iir" and stage.clocks(wanted.channels) > stage.available(wanted):
+            stage.each_clock = wanted.each_clock
         needed, there = stage.clocks(wanted.channels), stage.available(wanted)
         if needed > there:
             clock = frequency(float(needed * stage.rate * wanted.channels / stage.factor))
@@ -345,7 +349,7 @@ def _cost_of(stage: Planned, wanted: Wanted, device: Device, data: int, out: int
     if stage.kind == "iir":
         wide = max(1, math.ceil(data / max(device.factor_bits, 1)))
         return Cost(_ELLIPTIC_LUTS, wide**2 * (device.multipliers > 0), 60.0 * data)
-    if stage.adders:
+    if stage.each_clock and stage.kind == "cic":
         width = data + math.ceil(stage.order * math.log2(stage.factor))
         found = of_ladder(Ladder(stage.order, width, stage.factor, out + 1, out, _FLAGS))
         return Cost(luts_of(found, "parallel", device.family), 0.0, 0.0)
@@ -356,6 +360,8 @@ def _cost_of(stage: Planned, wanted: Wanted, device: Device, data: int, out: int
         bits = 1 + math.ceil(math.log2(largest * stage.factor**stage.order + 1))
     steps = [round(tap / largest * ((1 << bits - 1) - 1)) for tap in taps if tap][: stage.steps]
     pair = data + 1
+    if stage.each_clock:
+        return _cost_in_turns(stage, device, (data, pair, bits, out))
     if digits := _digits(stage, wanted, device, pair, bits):
         steps, block = steps * digits, device.factor_bits or MULTIPLIER_BITS
         pair, bits = min(pair, block), min(bits, block)
@@ -378,6 +384,21 @@ def _cost_of(stage: Planned, wanted: Wanted, device: Device, data: int, out: int
         device,
     )
     return Cost(luts_of(found, "folded", device.family), found["blocks"], found["memory_bits"])
+
+
+def _cost_in_turns(stage: Planned, device: Device, sizes: tuple[int, int, int, int]) -> Cost:
+    """Estimate a filter whose multipliers take turns; `sizes` are bits of data, pairs, coefficients and results."""
+    data, pair, bits, out = sizes
+    count, total = math.ceil(stage.steps / stage.factor), data + bits + 2
+    product = Multiplication(Operand(pair, signed=True), Operand(bits, signed=True))
+    found = {
+        "sums": count * (pair + total),
+        "chosen": count * data + total,
+        "registers": (stage.taps + 2 * count) * data + count * (pair + total) + 2 * out,
+        "logic": 16,
+    }
+    blocks = count * product.blocks_of(device.factor_bits or MULTIPLIER_BITS)
+    return Cost(luts_of(found, "parallel", device.family), blocks, 0.0)
 
 
 def _digits(stage: Planned, wanted: Wanted, device: Device, pair: int, factor: int) -> int:
