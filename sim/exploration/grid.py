@@ -12,7 +12,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Protocol, cast
 
-from sosmith.gen.chain.specification import ChainSpec, chain_from_tree, is_chain
+from sosmith.gen.chain.reading import chain_from_tree, is_chain
+from sosmith.gen.chain.specification import ChainSpec
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.specification.exact_values import exact
 from sosmith.gen.specification.specification import STAGE, Specification, from_tree

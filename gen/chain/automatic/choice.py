@@ -18,7 +18,8 @@ from sosmith.gen.chain.automatic.screen import Cost, Plan, Problem, Wanted, plan
 from sosmith.gen.chain.automatic.stages import tables_of
 from sosmith.gen.chain.automatic.structures import MAX_STAGES, structures
 from sosmith.gen.chain.design import ChainDesign, StageDesign, design_stages
-from sosmith.gen.chain.specification import ChainSpec, chain_from_tree
+from sosmith.gen.chain.reading import chain_from_tree
+from sosmith.gen.chain.specification import ChainSpec
 from sosmith.gen.estimate.estimate import TITLES, USUAL, estimated
 from sosmith.gen.fpga.boards import Board, Device, find_board
 from sosmith.gen.specification.choices import AUTO

@@ -13,8 +13,8 @@ from matplotlib.figure import Figure as Canvas
 from sosmith.gen.chain.design import ChainDesign
 from sosmith.gen.chain.facts import chain_tables, limits
 from sosmith.gen.chain.ideal import chain_gain, frequencies, level, stage_gain
-from sosmith.gen.chain.picture import POINTS, axis_label
 from sosmith.gen.chain.report.measures import aliases_entry, delay_entry, in_db, response_entry
+from sosmith.gen.chain.report.picture import POINTS, axis_label
 from sosmith.gen.chain.report.provenance import chain_provenance, names_of
 from sosmith.gen.chain.report.run import ChainRun
 from sosmith.gen.chain.top import chain_interface

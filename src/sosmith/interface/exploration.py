@@ -9,7 +9,7 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sosmith.gen.chain.specification import is_chain
+from sosmith.gen.chain.reading import is_chain
 from sosmith.gen.facts.table import Table, View
 from sosmith.gen.fpga.boards import SYNTHESIZED, find_board
 from sosmith.gen.quantity import number, quantity

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from sosmith.gen.chain.specification import chain_from_tree
+from sosmith.gen.chain.reading import chain_from_tree
 from sosmith.gen.core import design_core
 from sosmith.gen.specification.choices import PIPELINES
 from sosmith.gen.specification.combinations import CHAIN, OPTIONS, TERMS, Combination, combinations

@@ -8,7 +8,7 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
 
-from sosmith.gen.chain.specification import load_chain
+from sosmith.gen.chain.reading import load_chain
 from sosmith.gen.facts.design_tables import budget_table
 from sosmith.gen.facts.table import Table, View
 from sosmith.interface.certificate import Certificate, Part, Progress

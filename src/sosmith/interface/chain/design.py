@@ -407,7 +407,7 @@ class Chain(View):
         SpecificationError
             If the name ends in neither .svg nor .png, or the folder cannot be written.
         """
-        from sosmith.gen.chain.picture import chain_plot
+        from sosmith.gen.chain.report.picture import chain_plot
         from sosmith.gen.picture import format_of
         from sosmith.model.text_files import write_contents
 

@@ -8,16 +8,8 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sosmith.gen.chain.specification import (
-    ANY_INPUT,
-    ANY_OUTPUT,
-    KINDS,
-    ChainSpec,
-    chain_from_tree,
-    is_chain,
-    keys_of,
-    load_chain,
-)
+from sosmith.gen.chain.reading import KINDS, chain_from_tree, is_chain, keys_of, load_chain
+from sosmith.gen.chain.specification import ANY_INPUT, ANY_OUTPUT, ChainSpec
 from sosmith.gen.facts.table import Table, View
 from sosmith.gen.specification.choices import FAMILIES, FIR_FAMILIES
 from sosmith.gen.specification.exact_values import exact
