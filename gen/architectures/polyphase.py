@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from sosmith.gen.architectures.decimating import AtEachClock
 from sosmith.gen.architectures.fir_steps import FewSteps
-from sosmith.gen.word_lengths.cost import Cost, Multiplication, Operand, cost_of_graphs
+from sosmith.gen.word_lengths.cost import Multiplication, Operand
 from sosmith.hdl.plan.polyphase import PolyphasePlan, polyphase_plan
 from sosmith.model.errors import ShortfallError
 
@@ -54,20 +54,6 @@ class Polyphase(AtEachClock):
     def _factors(self) -> Multiplication:
         data = self.plan.steps.pair_bits(self.datapath.inputs[0])
         return Multiplication(Operand(data, signed=True), Operand(self.plan.steps.factor_bits, signed=True))
-
-    @property
-    def _own_cost(self) -> Cost:
-        """Operators: the multipliers, sums of samples and of products, the line, and those of the output."""
-        plan, (port,) = self.plan, self.datapath.inputs
-        graph = self.datapath.stages[-1].graph
-        pairs = plan.multipliers * plan.steps.pairs
-        total = graph.nodes[graph.inputs[0]].width
-        own = Cost(
-            multiplications=self.multiplications,
-            adder_bits=pairs * self._factors.data.bits + plan.multipliers * total,
-            register_bits=plan.length * port.bits + total,
-        )
-        return own.beside(cost_of_graphs([graph]))
 
     @property
     def multiplier_blocks(self) -> int:

@@ -56,13 +56,10 @@ def test_certificate_and_files_are_proven(seed: int, tmp_path: Path) -> None:
     made.generate(tmp_path)
     read = sosmith.Certificate.load(tmp_path / f"down{seed}.certificate.json")
     proof = read.verify(spec=tmp_path / "down.toml", files=tmp_path)
-    assert not [part for part in proof.missing if part != "manifest"]
-    # Which products share a multiplier is not held against the cost in the manifest.
-    takes_turns = made.architecture == "parallel" and drawn.shape != "cic"
-    others = {"calibration": "not_read"} | ({"manifest": "partial"} if takes_turns else {})
-    assert {name: part.state.value for name, part in proof.scope.items()} == (
-        dict.fromkeys(proof.scope, "proven") | others
-    )
+    assert not proof.missing
+    assert {name: part.state.value for name, part in proof.scope.items()} == dict.fromkeys(proof.scope, "proven") | {
+        "calibration": "not_read"
+    }
     assert float(proof.budget["filter rounding"]) * 2**40 < float(proof.lsb)  # nothing is rounded but the output
 
 

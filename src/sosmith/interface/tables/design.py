@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from sosmith.gen.architectures.architecture import Architecture
 from sosmith.gen.architectures.folded_fir import FoldedFir
+from sosmith.gen.architectures.polyphase import Polyphase
 from sosmith.gen.architectures.shared_fir import SharedFir
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.estimate.estimate import Estimate
@@ -211,6 +212,11 @@ def _hardware_rows(architecture: Architecture) -> list[tuple[str, str]]:
             ("multipliers", f"1 of {plan.data_bits} x {plan.factor_bits}, {steps}"),
             ("memory", f"{plan.words:,} samples of {port.bits} bits a channel{', twice' * plan.pairs}"),
         ]
+    if isinstance(architecture, Polyphase):
+        (size, *_), phases = architecture.multiplications, architecture.plan
+        multipliers = f"{phases.multipliers} of {size.data.bits} x {size.factor.bits}, which take turns"
+        products = f"{len(phases.steps.steps)} products for a result"
+        return [latency, ("multipliers", f"{multipliers}: {products}"), ("line", f"{phases.length:,} samples")]
     if program is None:
         sizes = f"{cost.adder_bits}, {cost.register_bits}"
         return [latency, ("multipliers", cost.multiplier_sizes), ("adder bits, state and register bits", sizes)]
