@@ -99,6 +99,36 @@ def test_whatever_is_edited_is_found(case: tuple[str, float, bool], seed: int) -
     assert found["rejected"] > 8
 
 
+@pytest.mark.parametrize("start", ["zero", "steady"])
+@pytest.mark.parametrize(
+    ("taps", "factor", "line", "choice"),
+    [
+        ([0.5, 0.3], 2, ["line1"], "phase1 ? line1 : line0"),
+        ([0.5, 0.3, 0.2], 3, ["line1", "line2"], "phase1[0] ? line2 : line0"),
+        ([0.5, 0.3, 0.2], 3, ["line1"], "phase1[0] ? line1 : line0"),
+    ],
+)
+def test_no_sample_is_too_old(start: str, taps: list[float], factor: int, line: list[str], choice: str) -> None:
+    """A longer line has samples that the graph does not remember, one sample later: none of them may be taken."""
+    tree = {
+        "name": "few",
+        "sample_rate": 1000.0,
+        "input": {"x": {"bits": 5, "range": [-1.0, 1.0], "signed": True}},
+        "filter": {"taps": taps, "decimate": factor},
+        "output": {"bits": 7, "range": [-1.0, 1.0], "signed": True},
+        "hardware": {"start": start, "clock": 1e3, "architecture": "parallel"},
+    }
+    core = proven_alone(sosmith.design(sosmith.Specification.load(tree)))
+    assert rejection(core, core.text) == ""
+    text = changed(core.text, r"first0 <= [^;]+;", f"first0 <= {choice};")
+    reset = "if (!aresetn) {0} <= 5'h00;\n    else if" if start == "zero" else "if"
+    for number, name in enumerate(line):
+        process = f"  always_ff @(posedge aclk)\n    {reset.format(name)} (enters) {name} <= line{number};\n"
+        text = changed(text, rf"  reg \[4:0\] line{number} = 5'h00;\n", rf"\g<0>  reg [4:0] {name} = 5'h00;\n{process}")
+    assert outputs(text, 400, 1) != outputs(core.text, 400, 1)
+    assert rejection(core, text)
+
+
 def test_a_certificate_that_says_otherwise() -> None:
     core = made()
     for factor in (2, 4):

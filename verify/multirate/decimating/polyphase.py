@@ -138,13 +138,19 @@ class _Check(ResultCheck):
         return known
 
     def _a_sample_later(self, form: Form) -> Form:
-        """Return what a form of samples is to the next sample, for which each of them is one further back."""
+        """Return what a form of samples is to the next sample, for which each of them is one further back.
+
+        Those that are older than all that the graph remembers have names of their own, and none is that of another.
+        """
         names: dict[Hashable, Form] = {}
         samples: dict[Hashable, Form] = {}
-        for ago in range(self.remembered):
-            key, sample = ("later", ago), self.sample(ago + 1)
-            low, high = (int(end) for end in self.forms.limits(sample))
-            names[self.input, ago], samples[key] = self.forms.variable(key, low, high), sample
+        low, high = (int(end) for end in self.forms.limits(self.sample(0)))
+        low, high = min(low, 0), max(high, 0)
+        for ago in range(self.remembered + self.entrance.factor):
+            key, own = ("later", ago), (self.input, ago) if ago <= self.remembered else ("older", ago)
+            older = self.forms.variable(("older", ago + 1), low, high)
+            names[own] = self.forms.variable(key, low, high)
+            samples[key] = self.sample(ago + 1) if ago < self.remembered else older
         # By way of other names, as each sample takes the place of the next one.
         return self.forms.settled(self.forms.settled(form, names), samples)
 

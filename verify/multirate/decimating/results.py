@@ -36,7 +36,7 @@ from sosmith.verify.parallel.dependence import Dependence
 from sosmith.verify.parallel.equality import same_word
 from sosmith.verify.parallel.flags import flags_of, wear_limits
 from sosmith.verify.parallel.forms import Forms
-from sosmith.verify.parallel.graph_codes import GraphCodes
+from sosmith.verify.parallel.graph_codes import DATA, GraphCodes
 from sosmith.verify.parallel.netlist import Netlist
 from sosmith.verify.parallel.split import split
 from sosmith.verify.program.normal_form import Form, constant, plus
@@ -85,6 +85,8 @@ class ResultCheck(ABC):
         self.remembered = self._memory()
         self._search = Search(self.netlist)
         self.buffer = self._find_buffer()
+        width, whole = self.netlist.widths[DATA], -(-self.port.bits // 8) * 8
+        require(width == whole, f"the port {DATA} must have {whole} bits, not {width}")
         require(down.factor > 1, f"a filter that decimates must leave results out, not {down.factor} of each")
         counted = 0 if self._counter is None else self.graph.nodes[self._counter].entry.high
         require(not (down.filled and counted), "no result must be settling where the first sample fills the filter")
