@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from sosmith.gen.architectures.decimating import AtEachClock
 from sosmith.gen.architectures.fir_steps import ExactTaps
 from sosmith.gen.word_lengths.cost import Cost, cost_of_graphs
-from sosmith.hdl.plan.cic import CicPlan, cic_plan
+from sosmith.hdl.plan.decimating.cic import CicPlan, cic_plan
 
 if TYPE_CHECKING:
     from amaranth.lib.wiring import Component

@@ -3,28 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 from sosmith.gen.architectures.architecture import Architecture
 from sosmith.gen.architectures.blocks import Blocks
 from sosmith.gen.specification.combinations import PARALLEL
+from sosmith.hdl.plan.decimating.plan import DecimatingPlan
 from sosmith.model.errors import ShortfallError
-
-
-class Pace(Protocol):
-    """A plan of clocks."""
-
-    @property
-    def factor(self) -> int:
-        """Samples for each result."""
-
-    @property
-    def latency_cycles(self) -> int:
-        """Clocks from the edge that accepts a sample to the one that can output its result."""
-
-    @property
-    def reset_cycles(self) -> int:
-        """Clocks after a reset until the first sample is accepted, which is on offer."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +33,7 @@ class AtEachClock(Architecture):
         return True
 
     @property
-    def plan(self) -> Pace:
+    def plan(self) -> DecimatingPlan:
         """Its plan of clocks.
 
         Raises

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from sosmith.gen.architectures.decimating import AtEachClock
 from sosmith.gen.architectures.fir_steps import FewSteps
 from sosmith.gen.word_lengths.cost import Multiplication, Operand
-from sosmith.hdl.plan.polyphase import PolyphasePlan, polyphase_plan
+from sosmith.hdl.plan.decimating.polyphase import PolyphasePlan, polyphase_plan
 from sosmith.model.errors import ShortfallError
 
 if TYPE_CHECKING:

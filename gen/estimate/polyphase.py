@@ -10,7 +10,7 @@ from sosmith.gen.estimate.memories import of_rom
 from sosmith.gen.estimate.products import Product, of_product
 from sosmith.gen.estimate.quantities import Quantities, flags_of, of_inputs, of_output_buffer
 from sosmith.gen.fpga.boards import Device
-from sosmith.hdl.plan.polyphase import PolyphasePlan
+from sosmith.hdl.plan.decimating.polyphase import PolyphasePlan
 from sosmith.model.dataflow.graph import Op
 
 

@@ -26,8 +26,8 @@ from __future__ import annotations
 from amaranth.hdl import Module, Signal, Value
 
 from sosmith.hdl.axi_stream import extended
-from sosmith.hdl.cores.decimating import DecimatingCore, Entered, Pace, Summed
-from sosmith.hdl.plan.cic import cic_plan
+from sosmith.hdl.cores.decimating import DecimatingCore, Entered, Summed
+from sosmith.hdl.plan.decimating.cic import cic_plan
 from sosmith.hdl.plan.rounded_sum import rounding
 from sosmith.model.dataflow.datapath import Datapath
 
@@ -35,7 +35,8 @@ from sosmith.model.dataflow.datapath import Datapath
 class CicCore(DecimatingCore):
     """A CIC filter of adders, for one channel.
 
-    Latency: `latency_cycles` of `sosmith.hdl.plan.cic.CicPlan`, without a stall. Throughput: one sample a clock.
+    Latency: `latency_cycles` of `sosmith.hdl.plan.decimating.cic.CicPlan`, without a stall. Throughput: one sample a
+    clock.
 
     Parameters
     ----------
@@ -49,9 +50,8 @@ class CicCore(DecimatingCore):
     """
 
     def __init__(self, datapath: Datapath) -> None:
-        self._plan = plan = cic_plan(datapath)
-        fills = plan.order if plan.filled else 0
-        super().__init__(datapath, Pace(plan.factor, fills, plan.settling, 2 * plan.order + 1, plan.limits))
+        self._plan = cic_plan(datapath)
+        super().__init__(datapath, self._plan)
 
     def sums(self, m: Module, sample: Entered) -> Summed:
         """Build integrators, combs, and the rounding."""

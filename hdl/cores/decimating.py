@@ -24,35 +24,12 @@ from typing import NamedTuple
 from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, signed
 
 from sosmith.hdl.pipelined_logic import limits
+from sosmith.hdl.plan.decimating.plan import DecimatingPlan
 from sosmith.hdl.plan.rounded_sum import last_node
 from sosmith.hdl.shell.pipeline import delayed
 from sosmith.hdl.shell.shell import Shell
 from sosmith.hdl.status import at_rail, status_of_result
 from sosmith.model.dataflow.datapath import Datapath
-
-
-class Pace(NamedTuple):
-    """How samples become results.
-
-    Attributes
-    ----------
-    factor : int
-        Samples for each result, from 2 on.
-    fills : int
-        Times that `factor` samples go in before the first one is accepted; 0 with a start from zero.
-    settling : int
-        Results that are flagged as settling after a start from zero.
-    clocks : int
-        Clocks from the edge that accepts a sample to the one that loads its result, before that is limited.
-    limits : bool
-        Whether results are limited to the range of the output.
-    """
-
-    factor: int
-    fills: int
-    settling: int
-    clocks: int
-    limits: bool
 
 
 class Entered(NamedTuple):
@@ -93,7 +70,7 @@ class DecimatingCore(Shell):
     ----------
     datapath : Datapath
         What it computes: one FIR section, the output stage, and a downsampler.
-    pace : Pace
+    plan : DecimatingPlan
         How samples become results.
 
     Members
@@ -102,8 +79,8 @@ class DecimatingCore(Shell):
         As those of `sosmith.hdl.shell.shell.Shell`.
     """
 
-    def __init__(self, datapath: Datapath, pace: Pace) -> None:
-        self._pace = pace
+    def __init__(self, datapath: Datapath, plan: DecimatingPlan) -> None:
+        self._pace = plan
         super().__init__(datapath)
 
     @abstractmethod

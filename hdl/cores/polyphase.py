@@ -22,8 +22,9 @@ r"""An FIR filter that decimates by R, with a sample at each clock, and a multip
 All move at the clocks at which `advance` is high; entrance and output are those of
 `sosmith.hdl.cores.decimating.DecimatingCore`. `phase` goes along with each sample: a sample that comes p samples before
 the one that brings the result has the phase R - p, that one 0. Which multiplier takes which product with which phase is
-said by `sosmith.hdl.plan.polyphase`. The total of a result begins with half a step of the output, so that it is rounded
-by what is left out of it. With a start from zero, a reset clears the line, and gives the total this half step.
+said by `sosmith.hdl.plan.decimating.polyphase`. The total of a result begins with half a step of the output, so that it
+is rounded by what is left out of it. With a start from zero, a reset clears the line, and gives the total this half
+step.
 """
 
 from __future__ import annotations
@@ -31,9 +32,9 @@ from __future__ import annotations
 from amaranth.hdl import Const, Module, Mux, Signal, Value, signed
 from amaranth.lib.memory import Memory
 
-from sosmith.hdl.cores.decimating import DecimatingCore, Entered, Pace, Summed
+from sosmith.hdl.cores.decimating import DecimatingCore, Entered, Summed
 from sosmith.hdl.memory_ports import read_port
-from sosmith.hdl.plan.polyphase import polyphase_plan
+from sosmith.hdl.plan.decimating.polyphase import polyphase_plan
 from sosmith.hdl.plan.rounded_sum import finest, rounding, sum_bits
 from sosmith.hdl.plan.tap_steps import TapStep
 from sosmith.model.dataflow.datapath import Datapath
@@ -42,8 +43,8 @@ from sosmith.model.dataflow.datapath import Datapath
 class PolyphaseCore(DecimatingCore):
     """An FIR filter that decimates, for one channel.
 
-    Latency: `latency_cycles` of `sosmith.hdl.plan.polyphase.PolyphasePlan`, without a stall. Throughput: one sample a
-    clock.
+    Latency: `latency_cycles` of `sosmith.hdl.plan.decimating.polyphase.PolyphasePlan`, without a stall. Throughput: one
+    sample a clock.
 
     Parameters
     ----------
@@ -57,8 +58,8 @@ class PolyphaseCore(DecimatingCore):
     """
 
     def __init__(self, datapath: Datapath) -> None:
-        self._plan = plan = polyphase_plan(datapath)
-        super().__init__(datapath, Pace(plan.factor, plan.fills, plan.settling, plan.clocks, plan.limits))
+        self._plan = polyphase_plan(datapath)
+        super().__init__(datapath, self._plan)
 
     def sums(self, m: Module, sample: Entered) -> Summed:
         """Build the line, the multipliers and the total."""

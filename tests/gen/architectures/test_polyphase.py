@@ -10,7 +10,7 @@ import pytest
 import sosmith
 from sosmith.gen.estimate.estimate import estimated
 from sosmith.gen.fpga.boards import find_board
-from sosmith.hdl.plan.polyphase import polyphase_plan
+from sosmith.hdl.plan.decimating.polyphase import polyphase_plan
 
 LINE = [0.3, 0.2, 0.15, 0.1, -0.15, 0.2, 0.3]
 

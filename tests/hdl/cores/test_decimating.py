@@ -15,7 +15,7 @@ import sosmith
 from sosmith.gen.output.verilog import core_verilog
 from sosmith.hdl.cores.cic import CicCore
 from sosmith.hdl.cores.polyphase import PolyphaseCore
-from sosmith.hdl.plan.polyphase import polyphase_plan
+from sosmith.hdl.plan.decimating.polyphase import polyphase_plan
 from sosmith.model.dataflow.cic import impulse_response
 
 RECIPE = Path(__file__).parents[3] / "examples" / "recipes" / "half_band_decimator.toml"

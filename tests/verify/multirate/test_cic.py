@@ -172,6 +172,6 @@ def test_a_certificate_of_other_taps() -> None:
 @pytest.mark.parametrize("change", [{"channels": 2}, {"hold": True}])
 def test_what_it_is_not_for(change: dict[str, object]) -> None:
     core = made()
-    sentence = r"^a CIC filter of adders must have one channel, and hold no results$"
+    sentence = r"^a filter that takes a sample at each clock must have one channel, and hold no results$"
     with pytest.raises(RejectedError, match=sentence):
         check_cic(core.text, core.certificate, core.item.model_copy(update=change))

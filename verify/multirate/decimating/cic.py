@@ -14,20 +14,17 @@ Everything else is as for any core that decimates (`sosmith.verify.multirate.dec
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence, Set
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 from sosmith.verify.certificate_file import Certificate, ItemEntry
 from sosmith.verify.graph import require
 from sosmith.verify.multirate.decimating.ladder import Ladder
-from sosmith.verify.multirate.decimating.results import ResultCheck
+from sosmith.verify.multirate.decimating.results import ResultCheck, decimating_netlist
 from sosmith.verify.multirate.logic import Logic, Part
 from sosmith.verify.multirate.ring.verdict import RingVerdict
-from sosmith.verify.parallel.check import CLOCK
-from sosmith.verify.parallel.netlist import Netlist, flattened
+from sosmith.verify.parallel.netlist import Netlist
 from sosmith.verify.program.normal_form import Form, constant, plus
-from sosmith.verify.progress import Progress
 from sosmith.verify.reader.recursion import deep_recursion
-from sosmith.verify.reader.source import read_source
 
 
 @dataclass(frozen=True)
@@ -80,10 +77,9 @@ def check_cic(text: str, certificate: Certificate, item: ItemEntry) -> CicVerdic
     RejectedError
         If it computes anything else, or has anything that is not known here.
     """
-    require(item.channels == 1 and not item.hold, "a CIC filter of adders must have one channel, and hold no results")
-    modules = read_source(text, certificate.name).modules
+    netlist = decimating_netlist(text, certificate, item)
     with deep_recursion():
-        return _Check(flattened(modules, CLOCK), certificate).checked()
+        return _Check(netlist, certificate).checked()
 
 
 class _Check(ResultCheck):
@@ -137,17 +133,10 @@ class _Check(ResultCheck):
 
     def checked(self) -> CicVerdict:
         """Check everything; return what is proven."""
-        latency, ladder = self.check(), self._ladder
+        ladder = self._ladder
+        proven = self.verdict(2 * ladder.order)
         return CicVerdict(
-            registers=len(self.netlist.registers),
-            memories=len(self.netlist.memories),
-            states=2 * ladder.order,
-            latency=latency,
-            waits=0,
-            clearing=self.cleared,
-            result_clocks=self.entrance.factor,
-            factor=self.entrance.factor,
-            pace=Progress(2, latency, self.cleared),
+            **{each.name: getattr(proven, each.name) for each in fields(proven)},
             adder_bits=2 * ladder.order * ladder.width,
             register_bits=3 * ladder.order * ladder.width,
         )

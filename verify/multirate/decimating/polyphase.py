@@ -25,16 +25,13 @@ from collections.abc import Hashable, Iterator, Mapping, Sequence, Set
 from sosmith.verify.certificate_file import Certificate, ItemEntry
 from sosmith.verify.graph import require
 from sosmith.verify.multirate.decimating.line import Line
-from sosmith.verify.multirate.decimating.results import ResultCheck
+from sosmith.verify.multirate.decimating.results import ResultCheck, decimating_netlist
 from sosmith.verify.multirate.logic import Logic, Part
 from sosmith.verify.multirate.ring.verdict import RingVerdict
-from sosmith.verify.parallel.check import CLOCK
 from sosmith.verify.parallel.equality import same_word
-from sosmith.verify.parallel.netlist import Netlist, flattened
+from sosmith.verify.parallel.netlist import Netlist
 from sosmith.verify.program.normal_form import ONE, Form, constant
-from sosmith.verify.progress import Progress
 from sosmith.verify.reader.recursion import deep_recursion
-from sosmith.verify.reader.source import read_source
 
 _TOTAL = "total"
 
@@ -56,13 +53,9 @@ def check_polyphase(text: str, certificate: Certificate, item: ItemEntry) -> Rin
     RejectedError
         If it computes anything else, or has anything that is not known here.
     """
-    require(
-        item.channels == 1 and not item.hold,
-        "a filter that takes a sample at each clock must have one channel, and hold no results",
-    )
-    modules = read_source(text, certificate.name).modules
+    netlist = decimating_netlist(text, certificate, item)
     with deep_recursion():
-        return _Check(flattened(modules, CLOCK), certificate).checked()
+        return _Check(netlist, certificate).checked()
 
 
 class _Check(ResultCheck):
@@ -168,15 +161,4 @@ class _Check(ResultCheck):
 
     def checked(self) -> RingVerdict:
         """Check everything; return what is proven."""
-        latency = self.check()
-        return RingVerdict(
-            registers=len(self.netlist.registers),
-            memories=len(self.netlist.memories),
-            states=self._line.length + 1,
-            latency=latency,
-            waits=0,
-            clearing=self.cleared,
-            result_clocks=self.entrance.factor,
-            factor=self.entrance.factor,
-            pace=Progress(2, latency, self.cleared),
-        )
+        return self.verdict(self._line.length + 1)

@@ -25,21 +25,24 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass
 
-from sosmith.verify.certificate_file import Certificate
+from sosmith.verify.certificate_file import Certificate, ItemEntry
 from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.multirate.decimating.entrance import READY, Beside, Entrance, Others
 from sosmith.verify.multirate.logic import Logic, Part, check_parts
 from sosmith.verify.multirate.ring.machine import UNKNOWN, Machine, State
-from sosmith.verify.parallel.check import FLAGS, OUTPUT
+from sosmith.verify.multirate.ring.verdict import RingVerdict
+from sosmith.verify.parallel.check import CLOCK, FLAGS, OUTPUT
 from sosmith.verify.parallel.control import RESET, SINK, Buffer, Search
 from sosmith.verify.parallel.dependence import Dependence
 from sosmith.verify.parallel.equality import same_word
 from sosmith.verify.parallel.flags import flags_of, wear_limits
 from sosmith.verify.parallel.forms import Forms
 from sosmith.verify.parallel.graph_codes import DATA, GraphCodes
-from sosmith.verify.parallel.netlist import Netlist
+from sosmith.verify.parallel.netlist import Netlist, flattened
 from sosmith.verify.parallel.split import split
 from sosmith.verify.program.normal_form import Form, constant, plus
+from sosmith.verify.progress import Progress
+from sosmith.verify.reader.source import read_source
 
 _FLAG_BITS = 8
 _WHOLE = re.compile(r"(?:sum|comb|difference|line|phase)\d+|left|phase|filled|total")
@@ -61,6 +64,21 @@ class Case:
 
     left: Mapping[str, Form]
     counted: Form | None
+
+
+def decimating_netlist(text: str, certificate: Certificate, item: ItemEntry) -> Netlist:
+    """Read the SystemVerilog of a core for one channel, whose results leave once.
+
+    Raises
+    ------
+    RejectedError
+        If it is for others, or has anything that cannot be read.
+    """
+    require(
+        item.channels == 1 and not item.hold,
+        "a filter that takes a sample at each clock must have one channel, and hold no results",
+    )
+    return flattened(read_source(text, certificate.name).modules, CLOCK)
 
 
 class ResultCheck(ABC):
@@ -181,10 +199,21 @@ class ResultCheck(ABC):
             self._check_result(case, valid, inside)
         return self.positions + len(valid) + 1
 
-    @property
-    def cleared(self) -> int:
-        """Clocks after a reset until the first sample is accepted."""
-        return self.entrance.fills * self.entrance.factor
+    def verdict(self, states: int) -> RingVerdict:
+        """Check everything; return what is proven, of a core with so many states."""
+        latency, factor = self.check(), self.entrance.factor
+        cleared = self.entrance.fills * factor
+        return RingVerdict(
+            registers=len(self.netlist.registers),
+            memories=len(self.netlist.memories),
+            states=states,
+            latency=latency,
+            waits=0,
+            clearing=cleared,
+            result_clocks=factor,
+            factor=factor,
+            pace=Progress(2, latency, cleared),
+        )
 
     def _positions_of_results(self) -> list[str]:
         """Return the registers that say whether there is a result behind the inside, one for each position.

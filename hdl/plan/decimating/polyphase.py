@@ -20,38 +20,27 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from sosmith.hdl.plan.rounded_sum import last_node
+from sosmith.hdl.plan.decimating.plan import DecimatingPlan, paced
 from sosmith.hdl.plan.tap_steps import TapStep, TapSteps, tap_steps
 from sosmith.model.dataflow.datapath import Datapath
-from sosmith.model.dataflow.graph import Op
 
 _BEFORE_SUMS = 4
 """Clocks from a sample to the products: line, places, sum of two, product."""
 
 
-@dataclass(frozen=True)
-class PolyphasePlan:
+@dataclass(frozen=True, kw_only=True)
+class PolyphasePlan(DecimatingPlan):
     """The products of a filter by multiplier and phase.
 
     Attributes
     ----------
     steps : TapSteps
         The products, each of one sample or two.
-    factor : int
-        R, from 2 on.
-    filled : bool
-        Whether the first sample goes in as often as the line has places, before it is accepted.
-    settling : int
-        Results that are flagged as settling after a start from zero.
-    limits : bool
-        Whether results are limited to the range of the output.
+    factor, filled, settling, limits
+        As of `DecimatingPlan`.
     """
 
     steps: TapSteps
-    factor: int
-    filled: bool
-    settling: int
-    limits: bool
 
     @property
     def multipliers(self) -> int:
@@ -96,16 +85,6 @@ class PolyphasePlan:
         """Clocks from the edge that accepts a sample to the one that adds its products to the result."""
         return _BEFORE_SUMS + self.levels + 1
 
-    @property
-    def latency_cycles(self) -> int:
-        """Clocks from the edge that accepts a sample to the one that can output its result."""
-        return self.clocks + self.limits + 1
-
-    @property
-    def reset_cycles(self) -> int:
-        """Clocks after a reset until the first sample is accepted, which is on offer."""
-        return self.fills * self.factor
-
 
 def polyphase_plan(datapath: Datapath) -> PolyphasePlan:
     """Return which multiplier takes which product of a datapath that is one FIR filter which decimates.
@@ -115,16 +94,4 @@ def polyphase_plan(datapath: Datapath) -> PolyphasePlan:
     ValueError
         If the datapath is another one, or keeps no samples.
     """
-    down = datapath.downsampler
-    steps = tap_steps(datapath)
-    if down is None or down.factor < 2:
-        raise ValueError("datapath must have a downsampler that leaves results out")
-    graph = datapath.stages[-1].graph
-    counted = next((graph.nodes[index].high for index in graph.delays), 0)
-    return PolyphasePlan(
-        steps=steps,
-        factor=down.factor,
-        filled=down.filled > 0,
-        settling=-(-counted // down.factor),
-        limits=last_node(datapath).op is Op.CLAMP,
-    )
+    return PolyphasePlan(**paced(datapath)._asdict(), steps=tap_steps(datapath))

@@ -9,60 +9,42 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sosmith.hdl.plan.rounded_sum import finest, last_node
+from sosmith.hdl.plan.decimating.plan import DecimatingPlan, paced
+from sosmith.hdl.plan.rounded_sum import finest
 from sosmith.model.dataflow.cic import impulse_response, order_of
 from sosmith.model.dataflow.datapath import Datapath
-from sosmith.model.dataflow.graph import Op
 from sosmith.model.sections.fir import FirSection
 
 
-@dataclass(frozen=True)
-class CicPlan:
+@dataclass(frozen=True, kw_only=True)
+class CicPlan(DecimatingPlan):
     """Integrators and combs.
 
     Attributes
     ----------
-    factor : int
-        R, from 2 on.
     order : int
         N, from 1 on: pairs of an integrator and a comb.
     width : int
         Bits of each, in which every result is exact.
     frac : int
         Fraction bits of what leaves the last comb.
-    filled : bool
-        Whether the first sample goes in N R times before it is accepted, as if it had been there for ever.
-    settling : int
-        Results that are flagged as settling after a start from zero.
-    limits : bool
-        Whether results are limited to the range of the output.
+    factor, filled, settling, limits
+        As of `DecimatingPlan`.
     """
 
-    factor: int
     order: int
     width: int
     frac: int
-    filled: bool
-    settling: int
-    limits: bool
 
     @property
-    def skipped(self) -> int:
-        """Results that do not count: those of the first sample as it goes in before it is accepted."""
+    def fills(self) -> int:
+        """N: once as many combs hold results of the first sample, nothing counts that was there before."""
         return self.order if self.filled else 0
 
     @property
-    def reset_cycles(self) -> int:
-        """Clocks after a reset until the first sample is accepted, which is on offer."""
-        return self.order * self.factor if self.filled else 0
-
-    @property
-    def latency_cycles(self) -> int:
-        """Clocks from the edge that accepts a sample to the one that can output its result.
-
-        One for each integrator and comb, one for the rounding, one where results are limited, one for the buffer.
-        """
-        return 2 * self.order + 2 + self.limits
+    def clocks(self) -> int:
+        """One for each integrator and comb, and one for the rounding."""
+        return 2 * self.order + 1
 
     @property
     def adder_bits(self) -> int:
@@ -81,31 +63,26 @@ def cic_plan(datapath: Datapath) -> CicPlan:
     Raises
     ------
     ValueError
-        If its taps are not those of a CIC filter.
+        If it is another one, or its taps are not those of a CIC filter.
     """
     section, *others = datapath.stages
-    down = datapath.downsampler
-    if not isinstance(section, FirSection) or len(others) != 1 or down is None:
-        raise ValueError("stages must be an FIR filter that decimates, and the output")
+    if not isinstance(section, FirSection) or len(others) != 1:
+        raise ValueError("stages must be an FIR filter and the output")
+    pace = paced(datapath)
     frac = max(product.frac for product in section.products)
     taps = [0] * section.length
     for product in section.products:
         for delay, sign in product.taps:
             taps[delay] = sign * product.coefficient << frac - product.frac
-    order = order_of(taps, down.factor)
+    order = order_of(taps, pace.factor)
     scale = taps[0]
     if order is None or scale & (scale - 1):
         raise ValueError("taps must be those of moving sums, times a power of two")
     (port,) = datapath.inputs
-    most = sum(impulse_response(down.factor, order))
-    graph = others[0].graph
-    counted = next((graph.nodes[index].high for index in graph.delays), 0)
+    most = sum(impulse_response(pace.factor, order))
     return CicPlan(
-        factor=down.factor,
+        **pace._asdict(),
         order=order,
         width=max((port.highest * most).bit_length(), (-port.lowest * most - 1).bit_length()) + port.signed,
         frac=finest([datapath]) - (scale.bit_length() - 1),
-        filled=down.filled > 0,
-        settling=-(-counted // down.factor),
-        limits=last_node(datapath).op is Op.CLAMP,
     )

@@ -1,0 +1,1 @@
+"""Plans of cores that decimate and take a sample at each clock."""
