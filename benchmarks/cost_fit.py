@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import nnls
 
-from sosmith.gen.architectures.registry import ARCHITECTURES
+from sosmith.gen.architectures.registry import MEASURED
 from sosmith.gen.estimate.estimate import TITLES, total
 
 Factors = dict[str, float]
@@ -86,7 +86,7 @@ def fitted(rows: Sequence[Row]) -> dict[str, dict[str, dict[str, Factors]]]:
     ):
         expected = np.array([_EXPECTED.get(name, 1.0) if target == "luts" else 1.0 for name in chosen])
         of_all = _least_squares(known, chosen, target, expected, _PULLS[0])
-        for architecture in ARCHITECTURES:
+        for architecture in MEASURED:
             here = [row for row in known if row.architecture == architecture]
             common = _least_squares(here, chosen, target, of_all, _PULLS[1])
             for family in TITLES:

@@ -124,7 +124,7 @@ def design_core(
     wanted = spec.hardware.architecture
     rings = _fits_rings(spec, response, asked)
     if not kinds:
-        kinds = candidates(wanted, budget.blocks, asked_by(spec), rings=rings)
+        kinds = candidates(wanted, budget.blocks, asked_by(spec), rings=rings, cycles=budget.cycles)
     elif not rings and any(each.is_filled for each in kinds):
         raise ShortfallError("a ring must keep the samples of an FIR filter as they come, and none that are scaled")
     (quantized, reason, architecture), refused = search.first_that_keeps_up(kinds)

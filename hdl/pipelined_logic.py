@@ -62,6 +62,10 @@ class PipelinedLogic:
         Products by constants that are made of adders, see `sosmith.hdl.adders`.
     words : dict of int to Value
         What stands for the signals of some DELAY nodes, by node.
+    kept : collection of int
+        Nodes whose signals hold the same sample's values in all pipeline stages, and are not passed on.
+    factors : dict of int to Value
+        Constants of products that come from elsewhere, by node.
 
     Attributes
     ----------
@@ -83,11 +87,14 @@ class PipelinedLogic:
         valid: Sequence[Value],
         adders: Collection[int] = (),
         words: Mapping[int, Value] = _NO_WORDS,
+        kept: Collection[int] = (),
+        factors: Mapping[int, Value] = _NO_WORDS,
     ) -> None:
         self._m, self._graph, self._pipeline_stages = m, graph, pipeline_stages
         self._constants, self._banks, self._takes, self._valid = constants, banks, takes, valid
         self._passed: dict[tuple[int, int], Value] = {}
         self._adders, self._words = adders, words
+        self._kept, self._factors = kept, factors
         self._multiples: dict[int, Value] = {}
         self._used = used_bits(graph)
         self._awaited: dict[int, Signal] = {}
@@ -99,7 +106,7 @@ class PipelinedLogic:
         node, own = self._graph.nodes[index], self._pipeline_stages[index]
         if node.op is Op.CONSTANT and index in self._constants:
             return chosen(self._constants[index], self._banks[pipeline_stage])
-        if own == pipeline_stage or node.op is Op.CONSTANT:
+        if own == pipeline_stage or node.op is Op.CONSTANT or index in self._kept:
             return self.wires[index]
         if own > pipeline_stage:
             # A state that is updated in a later pipeline stage: if the sample before is still there, the update is due.
@@ -138,7 +145,7 @@ class PipelinedLogic:
                 wire = Signal(self._shape(index), name=name, attrs={"keep": 1} if index in apart else {})
                 if node.op is not Op.DELAY:
                     pair = self._constants.get(index)
-                    factor = None if pair is None else chosen(pair, self._banks[own])
+                    factor = self._factors.get(index) if pair is None else chosen(pair, self._banks[own])
                     operands = [self.at(i, own) for i in node.operands]
                     of_adders = index in self._adders
                     value = self._multiple(index) if of_adders else logic(self._graph, node, operands, factor)
@@ -158,7 +165,8 @@ class PipelinedLogic:
     def _is_once(self, index: int) -> bool:
         """Whether a node is a product by the constant 1, whose name would else compete with that of its operand."""
         node = self._graph.nodes[index]
-        return node.op is Op.SCALE and node.parameter == 1 and index not in self._constants
+        loaded = index in self._constants or index in self._factors
+        return node.op is Op.SCALE and node.parameter == 1 and not loaded
 
     def _multiple(self, index: int) -> Value:
         """Product by a constant from adders, made with those of its operand in the same pipeline stage."""

@@ -299,7 +299,7 @@ class StreamEntry(Entry):
     fields: Annotated[tuple[FieldEntry, ...], Field(min_length=1, max_length=2)]
 
 
-_Architecture = Literal["parallel", "folded", "serial", "online"]
+_Architecture = Literal["parallel", "folded", "serial", "multiplexed", "online"]
 _Code = Annotated[int, Field(strict=True, ge=-(1 << 31), lt=1 << 32)]
 _Codes = tuple[_Code, _Code]
 _MOST_CHANNELS = 1 << 16

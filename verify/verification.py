@@ -14,7 +14,7 @@
 6. Where a filter starts from zero, samples may be flagged until it has settled: the counter is run, and what any other
    past could change is followed until it has faded (`sosmith.verify.bounds.settling`).
 
-7. A decimator before the stages is exact but for one rounding (`sosmith.verify.decimation`), and what comes
+7. A decimator before the stages is exact but for one rounding (`sosmith.verify.multirate.decimation`), and what comes
    through it from above half the lower rate is bounded (`sosmith.verify.bounds.largest_gain`). All else is proven of
    what is behind it, and, with a calibration before it, of that.
 
@@ -37,8 +37,8 @@ from sosmith.verify.bounds.largest_gain import check_bands
 from sosmith.verify.bounds.polynomial import output_error, polynomial_error
 from sosmith.verify.bounds.settling import check_fading, without_counter
 from sosmith.verify.certificate_file import Certificate, Operation, StageEntry, on_grid
-from sosmith.verify.decimation import at_lower_rate, calibration_alone, remembered, rounding
 from sosmith.verify.graph import RejectedError, Transfer, check_graph, inputs_of, label, require
+from sosmith.verify.multirate.decimation import at_lower_rate, calibration_alone, remembered, rounding
 from sosmith.verify.online import check_online
 from sosmith.verify.start import Start, check_start, section_alone
 

@@ -63,9 +63,9 @@ _WHOLE_CERTIFICATES = tuple(
         "test_verification_has_nothing_in_common",
     )
 )
-_VERIFY = tuple(
-    f"tests/verify/test_{name}.py"
-    for name in ("calibration_ahead", "certificate", "decimation", "online", "start", "turns")
+_VERIFY = (
+    *(f"tests/verify/test_{name}.py" for name in ("calibration_ahead", "certificate", "online", "start", "turns")),
+    "tests/verify/multirate/test_decimation.py",
 )
 _PROGRAM = "tests/verify/program/test_check.py::"
 _SPECIFIED = "tests/verify/specified/"
@@ -199,6 +199,7 @@ ROOMS = {
     "reader": Room(files=("verify/reader/**/*.py",), tests=("tests/verify/reader",)),
     "unit": Room(files=("verify/unit/*.py",), tests=("tests/verify/unit",)),
     "multirate": Room(files=("verify/multirate/**/*.py",), tests=("tests/verify/multirate",)),
+    "multiplexed": Room(files=("verify/multiplexed/*.py",), tests=("tests/verify/multiplexed",)),
     "chain": Room(files=("verify/chain/*.py",), tests=("tests/verify/chain",)),
     "smt": Room(files=("verify/parallel/smt/*.py",), tests=("tests/verify/parallel/smt",)),
     "c_model": Room(files=("verify/c_model/*.py",), tests=("tests/verify/c_model",)),

@@ -45,6 +45,10 @@ class Architecture(ABC):
     is_filled : bool
         Of the class: whether what it remembers is filled with the first sample of a steady start, or with zeros,
         instead of a start beside the sections.
+    least_clocks : int
+        Of the class: fewest clocks for each result that any of its cores takes.
+    shares_sections : bool
+        Of the class: whether sections of the same structure share hardware, and so have the same formats.
     datapath : Datapath
         The datapath.
     channels : int
@@ -71,11 +75,17 @@ class Architecture(ABC):
         Whether loading can be locked until a reset.
     reload_registers : bool
         Whether there are registers for that; otherwise pins, for registers elsewhere.
+    clock : float
+        The clock that it is made for, in Hz; 0 if none is known.
+    available : int
+        Clocks that there are for each result; 0 if that is not known.
     """
 
     terms: ClassVar[Terms]
     checked: ClassVar[str]
     is_filled: ClassVar[bool] = False
+    least_clocks: ClassVar[int] = 1
+    shares_sections: ClassVar[bool] = False
 
     datapath: Datapath
     channels: int = 1
@@ -89,6 +99,8 @@ class Architecture(ABC):
     calibration: Architecture | None = None
     reload_lock: bool = False
     reload_registers: bool = True
+    clock: float = 0.0
+    available: int = 0
 
     @classmethod
     @abstractmethod
@@ -120,6 +132,11 @@ class Architecture(ABC):
     def name(self) -> str:
         """As in the specification."""
         return self.terms.name
+
+    @classmethod
+    def measured_as(cls) -> str:
+        """Return the name of the architecture whose synthesized cores say what its operators take."""
+        return cls.terms.name
 
     @property
     def has_module(self) -> bool:
@@ -219,6 +236,27 @@ class Architecture(ABC):
         return packed(values_of(datapath, loadable), loadable)
 
     # Size.
+
+    @property
+    def least_blocks(self) -> tuple[int, str]:
+        """Fewest multiplier blocks that it takes, and for what, half a sentence; 0 where adders make all products."""
+        return 0, ""
+
+    def check_blocks(self) -> None:
+        """Check that there are multiplier blocks enough, where there are any.
+
+        Raises
+        ------
+        ShortfallError
+            If there are too few.
+        """
+        (needed, why), there = self.least_blocks, self.blocks
+        if there.asked is not None and needed > there.asked:
+            raise ShortfallError(f"hardware.multipliers must be at least {needed} {why}, not {there.asked}")
+        if there.available and needed > there.available:
+            raise ShortfallError(
+                f"the board must have at least {needed} multiplier blocks {why}, not {there.available}"
+            )
 
     @cached_property
     def graphs(self) -> list[Graph]:

@@ -29,6 +29,7 @@ class FewSteps:
     few_digits = False
     floors_products = False
     exact_taps = False
+    tied = False
     factor_bits = None
 
     def of_graph(self, graph: Graph) -> float:
@@ -69,6 +70,7 @@ class ExactTaps(FewSteps):
     """Taps as they are, for hardware that has no coefficients: of those, what takes software the fewest steps."""
 
     exact_taps = True
+    tied = False
 
     def size_text(self, datapath: Datapath) -> str:
         """Return the number of steps in software in words."""

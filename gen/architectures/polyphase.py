@@ -10,7 +10,6 @@ from sosmith.gen.architectures.decimating import AtEachClock
 from sosmith.gen.architectures.fir_steps import FewSteps
 from sosmith.gen.word_lengths.cost import Multiplication, Operand
 from sosmith.hdl.plan.decimating.polyphase import PolyphasePlan, polyphase_plan
-from sosmith.model.errors import ShortfallError
 
 if TYPE_CHECKING:
     from amaranth.lib.wiring import Component
@@ -26,13 +25,10 @@ class Polyphase(AtEachClock):
 
     checked = "each multiplier takes the products of the datapath's graphs, for all samples, stalls and resets"
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        asked, needed = self.blocks.asked, self.multiplier_blocks
-        if asked is not None and needed > asked:
-            raise ShortfallError(
-                f"hardware.multipliers must be at least {needed} for a sample at each clock, not {asked}"
-            )
+    @property
+    def least_blocks(self) -> tuple[int, str]:
+        """Those of its multipliers."""
+        return self.multiplier_blocks, "for a sample at each clock"
 
     @classmethod
     def objective(cls, board: Board | None, *, adders: bool = False, blocks: Blocks | None = None) -> Objective:

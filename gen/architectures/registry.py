@@ -12,6 +12,7 @@ from sosmith.gen.architectures.budget import Budget
 from sosmith.gen.architectures.cic import Cic
 from sosmith.gen.architectures.folded import Folded
 from sosmith.gen.architectures.folded_fir import FoldedFir, NarrowFir
+from sosmith.gen.architectures.multiplexed import Multiplexed
 from sosmith.gen.architectures.online import Online
 from sosmith.gen.architectures.parallel import Parallel
 from sosmith.gen.architectures.polyphase import Polyphase
@@ -21,20 +22,23 @@ from sosmith.gen.specification.choices import AUTO
 from sosmith.gen.specification.combinations import CIC_DECIMATE, FIR_DECIMATE, FOLDED, PARALLEL, Option, Terms
 from sosmith.model.dataflow.datapath import Datapath
 
-SMALLEST_FIRST: tuple[type[Architecture], ...] = (Serial, Folded, Parallel, Online)
+SMALLEST_FIRST: tuple[type[Architecture], ...] = (Serial, Folded, Multiplexed, Parallel, Online)
 """All architectures by the hardware that they take where multiplications are many: no multiplier block, one, many."""
 
 ARCHITECTURES: dict[str, type[Architecture]] = {each.terms.name: each for each in SMALLEST_FIRST}
 """All architectures that a specification can name, by name, the smallest first."""
 
+MEASURED = tuple(name for name, each in ARCHITECTURES.items() if each.measured_as() == name)
+"""Those of which synthesized cores say what they take, and not those of another one."""
+
 
 def candidates(
-    wanted: str, blocks: Blocks, options: tuple[Option, ...] = (), *, rings: bool = False
+    wanted: str, blocks: Blocks, options: tuple[Option, ...] = (), *, rings: bool = False, cycles: int = 0
 ) -> tuple[type[Architecture], ...]:
     """Architectures to try for the one that the specification asks for beside `options`, the smallest first.
 
     `rings` says that the core is an FIR filter whose samples a ring of memory can hold, which takes fewer clocks than a
-    program in the folded architecture.
+    program in the folded architecture; `cycles`, how many clocks there are for each result, 0 for any.
     """
     folded: tuple[type[Architecture], ...] = (NarrowFir, FoldedFir) if blocks.asked is None else (NarrowFir,)
     ways: tuple[tuple[Terms, tuple[type[Architecture], ...]], ...] = ()
@@ -49,7 +53,8 @@ def candidates(
     if wanted != AUTO:
         kinds: tuple[type[Architecture], ...] = (ARCHITECTURES[wanted],)
     else:
-        kinds = tuple(each for each in SMALLEST_FIRST if each.is_tried(blocks) and each.terms.takes(options))
+        quick = [each for each in SMALLEST_FIRST if not cycles or each.least_clocks <= cycles]
+        kinds = tuple(each for each in quick if each.is_tried(blocks) and each.terms.takes(options))
     if not rings:
         return kinds
     return tuple(each for kind in kinds for each in (folded if kind is Folded else (kind,)))
@@ -86,8 +91,11 @@ def fitting(
         calibration,
         budget.reload_lock,
         budget.reload_registers,
+        float(budget.clock),
+        budget.cycles,
     )
     budget.check(architecture)
+    architecture.check_blocks()
     if budget.reload:
         architecture.check_registers()
     return architecture

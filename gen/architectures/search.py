@@ -120,7 +120,7 @@ class Search:
     calibration: Architecture | None
     board: Board | None
     progress: Progress
-    _plans: dict[tuple[str, bool], Plan] = field(default_factory=dict)
+    _plans: dict[tuple[str, bool, bool], Plan] = field(default_factory=dict)
 
     def first_that_keeps_up(self, kinds: Sequence[type[Architecture]]) -> tuple[Candidate, str]:
         """Return the first design that keeps up, and why the one before did not, if there was one.
@@ -193,11 +193,12 @@ class Search:
     def _plan_of(self, realization: str, kind: type[Architecture]) -> Plan:
         """Plan a realization, once for all architectures that start alike."""
         steady = self.spec.hardware.start == "steady" and not kind.is_filled
-        if (realization, steady) not in self._plans:
+        key = realization, steady, kind.shares_sections
+        if key not in self._plans:
             spec, response = self.spec, self.response
             pre_stage, ideal = response.pre_stage, response.ideal
             self.progress(f"word lengths, {realization}" if ideal is not None else "word lengths")
-            self._plans[realization, steady] = plan(
+            self._plans[key] = plan(
                 name=spec.name,
                 inputs=response.inputs,
                 output=spec.output,
@@ -207,8 +208,9 @@ class Search:
                 realization=realization,
                 steady=steady,
                 loads=spec.hardware.reload,
+                together=kind.shares_sections,
             )
-        return self._plans[realization, steady]
+        return self._plans[key]
 
     def _in_hardware(self, kind: type[Architecture], datapath: Datapath, *, look_ahead: bool) -> Architecture:
         """Return the hardware of a datapath with its flags, for which a program has instructions.

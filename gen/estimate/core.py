@@ -8,11 +8,13 @@ from collections.abc import Sequence
 from sosmith.gen.architectures.architecture import Architecture
 from sosmith.gen.architectures.cic import Cic
 from sosmith.gen.architectures.folded_fir import FoldedFir
+from sosmith.gen.architectures.multiplexed import Multiplexed
 from sosmith.gen.architectures.polyphase import Polyphase
 from sosmith.gen.architectures.shared_fir import SharedFir
 from sosmith.gen.estimate.cic import of_cic
 from sosmith.gen.estimate.graphs import of_pipelined, of_start
 from sosmith.gen.estimate.memories import of_memory
+from sosmith.gen.estimate.multiplexed import of_multiplexed
 from sosmith.gen.estimate.online import of_units
 from sosmith.gen.estimate.pipelined import Pipelined
 from sosmith.gen.estimate.polyphase import of_polyphase
@@ -50,6 +52,8 @@ def quantities_of(architecture: Architecture, device: Device) -> Quantities:
         made = of_cic(architecture)
     elif isinstance(architecture, Polyphase):
         made = of_polyphase(architecture, device)
+    elif isinstance(architecture, Multiplexed):
+        made = of_multiplexed(architecture, device)
     elif architecture.program is not None:
         made = of_program(architecture, device)
     else:

@@ -115,7 +115,7 @@ def estimated(architecture: Architecture, board: Board) -> Estimate | None:
     made = on_board(architecture, board)
     found = quantities_of(made, board.device)
     fitted = _fitted()
-    of = fitted["factors"][architecture.name][board.device.family]
+    of = fitted["factors"][architecture.measured_as()][board.device.family]
     tested = fitted["tested"][board.device.family]
     clocks = fitted["clocks"].get(architecture.name, {}).get(board.device.title)
     return Estimate(

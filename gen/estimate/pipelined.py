@@ -9,6 +9,7 @@ from functools import cached_property
 from sosmith.hdl.plan.interleaving import schedule
 from sosmith.hdl.plan.look_ahead import TurnPlan
 from sosmith.hdl.plan.pipeline import pipeline_stages
+from sosmith.hdl.plan.sharing.sections import SharedSections
 from sosmith.hdl.plan.used_bits import used_bits
 from sosmith.model.dataflow.graph import Graph, Op
 
@@ -44,6 +45,8 @@ class Pipelined:
         Pipeline stage in which each such memory is written, where that is not the one of the state.
     shares : bool
         Whether an output that is the upper part of a state's next value takes no register of its own.
+    kept : collection of int
+        Nodes that no register passes on, as they stay as they are.
     """
 
     graph: Graph
@@ -56,11 +59,17 @@ class Pipelined:
     block_ram: bool = False
     writes: Mapping[int, int] = field(default_factory=dict)
     shares: bool = False
+    kept: Collection[int] = ()
 
     @classmethod
     def of_one(cls, graph: Graph, adders: Collection[int]) -> Pipelined:
         """Return the plan for one channel."""
         return cls(graph, tuple(pipeline_stages(graph)), adders, shares=True)
+
+    @classmethod
+    def of_turn(cls, unit: SharedSections, clocks: int) -> Pipelined:
+        """Return the plan of sections that share hardware, where inputs and states stay as they are in all clocks."""
+        return cls(unit.graph, tuple(unit.turn(clocks)), kept=unit.kept, shares=True)
 
     @classmethod
     def of_channels(cls, graph: Graph, channels: int, adders: Collection[int], *, rewrites: bool) -> Pipelined:
@@ -121,6 +130,8 @@ class Pipelined:
 
     def passes(self, index: int) -> int:
         """Return how many registers pass a node on; bits that are cut off a state are taken from where that is."""
+        if index in self.kept:
+            return 0
         node, own = self.graph.nodes[index], self.stages[index]
         if node.op in {Op.FLOOR, Op.FRACTION} and self.graph.nodes[node.operands[0]].op is Op.DELAY:
             own = max(own, self.stages[node.operands[0]])

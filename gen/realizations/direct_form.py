@@ -12,6 +12,7 @@ import numpy as np
 
 from sosmith.gen.filter.design import decay_length
 from sosmith.gen.realizations.coefficients import Rounding
+from sosmith.gen.realizations.tied_row import TiedRow
 from sosmith.model.arithmetic.recursive_filters import lfilter
 from sosmith.model.dataflow.graph import Range
 from sosmith.model.errors import ShortfallError
@@ -205,18 +206,34 @@ def direct_form(
         )
     except ValueError as error:
         raise ShortfallError(f"{name} must be stable with coefficients of {rounding.bits} bits: {error}") from None
-    return replace(section, feedback=best_feedback(section.denominator, integer_part, feedback_order))
+    tied = row.feedback if isinstance(row, TiedRow) else None
+    return replace(section, feedback=tied or best_feedback(section.denominator, integer_part, feedback_order))
 
 
-@lru_cache(maxsize=1024)
 def best_feedback(denominator: tuple[Fraction, Fraction], integer_part: tuple[int, int], order: int) -> tuple[int, int]:
     """Multiplier-free error feedback (k1, k2) of a given order with the smallest peak gain to the section's output.
 
     Double precision is sufficient for this choice. Among equal gains the integer part is preferred, because one
     register then holds both state and error.
     """
+    gains = _feedback_gains(denominator, order)
+    return min(gains, key=lambda k: (gains[k], k != integer_part))
+
+
+def common_feedback(rows: Sequence[Row], order: int) -> tuple[int, int]:
+    """Return the error feedback of at most a given order that is best for several sections together."""
+    each = [_feedback_gains((Fraction(row[4]), Fraction(row[5])), order) for row in rows]
+    side = pole_side(rows[0])
+    integer_part = (-2 * side, 1) if rows[0][5] else (-side, 0)
+    possible = [k for k in each[0] if all(k in gains for gains in each)]
+    return min(possible, key=lambda k: (sum(gains[k] for gains in each), k != integer_part))
+
+
+@lru_cache(maxsize=1024)
+def _feedback_gains(denominator: tuple[Fraction, Fraction], order: int) -> dict[tuple[int, int], float]:
+    """Return the peak gain to the section's output of each error feedback of a given order, without multipliers."""
     if order == 0:
-        return 0, 0
+        return {(0, 0): 1.0}
     second = order == 2 and denominator[1] != 0
     first_choices, second_choices = (range(-2, 3), range(-1, 2)) if second else (range(-1, 2), range(1))
     a = [1.0, float(denominator[0]), float(denominator[1])]
@@ -224,10 +241,10 @@ def best_feedback(denominator: tuple[Fraction, Fraction], integer_part: tuple[in
     impulse[0] = 1.0
     plain = lfilter([1.0], a, impulse)
 
-    def cost(k: tuple[int, int]) -> tuple[float, bool]:
+    def gain(k: tuple[int, int]) -> float:
         shaped = np.array(plain)
         for delay, weight in enumerate(k, start=1):
             shaped[delay:] += weight * plain[:-delay]
-        return round(float(np.abs(shaped).sum()), 6), k != integer_part
+        return round(float(np.abs(shaped).sum()), 6)
 
-    return min(cartesian(first_choices, second_choices), key=cost)
+    return {k: gain(k) for k in cartesian(first_choices, second_choices)}

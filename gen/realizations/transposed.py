@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from sosmith.gen.realizations.coefficients import Rounding
 from sosmith.gen.realizations.direct_form import pole_side, products
+from sosmith.gen.realizations.tied_row import TiedRow
 from sosmith.model.dataflow.graph import Range
 from sosmith.model.errors import ShortfallError
 from sosmith.model.sections.transposed_form import Limits, TransposedForm
@@ -57,7 +58,8 @@ def transposed_form(
     side = pole_side(row)
     made, integer_part = products(row, rounding, name, side)
     operator = side if delta else 0
-    exponent = _delta_exponent(row, operator)
+    tied = row.delta_exponent if isinstance(row, TiedRow) and delta else None
+    exponent = _delta_exponent(row, operator) if tied is None else tied
     state_fracs = (fracs.get("t1"), fracs.get("t2")) if fracs else (x.frac, x.frac)
     # If y(n) does not depend on x(n), it is s1, which is already quantized.
     output = "v" if any(product.x[0] for product in made) else "t1"
@@ -84,6 +86,12 @@ def _exact_frac(x_frac: int, fracs: Mapping[str, int], delta_exponent: int) -> i
     if not fracs:
         return x_frac
     return max(x_frac, fracs.get("t1", 0), fracs.get("t2", 0) - delta_exponent)
+
+
+def common_exponent(rows: Sequence[Row]) -> int:
+    """Return the exponent of sections with the delta operator that suits several of them: the middle of theirs."""
+    each = [_delta_exponent(row, pole_side(row)) for row in rows]
+    return round((min(each) + max(each)) / 2)
 
 
 def _delta_exponent(row: Row, operator: int) -> int:

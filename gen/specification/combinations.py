@@ -263,7 +263,20 @@ ONLINE = Terms(
     ),
 )
 
-TERMS = {terms.name: terms for terms in (PARALLEL, FOLDED, SERIAL, ONLINE)}
+MULTIPLEXED = Terms(
+    "multiplexed",
+    {
+        FIR: Refusal(Verdict.NO_USE, "it has no sections that could share hardware"),
+        SEVERAL: _SLOW,
+        LOOK_AHEAD: _SLOW,
+        NO_MULTIPLIERS: Refusal(
+            Verdict.REFUSED, "its constants change from section to section", only="'auto' or at least 1"
+        ),
+    }
+    | dict.fromkeys((CHANNELS, RELOAD, PROTECT, DECIMATE, FIR_DECIMATE, CIC_DECIMATE), LATER),
+)
+
+TERMS = {terms.name: terms for terms in (PARALLEL, FOLDED, SERIAL, MULTIPLEXED, ONLINE)}
 """All architectures by name; `sosmith.gen.architectures.registry` has a class for each."""
 
 CHAIN = Terms(

@@ -10,6 +10,7 @@ from sosmith.gen.filter.design import Filter
 from sosmith.gen.proof.cascade_proof import CascadeProof, coefficient_extent, rounding_gains
 from sosmith.gen.realizations.registry import Section
 from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
+from sosmith.gen.realizations.tied_formats import groups_of, with_the_most
 from sosmith.gen.word_lengths.bit_limits import MAX_BITS, MIN_BITS
 from sosmith.gen.word_lengths.cascade import cascade, parts_of, stages_of, unquantized
 from sosmith.model.dataflow.graph import Range
@@ -19,7 +20,7 @@ _Fracs = list[dict[str, int]]
 
 
 def equally_shared(
-    ideal: Filter, realization: str, x: Range, share: Fraction, *, steady: bool = False
+    ideal: Filter, realization: str, x: Range, share: Fraction, *, steady: bool = False, tied: bool = False
 ) -> tuple[Sequence[Section], CascadeProof]:
     """Choose formats with equal shares for coefficients and rounding, and prove the stages.
 
@@ -35,15 +36,18 @@ def equally_shared(
         Error allowed for each part, in output LSBs.
     steady : bool
         As for `sosmith.gen.proof.cascade_proof.prove_cascade`.
+    tied : bool
+        Whether sections of the same structure have the same fraction bits.
 
     Raises
     ------
     ShortfallError
         If no formats within the limits keep to the error allowed, or the filter has no such realization.
     """
-    parts_of(ideal, realization)  # raises here, with its own reason, if there is no such realization
+    parts = parts_of(ideal, realization)  # raises here, with its own reason, if there is no such realization
+    groups = groups_of(parts, realization) if tied else ()
     bits = _coefficient_bits(ideal, realization, x, share, steady=steady)
-    fracs = _fraction_bits(ideal, realization, bits, share)
+    fracs = with_the_most(_fraction_bits(ideal, realization, bits, share), groups)
     while True:
         sections, proof = cascade(ideal, realization, _rounded(ideal, realization, bits, fracs), x, steady=steady)
         if proof.rounding.magnitude <= share:

@@ -12,6 +12,7 @@ from typing import Protocol
 from sosmith.gen.word_lengths.cost import (
     LUTS_OF_A_BLOCK,
     MULTIPLIER_BITS,
+    Cost,
     area_by_digits,
     area_of,
     bits_by_digits,
@@ -19,6 +20,7 @@ from sosmith.gen.word_lengths.cost import (
     cost_of_graphs,
 )
 from sosmith.hdl.plan.block_products import blocks_of, with_blocks
+from sosmith.hdl.plan.sharing.sharing import sharing
 from sosmith.model.dataflow.adder_graph import scalings
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.folding.fold import columns_of, program
@@ -82,6 +84,10 @@ class Objective(Protocol):
         """Whether the hardware has no coefficients, so that taps of an FIR filter must be exact."""
 
     @property
+    def tied(self) -> bool:
+        """Whether sections of the same structure share hardware, so that they have the same formats."""
+
+    @property
     def factor_bits(self) -> int | None:
         """Bits of a constant, with its sign, beyond which a product takes more; None if there is no such step."""
 
@@ -116,6 +122,7 @@ class SmallArea:
     few_digits = False
     floors_products = True
     exact_taps = False
+    tied = False
     factor_bits = MULTIPLIER_BITS
 
     def of_graph(self, graph: Graph) -> float:
@@ -144,6 +151,36 @@ SMALL_AREA = SmallArea()
 
 
 @dataclass(frozen=True)
+class SharedArea(SmallArea):
+    """Estimated area of the multiplexed architecture: sections of the same structure count once."""
+
+    tied = True
+
+    def of_datapath(self, datapath: Datapath) -> float:
+        """Return the area of all operators, in LUT4; infinite if no sections share any."""
+        try:
+            return self._cost(datapath).area
+        except ValueError:
+            return math.inf
+
+    def least(self, graphs: Sequence[Graph]) -> float:
+        """Return the area of a multiplier block for each product of the largest section: others may share them."""
+        return max((super(SharedArea, self).least([graph]) for graph in graphs), default=0)
+
+    def size_text(self, datapath: Datapath) -> str:
+        """Return the area in words."""
+        area = self._cost(datapath).area
+        return f"{area:,} LUT4 with shared sections counted once and a multiplier block as {LUTS_OF_A_BLOCK}"
+
+    def _cost(self, datapath: Datapath) -> Cost:
+        return cost_of_graphs(sharing(datapath).graphs)
+
+
+SHARED_AREA = SharedArea()
+"""For the multiplexed architecture."""
+
+
+@dataclass(frozen=True)
 class FewAdders:
     """Estimated area of the parallel architecture whose products by constants are made of adders."""
 
@@ -155,6 +192,7 @@ class FewAdders:
     few_digits = True
     floors_products = True
     exact_taps = False
+    tied = False
     factor_bits = None
 
     def of_graph(self, graph: Graph) -> float:
@@ -198,6 +236,7 @@ class FewSums:
     few_digits = False
     floors_products = True
     exact_taps = False
+    tied = False
 
     @property
     def factor_bits(self) -> int:
@@ -256,6 +295,7 @@ class ShortProgram:
     few_digits = False
     floors_products = False  # products are added up with all their bits
     exact_taps = False
+    tied = False
     beyond = "longer even with one digit for each value"
     unsuited = "not to be folded"
     hopeless = 1.5  # trimming saved less than a fifth in every design seen

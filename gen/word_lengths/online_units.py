@@ -43,6 +43,7 @@ class OnlineUnits:
     few_digits = False
     floors_products = False
     exact_taps = False
+    tied = False
     factor_bits = None
 
     def of_graph(self, graph: Graph) -> float:

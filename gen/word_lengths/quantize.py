@@ -20,6 +20,7 @@ from sosmith.gen.proof.cascade_proof import CascadeProof, ideal_gain
 from sosmith.gen.realizations.kept_formats import Choice, choice_of_tree, kept_or_made, tree_of_choice
 from sosmith.gen.realizations.registry import REALIZATIONS, Section, realization_of
 from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
+from sosmith.gen.realizations.tied_formats import standing_together
 from sosmith.gen.word_lengths.bit_limits import MAX_BITS
 from sosmith.gen.word_lengths.cascade import cascade, parts_of, stages_of, unquantized
 from sosmith.gen.word_lengths.equal_shares import equally_shared
@@ -167,6 +168,7 @@ def plan(
     realization: str,
     steady: bool = False,
     loads: bool = False,
+    together: bool = False,
 ) -> Plan:
     """Choose formats and integer coefficients that keep to equal shares of the error allowed.
 
@@ -188,6 +190,8 @@ def plan(
         Whether a filter starts from the steady state of its first sample, and not from zero.
     loads : bool
         Whether other coefficients can be loaded.
+    together : bool
+        Whether sections of the same structure follow each other.
 
     Raises
     ------
@@ -205,7 +209,7 @@ def plan(
     before = _input_stages(polynomial, inputs, output, share, gain, at_zero, loads=by_taps)
     search, start = None, None
     if ideal is not None and realization_of(realization).searched:
-        ideal = _ordered(ideal, realization) if realization_of(realization).cascade else ideal
+        ideal = _ordered(ideal, realization, together=together) if realization_of(realization).cascade else ideal
         search = Search(parts_of(ideal, realization), realization, before, gain, steady=steady)
         start = _start(search, float(share) / (1 if realization_of(realization).cascade else _FINER))
     planned = Plan(
@@ -331,8 +335,15 @@ def prove(planned: Plan) -> Quantized:
 def _equally_shared(planned: Plan, ideal: Filter) -> Quantized:
     """Give every part of the budget an equal share, from exact figures."""
     before = planned.input_stages[0]
-    x, share = before.output, planned.share
-    return _assembled(planned, before, *equally_shared(ideal, planned.realization, x, share, steady=planned.steady))
+    shared = equally_shared(
+        ideal,
+        planned.realization,
+        before.output,
+        planned.share,
+        steady=planned.steady,
+        tied=planned.objective.tied,
+    )
+    return _assembled(planned, before, *shared)
 
 
 def _by_taps(planned: Plan) -> Quantized:
@@ -417,8 +428,11 @@ def _remedy_of_poles(ideal: Filter) -> str:
     return ", move the cutoff further from 0 and from half the sample rate"
 
 
-def _ordered(ideal: Filter, realization: str) -> Filter:
-    """Return the filter with its sections in the order with the smallest rounding error, if the gain is worth it."""
+def _ordered(ideal: Filter, realization: str, *, together: bool) -> Filter:
+    """Return the filter with its sections in the order with the smallest rounding error, if the gain is worth it.
+
+    Those of the same structure may have to stand `together`: then in that order behind the first one of them.
+    """
 
     def search_order() -> list[int]:
         try:
@@ -428,4 +442,5 @@ def _ordered(ideal: Filter, realization: str) -> Filter:
         return [*best_order(models)]
 
     order: list[int] = kept_or_made(("order", realization, ideal.rows), search_order, list, list)
-    return replace(ideal, rows=tuple(ideal.rows[k] for k in order))
+    rows = tuple(ideal.rows[k] for k in order)
+    return replace(ideal, rows=standing_together(rows, realization) if together else rows)

@@ -17,11 +17,11 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property, lru_cache
-from itertools import combinations, pairwise
+from itertools import combinations, pairwise, zip_longest
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -30,6 +30,7 @@ from sosmith.gen.realizations.coefficients import lowest_terms, round_significan
 from sosmith.gen.realizations.kept_formats import Choice
 from sosmith.gen.realizations.registry import realization_of
 from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
+from sosmith.gen.realizations.tied_formats import Group, groups_of, tied_start, tied_step
 from sosmith.gen.word_lengths.bit_limits import MIN_BITS
 from sosmith.gen.word_lengths.cost import MULTIPLIER_BITS
 from sosmith.gen.word_lengths.estimates import Array, Estimate, estimates_of, largest_magnitude
@@ -131,10 +132,30 @@ class Search:
         self._known: dict[tuple[object, ...], tuple[float, Range, dict[str, int]]] = {}
         self._saved: dict[tuple[object, ...], list[float]] = {}
         self._merely: tuple[Choice, float, Choice] | None = None
+        self._known_start: tuple[Choice, Choice] | None = None
+
+    @cached_property
+    def _all_groups(self) -> tuple[Group, ...]:
+        return groups_of(self._parts, self._realization)
+
+    @property
+    def _groups(self) -> tuple[Group, ...]:
+        """Sections that have the same formats; none where each has its own."""
+        return self._all_groups if self._objective.tied else ()
+
+    @property
+    def _alike(self) -> Sequence[Group]:
+        """All sections, those together that have the same formats."""
+        return self._groups or [(k,) for k in range(len(self._parts))]
 
     @cached_property
     def _estimates(self) -> list[Estimate]:
         return estimates_of(self._parts, self._realization, self._windows)
+
+    @property
+    def _ideals(self) -> list[dict[str, float]]:
+        """Ideal coefficients of each section by name."""
+        return [estimate.ideal for estimate in self._estimates]
 
     @property
     def work(self) -> int:
@@ -158,6 +179,7 @@ class Search:
         other._inputs = other._sized_inputs()
         other._known = {}
         other._merely = None
+        other._known_start = None
         return other
 
     def _sized_inputs(self) -> list[_Input]:
@@ -205,6 +227,7 @@ class Search:
         allowed : float
             Allowed sum of the errors of input stage, coefficients and rounding, in output LSBs.
         """
+        start = self._tied(start)
         ways = []
         if len(self._inputs) > 1:
             ways.append(self._trimmed_once(start, allowed, calibration=False))
@@ -214,9 +237,26 @@ class Search:
 
     def merely_trimmed(self, start: Choice, allowed: float) -> Choice:
         """Return formats trimmed without a look at what costs nothing; parameters as of `trimmed`."""
+        start = self._tied(start)
         if self._merely is None or self._merely[0] is not start or self._merely[1] != allowed:
             self._merely = start, allowed, self._trimmed_once(start, allowed)
         return self._merely[2]
+
+    def _tied(self, start: Choice) -> Choice:
+        """Return formats that are the same where they must be."""
+        if self._known_start is None or self._known_start[0] is not start:
+            self._known_start = start, tied_start(self._groups, self._ideals, start) if self._groups else start
+        return self._known_start[1]
+
+    def _all_tied(self, before: Choice, steps: Iterable[Choice]) -> Iterator[Choice]:
+        """Yield steps, each with all sections changed that have the same formats as the one that it changes."""
+        if not self._groups:
+            yield from steps
+            return
+        for step in steps:
+            tied = tied_step(self._groups, self._ideals, before, step)
+            if tied is not None:
+                yield tied
 
     def with_free_bits(self, choice: Choice) -> Choice:
         """Return formats with a smaller error, for a negligible size."""
@@ -241,7 +281,7 @@ class Search:
         while error <= allowed:
             self._base = self._based(choice.formats)
             steps: list[tuple[float, Choice, float, float]] = []
-            for candidate in self._steps(choice, calibration=calibration):
+            for candidate in self._all_tied(choice, self._steps(choice, calibration=calibration)):
                 after = self.error(candidate)
                 if after > allowed:
                     continue
@@ -290,6 +330,7 @@ class Search:
         """
         best: tuple[Choice, float] | None = None
         steps = self._steps(choice, calibration=calibration) if self._objective.floors_products else ()
+        steps = self._all_tied(choice, steps)
         most = len(choice.formats) * max(_STEPS)
         for candidate in steps:
             other, error, smallest = candidate, self.error(candidate), size if best is None else best[1]
@@ -298,7 +339,9 @@ class Search:
             for _ in range(most):
                 if error <= allowed or self.size(other) >= smallest:
                     break
-                longer = [(each, self.error(each), self.size(each)) for each in self._longer(other)]
+                longer = [
+                    (each, self.error(each), self.size(each)) for each in self._all_tied(other, self._longer(other))
+                ]
                 before, grown = error, self.size(other)
                 merits = [(before - after) / max(larger - grown, 1.0) for _, after, larger in longer]
                 other, error, _ = longer[merits.index(max(merits))]
@@ -322,7 +365,10 @@ class Search:
 
     def _most_saved(self, choice: Choice, bits: int) -> float:
         """Return how much the error falls if the best places keep so many bits more in all, whatever their size."""
-        saved = [each for k, form in enumerate(choice.formats) for each in self._saved_by_bits(k, form, bits)]
+        saved: list[float] = []
+        for group in self._alike:  # a bit more in one of them is a bit more in all
+            each_saves = (self._saved_by_bits(k, choice.formats[k], bits) for k in group)
+            saved += map(sum, zip_longest(*each_saves, fillvalue=0.0))
         return sum(sorted(saved, reverse=True)[:bits])
 
     def _saved_by_bits(self, k: int, form: SectionFormat, bits: int) -> list[float]:
@@ -354,7 +400,7 @@ class Search:
             if error <= _WORTH:
                 return choice
             least = (1 - _WORTH) * error
-            others = [*(neighbours or self._neighbours)(choice)]
+            others = [*self._all_tied(choice, (neighbours or self._neighbours)(choice))]
             errors = [self.error(other) for other in others]
             better = (at for at in np.argsort(errors, kind="stable").tolist() if errors[at] < least)
             free = next((others[at] for at in better if self.size(others[at]) <= size), None)
@@ -382,7 +428,7 @@ class Search:
             for (k, name), by in move:
                 integer, frac = moved.formats[k].coefficients[name]
                 if integer + by:
-                    value = lowest_terms(integer + by, frac)
+                    value = self._shortest(integer + by, frac)
                     moved = moved.with_format(k, moved.formats[k].with_coefficient(name, value))
             yield moved
 
@@ -418,7 +464,11 @@ class Search:
                 exact = self._estimates[k].ideal[name] * 2.0 ** (frac - step)
                 if abs(integer).bit_length() > step + 1:
                     for neighbour in {math.floor(exact), math.ceil(exact)} - {0}:
-                        yield form.with_coefficient(name, lowest_terms(neighbour, frac - step))
+                        yield form.with_coefficient(name, self._shortest(neighbour, frac - step))
+
+    def _shortest(self, integer: int, frac: int) -> tuple[int, int]:
+        """Return a coefficient in lowest terms, unless it has as many fraction bits as others."""
+        return (integer, frac) if self._groups else lowest_terms(integer, frac)
 
     def _shorter_products(self, k: int, form: SectionFormat) -> Iterator[SectionFormat]:
         """Yield formats where all products of a sum drop more bits: one that keeps more keeps the words long."""
@@ -491,7 +541,8 @@ class Search:
 
     def size(self, choice: Choice) -> float:
         """Estimated size of the input stage and the sections, infinite if rounded coefficients are unstable."""
-        return self._inputs[choice.input_stage].size + sum(size for size, _ in self._built_sections(choice))
+        sizes = [size for size, _ in self._built_sections(choice)]
+        return self._inputs[choice.input_stage].size + sum(max(sizes[k] for k in group) for group in self._alike)
 
     def output(self, choice: Choice) -> Range:
         """Return the estimated output range of the last section."""

@@ -60,12 +60,16 @@ from sosmith.hdl.shell.pipeline import Sample, delayed, through
 from sosmith.hdl.shell.shell import Shell
 from sosmith.hdl.stages.interleaved import InterleavedStage
 from sosmith.hdl.stages.pipelined import PipelinedStage
+from sosmith.hdl.stages.shared import SharedStage
 from sosmith.hdl.stages.starting import StartingStage
 from sosmith.hdl.status import NEVER, status_of_result, with_fault
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.structure import Stage
 from sosmith.model.reload.constants import constants
 from sosmith.model.sections.start import PassingStage, StartStage
+
+AnyStage = PipelinedStage | InterleavedStage | SharedStage
+"""What a stage of a datapath, or several sections, are in hardware."""
 
 
 class _Swap(NamedTuple):
@@ -89,14 +93,14 @@ class _Swap(NamedTuple):
 
 
 @dataclass(frozen=True)
-class _Parts:
+class Parts:
     """What a core is made of.
 
     Attributes
     ----------
     advance : Value
         Whether the pipeline moves.
-    stages : list of PipelinedStage or InterleavedStage
+    stages : sequence of AnyStage
         The stages.
     banks : ConstantBanks or None
         Constants that can be loaded.
@@ -109,7 +113,7 @@ class _Parts:
     """
 
     advance: Value
-    stages: list[PipelinedStage | InterleavedStage]
+    stages: Sequence[AnyStage]
     banks: ConstantBanks | None
     bank: Signal
     waiting: Signal
@@ -267,22 +271,15 @@ class Core(Shell):
         self._restart(m, parts, first)
         self.hand_out(m, buffer, result.valid, [(result.code, flags)], result.channel)
 
-    def _parts(self, m: Module, advance: Value) -> _Parts:
+    def _parts(self, m: Module, advance: Value) -> Parts:
         """Make stages, and what loads and guards them."""
         loadable = None if self.fingerprint is None else constants(self.datapath)
         banks = None if loadable is None else ConstantBanks(self.datapath, loadable, parity=self.is_guarded)
-        stages: list[PipelinedStage | InterleavedStage] = []
-        for k, (stage, adders) in enumerate(zip(self.datapath.stages, self.adders, strict=True)):
-            pairs = NO_CONSTANTS if banks is None else banks.of_stage(k)
-            component = (
-                InterleavedStage(stage, self.channels, pairs, protect=self.protect, adders=adders)
-                if self.channels > 1
-                else self._stage_of_one(stage, pairs, adders)
-            )
-            m.submodules[stage.name] = component
-            m.d.comb += component.advance.eq(advance)
-            stages.append(component)
-        return _Parts(
+        stages = self._stages(banks)
+        for stage in stages:
+            m.submodules[stage.name] = stage
+            m.d.comb += stage.advance.eq(advance)
+        return Parts(
             advance,
             stages,
             banks,
@@ -292,6 +289,17 @@ class Core(Shell):
             swap=_Swap(Signal(name="pending"), Signal(name="may_swap")) if self.restarts else None,
             empty=Signal(name="empty"),
         )
+
+    def _stages(self, banks: ConstantBanks | None) -> Sequence[AnyStage]:
+        """Make the stages."""
+        stages: list[AnyStage] = []
+        for k, (stage, adders) in enumerate(zip(self.datapath.stages, self.adders, strict=True)):
+            pairs = NO_CONSTANTS if banks is None else banks.of_stage(k)
+            if self.channels > 1:
+                stages.append(InterleavedStage(stage, self.channels, pairs, protect=self.protect, adders=adders))
+            else:
+                stages.append(self._stage_of_one(stage, pairs, adders))
+        return stages
 
     def _stage_of_one(self, stage: Stage, pairs: Mapping[int, Pair], adders: Collection[int]) -> PipelinedStage:
         """Make a stage for one channel; the first sample is kept once, but where each sample has to check it."""
@@ -311,7 +319,7 @@ class Core(Shell):
         """Whether each channel has limits of wear of its own: it takes a clock to read them."""
         return len(self.datapath.wear) > 1
 
-    def _fault_of(self, m: Module, parts: _Parts, last: Sample) -> Value:
+    def _fault_of(self, m: Module, parts: Parts, last: Sample) -> Value:
         """Return whether a wrong bit was found for a result, when its flags are known."""
         fault = last.fault
         if not self.is_guarded:
@@ -326,7 +334,7 @@ class Core(Shell):
             m.d.sync += judged.eq(fault)
         return judged
 
-    def _restart(self, m: Module, parts: _Parts, first: Sample) -> None:
+    def _restart(self, m: Module, parts: Parts, first: Sample) -> None:
         """Clear registers at the clock of a restart, which may begin when the pipeline is empty."""
         if not parts.causes:
             return
@@ -342,7 +350,7 @@ class Core(Shell):
                 m.d.comb += stage.clear.eq(clears)
         m.d.comb += parts.empty.eq(~remaining.any())
 
-    def _reload_port(self, m: Module, parts: _Parts) -> ReloadPort | BankPins | None:
+    def _reload_port(self, m: Module, parts: Parts) -> ReloadPort | BankPins | None:
         """Make the reload port of the banks, and connect them."""
         banks, swap = parts.banks, parts.swap
         if banks is None or self.fingerprint is None:
@@ -368,7 +376,7 @@ class Core(Shell):
             m.d.comb += swap.pending.eq(port.pending)
         return port
 
-    def _source(self, m: Module, parts: _Parts) -> tuple[Sample, Value, Value | None]:
+    def _source(self, m: Module, parts: Parts) -> tuple[Sample, Value, Value | None]:
         """Return what is there for the first stage, its codes as on `s_axis_tdata`, and the flags given with it."""
         if self.channels > 1:
             return self._source_of_channels(m, parts)
@@ -385,7 +393,7 @@ class Core(Shell):
         sample = Sample(valid, parts.bank, fault=self.given_fault)
         return sample, self.s_axis_tdata, self.given_flags if self.flags_given else None
 
-    def _source_of_channels(self, m: Module, parts: _Parts) -> tuple[Sample, Value, Value | None]:
+    def _source_of_channels(self, m: Module, parts: Parts) -> tuple[Sample, Value, Value | None]:
         """Return the same of several channels, from behind an input buffer where samples wait for those before."""
         guard, swap, advance = parts.guard, parts.swap, parts.advance
         bits = channel_bits(self.channels)
@@ -432,7 +440,7 @@ class Core(Shell):
         sample = Sample(valid, head.bank, fault=fault, channel=channel, scrub=scrubs)
         return sample, head.tdata, head.given if self.flags_given else None
 
-    def _clear_channels(self, m: Module, parts: _Parts) -> tuple[Signal, Signal]:
+    def _clear_channels(self, m: Module, parts: Parts) -> tuple[Signal, Signal]:
         """Clear the states of all channels after a reset or restart; return whether it goes on, and the channel."""
         clearing = Signal(init=1)
         cleared = Signal(channel_bits(self.channels))
@@ -446,7 +454,7 @@ class Core(Shell):
         return clearing, cleared
 
     @staticmethod
-    def _waits(m: Module, parts: _Parts, enters: Value, channel: Value) -> Value:
+    def _waits(m: Module, parts: Parts, enters: Value, channel: Value) -> Value:
         """Return whether the sample in front must wait, as the states of its channel may not have been written yet.
 
         They may not if it is the channel of one of the last samples, of as many as the slowest stage asks.

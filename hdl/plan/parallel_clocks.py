@@ -10,6 +10,7 @@ from sosmith.hdl.plan.pipeline import longest_time, pipeline_depth, pipeline_sta
 from sosmith.hdl.plan.unfolding import unfolded_stages
 from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.graph import Graph
+from sosmith.model.dataflow.structure import Stage
 from sosmith.model.sections.start import StartStage
 
 _UNIT, _CHAINED, _BESIDE = 0.5e-9, 0.4e-9, 3.6e-9
@@ -59,11 +60,13 @@ def pipeline_stages_of(
 def depths(datapath: Datapath, channels: int, protect: str, adders: Sequence[Collection[int]] = ()) -> list[int]:
     """Return the number of pipeline stages of each datapath stage."""
     if channels == 1:
-        return [
-            1 if protect == "none" and isinstance(stage, StartStage) else pipeline_depth(stage.graph)
-            for stage in datapath.stages
-        ]
+        return [depth_of(stage, protect) for stage in datapath.stages]
     return [plan.depth for plan in schedules(datapath, channels, protect, adders)]
+
+
+def depth_of(stage: Stage, protect: str = "none") -> int:
+    """Return the number of pipeline stages of a datapath stage for one channel."""
+    return 1 if protect == "none" and isinstance(stage, StartStage) else pipeline_depth(stage.graph)
 
 
 def block_latency_cycles(datapath: Datapath, lanes: int, products: Products | None = None) -> int:
@@ -87,4 +90,9 @@ def clock_estimate(datapath: Datapath, lanes: int, products: Products | None = N
     stages = unfolded_stages(datapath, lanes)
     if products is not None:
         return 1 / (_BESIDE + _UNIT * period(stages, products))
-    return 1 / (_BESIDE + _CHAINED * max(longest_time(stage.graph) for stage in stages))
+    return clock_of(max(longest_time(stage.graph) for stage in stages))
+
+
+def clock_of(time: int) -> float:
+    """Estimate the clock of a pipeline stage of so many units of time, where carry chains overlap, in Hz."""
+    return 1 / (_BESIDE + _CHAINED * time)

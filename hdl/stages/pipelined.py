@@ -170,7 +170,7 @@ class PipelinedStage(wiring.Component):
         saturated = iter(self.o_saturated)
         for k, i in enumerate(graph.outputs):
             output = getattr(self, f"o{k}")
-            state = _held(graph, i, wires) if stages[i] == last else None
+            state = held(graph, i, wires) if stages[i] == last else None
             if state is not None:
                 m.d.comb += output.eq(state)
             else:
@@ -231,8 +231,8 @@ def _fitting(value: Value, state: Value) -> Value:
     return Cat(value, *([value[-1] if value.shape().signed else Const(0, 1)] * len(state)))[: len(state)]
 
 
-def _held(graph: Graph, output: int, wires: list[Value]) -> Value | None:
-    """Return the output of the sample that has just been computed from a state that holds it, or None.
+def held(graph: Graph, output: int, wires: list[Value]) -> Value | None:
+    """Return the output of the sample that has just been computed from a state among `wires` that holds it, or None.
 
     A section's output is the upper part of its state v, so that it needs no register of its own.
     """

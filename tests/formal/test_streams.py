@@ -149,7 +149,7 @@ def test_a_broken_buffer_is_found_out(right: str, wrong: str, tmp_path: Path) ->
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [
-        ("component.advance.eq(advance)", "component.advance.eq(1)"),  # the pipeline moves into a full buffer
+        ("stage.advance.eq(advance)", "stage.advance.eq(1)"),  # the pipeline moves into a full buffer
         ("valid: Value = self.s_axis_tvalid", "valid: Value = Const(1, 1)"),  # samples out of nothing
         ("self.s_axis_tready.eq(ready)", "self.s_axis_tready.eq(1)"),  # samples taken and dropped
     ],

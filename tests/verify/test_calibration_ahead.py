@@ -18,8 +18,8 @@ from sosmith.gen.output.generate import generate
 from sosmith.gen.output.verilog import core_verilog
 from sosmith.gen.specification.specification import from_text
 from sosmith.interface.certificate import Certificate
-from sosmith.verify.decimation import calibration_alone, module_in
 from sosmith.verify.graph import RejectedError
+from sosmith.verify.multirate.decimation import calibration_alone, module_in
 from sosmith.verify.program.check import check_program
 from sosmith.verify.specified.stated_specification import check_specification
 from sosmith.verify.verification import verify

@@ -33,8 +33,8 @@ from sosmith.verify.c_model.frame import (
 )
 from sosmith.verify.c_model.stages import Stages
 from sosmith.verify.certificate_file import Certificate, ItemEntry, Operation, PortEntry
-from sosmith.verify.decimation import at_lower_rate
 from sosmith.verify.graph import require
+from sosmith.verify.multirate.decimation import at_lower_rate
 
 _RAIL, _OUTSIDE, _SATURATED, _SETTLING = 0, 1, 2, 5
 """Bits of a status."""

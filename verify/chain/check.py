@@ -31,8 +31,8 @@ from sosmith.verify.chain.manifest import check_chain_manifest
 from sosmith.verify.chain.responses import Part, factor_of, parts_of, peak_gain, reach_of, rise_of
 from sosmith.verify.chain.top import Stage, check_top
 from sosmith.verify.chain.words import check_words
-from sosmith.verify.decimation import samples_of_filter
 from sosmith.verify.graph import RejectedError, require
+from sosmith.verify.multirate.decimation import samples_of_filter
 from sosmith.verify.verdict.door import Judgement, Stated, judge
 from sosmith.verify.verdict.generated_files import about_of, ascii_text, content_of, sha256, unicode_text
 from sosmith.verify.verdict.limits import SECONDS, limited

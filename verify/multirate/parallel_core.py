@@ -16,11 +16,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from sosmith.verify.certificate_file import Certificate
-from sosmith.verify.decimation import at_lower_rate, calibration_alone
 from sosmith.verify.graph import require
 from sosmith.verify.multirate.calibration import CHANNEL, CODE, FLAGS, layout_of
 from sosmith.verify.multirate.cic import MultirateTop, multirate_top
 from sosmith.verify.multirate.connections import AHEAD, BEHIND, CIC, CLOCK, DATA, DEST, calibration_connections
+from sosmith.verify.multirate.decimation import at_lower_rate, calibration_alone
 from sosmith.verify.multirate.passed_flags import origins
 from sosmith.verify.parallel.check import FLAGS as LEAVING_FLAGS
 from sosmith.verify.parallel.check import OUTPUT, OUTPUT_DEST, HardwareVerdict, Inside, check_modules

@@ -9,8 +9,8 @@ from tempfile import TemporaryDirectory
 
 from sosmith.model.errors import ToolError
 from sosmith.verify.certificate_file import Certificate
-from sosmith.verify.decimation import calibration_alone, handed_on
 from sosmith.verify.graph import RejectedError
+from sosmith.verify.multirate.decimation import calibration_alone, handed_on
 from sosmith.verify.rocq.bound import bound_claims, why_no_bound
 from sosmith.verify.rocq.cascade import cascade_of
 from sosmith.verify.rocq.claims import Claim, gain_claims

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from sosmith.verify.certificate_file import Certificate, PortEntry
-from sosmith.verify.decimation import calibration_alone
+from sosmith.verify.multirate.decimation import calibration_alone
 from sosmith.verify.rocq.calibration import Calibration, calibration_of, formula
 from sosmith.verify.rocq.claims import Claim
 from sosmith.verify.rocq.flat import FlatGraph, flattened

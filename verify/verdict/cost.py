@@ -2,8 +2,8 @@
 
 The sizes of multipliers, in the order of the graphs, leave out products by constants that are made of adders, whose
 sums are among the bits of adders. Which products these are, and what sums there are, is read in the hardware of a
-parallel core. A program has no hardware for each operator, nor have multipliers that take turns: there every product
-counts as a multiplier. Integrators and combs count in place of the filter that they make.
+parallel core. A program has no hardware for each operator, nor have multipliers or sections that take turns: there
+every product counts as a multiplier. Integrators and combs count in place of the filter that they make.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from sosmith.verify.verdict.products import products_of
 from sosmith.verify.verdict.scope import Proofs
 
 _PROGRAMS = frozenset({"folded", "serial"})
+_SHARED = _PROGRAMS | {"multiplexed"}
 
 
 def cost_of(certificate: Certificate, item: ItemEntry, proofs: Proofs, stated: Mapping[str, Any]) -> Any:
@@ -42,7 +43,7 @@ def cost_of(certificate: Certificate, item: ItemEntry, proofs: Proofs, stated: M
         "adder_bits": everything.adder_bits,
         "register_bits": everything.register_bits,
     }
-    if item.architecture in _PROGRAMS or certificate.downsampling is not None:
+    if item.architecture in _SHARED or certificate.downsampling is not None:
         return whole
     products: list[tuple[list[int], bool | None]] = []
     adder_bits = everything.adder_bits

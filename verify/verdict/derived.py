@@ -19,8 +19,8 @@ from sosmith.verify.certificate_file import (
     PortEntry,
     StageEntry,
 )
-from sosmith.verify.decimation import samples_of_filter
 from sosmith.verify.graph import inputs_of
+from sosmith.verify.multirate.decimation import samples_of_filter
 from sosmith.verify.verdict.figures import Figure
 from sosmith.verify.verdict.operators import bits
 from sosmith.verify.verdict.recursions import Recursion

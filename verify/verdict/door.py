@@ -12,11 +12,12 @@ from pathlib import Path
 
 from sosmith.verify.c_model.check import check_c_model
 from sosmith.verify.certificate_file import Certificate, ItemEntry
-from sosmith.verify.decimation import at_lower_rate, behind_decimator, calibration_alone, module_in
 from sosmith.verify.graph import RejectedError, require
+from sosmith.verify.multiplexed.check import check_multiplexed
 from sosmith.verify.multirate.cic import DecimatorVerdict, check_decimator
 from sosmith.verify.multirate.decimating.cic import check_cic, is_cic
 from sosmith.verify.multirate.decimating.polyphase import check_polyphase
+from sosmith.verify.multirate.decimation import at_lower_rate, behind_decimator, calibration_alone, module_in
 from sosmith.verify.multirate.parallel_core import check_ahead, check_behind
 from sosmith.verify.multirate.ring.check import check_rings
 from sosmith.verify.parallel.check import HardwareVerdict, check_hardware
@@ -237,6 +238,9 @@ def _hardware_proven(
         if certificate.decimation is None:
             progress("unit", 0, 0)
             unit = check_unit(text, certificate, serial=item.architecture == "serial")
+    elif item.architecture == "multiplexed":
+        progress("hardware", 0, 0)
+        hardware = check_multiplexed(text, certificate, item)
     elif item.architecture == "parallel":
         progress("hardware", 0, 0)
         hardware = (

@@ -142,7 +142,7 @@ class Design:
 
     @property
     def architecture(self) -> str:
-        """How the hardware is organized: "parallel", "folded", "serial" or "online"."""
+        """How the hardware is organized: "parallel", "folded", "serial", "multiplexed" or "online"."""
         return self.core.architecture.name
 
     @property

@@ -1009,7 +1009,7 @@ BAD = [
         "unknown architecture",
         CLOCK,
         CLOCK + '\narchitecture = "systolic"',
-        "hardware.architecture must be one of auto, parallel, folded, serial, online, not 'systolic'",
+        "hardware.architecture must be one of auto, parallel, folded, serial, multiplexed, online, not 'systolic'",
     ),
     (
         "several channels digit by digit",

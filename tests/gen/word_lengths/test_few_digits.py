@@ -85,7 +85,7 @@ def test_the_board_and_the_specification_say_how_many_blocks_there_are() -> None
     assert blocks_for(None, up5k) == Blocks(8, 16)
     assert blocks_for(3, up5k) == Blocks(3, 16, asked=3)
     assert tried(Blocks(0)) == ["serial", "folded", "parallel"]
-    assert tried(Blocks(8)) == ["folded", "parallel"]
+    assert tried(Blocks(8)) == ["folded", "multiplexed", "parallel"]
     assert tried(Blocks(0), NO_MULTIPLIERS) == ["serial", "parallel"]
     assert tried(Blocks(0), SEVERAL) == ["parallel"]
     assert ARCHITECTURES["parallel"].objective(hx8k, adders=True) == FEW_ADDERS

@@ -7,9 +7,9 @@ import pytest
 from tests.verify.multirate.decimators import Case, designed, written
 
 from sosmith.verify.certificate_file import PortEntry
-from sosmith.verify.decimation import module_in
 from sosmith.verify.graph import RejectedError
 from sosmith.verify.multirate.cic import check_decimator
+from sosmith.verify.multirate.decimation import module_in
 from sosmith.verify.multirate.repeated_sign import check_signs
 from sosmith.verify.reader.source import read_modules
 

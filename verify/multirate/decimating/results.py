@@ -22,37 +22,30 @@ from __future__ import annotations
 
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping, Sequence, Set
+from collections.abc import Hashable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass
 
 from sosmith.verify.certificate_file import Certificate, ItemEntry
 from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.multirate.decimating.entrance import READY, Beside, Entrance, Others
+from sosmith.verify.multirate.followed import Followed
 from sosmith.verify.multirate.logic import Logic, Part, check_parts
-from sosmith.verify.multirate.ring.machine import UNKNOWN, Machine, State
+from sosmith.verify.multirate.ring.machine import State
 from sosmith.verify.multirate.ring.verdict import RingVerdict
-from sosmith.verify.parallel.check import CLOCK, FLAGS, OUTPUT
+from sosmith.verify.parallel.check import CLOCK
 from sosmith.verify.parallel.control import RESET, SINK, Buffer, Search
-from sosmith.verify.parallel.dependence import Dependence
-from sosmith.verify.parallel.equality import same_word
-from sosmith.verify.parallel.flags import flags_of, wear_limits
-from sosmith.verify.parallel.forms import Forms
-from sosmith.verify.parallel.graph_codes import DATA, GraphCodes
+from sosmith.verify.parallel.graph_codes import DATA
 from sosmith.verify.parallel.netlist import Netlist, flattened
 from sosmith.verify.parallel.split import split
 from sosmith.verify.program.normal_form import Form, constant, plus
 from sosmith.verify.progress import Progress
 from sosmith.verify.reader.source import read_source
 
-_FLAG_BITS = 8
 _WHOLE = re.compile(r"(?:sum|comb|difference|line|phase)\d+|left|phase|filled|total")
 """Registers that stay whole, whatever they take over."""
 
 _COUNT_BITS = 64
 """Bits in which counts are compared: more than any has."""
-
-_MOST_OPENED = 4
-"""Most stages of the graph that are opened, one after the other, for one comparison."""
 
 _MOST_POSITIONS = 8
 """Most positions behind the inside."""
@@ -81,7 +74,7 @@ def decimating_netlist(text: str, certificate: Certificate, item: ItemEntry) -> 
     return flattened(read_source(text, certificate.name).modules, CLOCK)
 
 
-class ResultCheck(ABC):
+class ResultCheck(Followed, ABC):
     """The check of a core.
 
     Parameters
@@ -94,27 +87,21 @@ class ResultCheck(ABC):
     def __init__(self, netlist: Netlist, certificate: Certificate) -> None:
         down = certificate.downsampling
         assert down is not None
-        self.certificate, (self.port,) = certificate, certificate.inputs
-        self.netlist = split(netlist, {name for name in netlist.registers if _WHOLE.fullmatch(name)})
-        self.forms = Forms()
-        self.graph = GraphCodes(certificate, self.forms)
+        (self.port,) = certificate.inputs
+        whole = split(netlist, {name for name in netlist.registers if _WHOLE.fullmatch(name)})
+        self._search = Search(whole)
+        super().__init__(whole, certificate, _buffer_found(self._search))
         (self.input,) = self.graph.lanes[0].inputs
         self._counter: int | None = None
         self.remembered = self._memory()
-        self._search = Search(self.netlist)
-        self.buffer = self._find_buffer()
-        width, whole = self.netlist.widths[DATA], -(-self.port.bits // 8) * 8
-        require(width == whole, f"the port {DATA} must have {whole} bits, not {width}")
+        width, bits = self.netlist.widths[DATA], -(-self.port.bits // 8) * 8
+        require(width == bits, f"the port {DATA} must have {bits} bits, not {width}")
         require(down.factor > 1, f"a filter that decimates must leave results out, not {down.factor} of each")
         counted = 0 if self._counter is None else self.graph.nodes[self._counter].entry.high
         require(not (down.filled and counted), "no result must be settling where the first sample fills the filter")
         fills = self.fills_for(down.factor) if down.filled else 0
         self.entrance = Entrance(self.port, down.factor, fills, self.buffer.full)
         self.left = fills or -(-counted // down.factor)
-        self._machine = Machine(self.netlist, self.forms, {}, {})
-        self._limits = wear_limits(self, self.netlist, certificate, "")
-        self._dependence = Dependence(self.netlist, frozenset())
-        self._number = 0
 
     # What the inside is.
 
@@ -152,10 +139,6 @@ class ResultCheck(ABC):
         assert code is not None
         return code
 
-    def constant_word(self, name: str) -> Form:
-        """Return the word of a memory that never changes."""
-        return self.forms.variable(("constant", name), 0, (1 << self.netlist.memories[name].width) - 1)
-
     def _memory(self) -> int:
         """Return how many samples the graph remembers; find the node that counts those since a start, if one does."""
         remembered = 0
@@ -167,17 +150,6 @@ class ResultCheck(ABC):
                 require(self._counter is None and ago == 1, "the graph must remember samples alone, and their number")
                 self._counter = index
         return remembered
-
-    def _find_buffer(self) -> Buffer:
-        """Find the control of the output buffer, and check that it is a queue of two."""
-        search = self._search
-        valid = search.register(search.net("m_axis_tvalid", {}), "m_axis_tvalid")
-        ready = search.inverted(search.net(READY, {"filling": 0}))
-        full = search.register(ready, f"not {READY}")
-        comes = search.loaded(valid, {RESET: 1, full: 0, valid: 0})
-        buffer = Buffer(valid, full, search.register(comes, f"what {valid} takes over"), SINK)
-        search.check_buffer(buffer)
-        return buffer
 
     # All of it.
 
@@ -240,7 +212,7 @@ class ResultCheck(ABC):
         With a start from zero, all of them do, whatever is left of those that are flagged.
         """
         full = self.buffer.full
-        self._check_kept({first}, {full: constant(1)}, "while the pipeline stands")
+        self.check_kept({first}, {full: constant(1)}, "while the pipeline stands")
         some = self.forms.variable("some left", 1, (1 << self.left.bit_length()) - 1) if self.left else {}
         skips = self.entrance.fills > 0
         for left, counts in (({}, True), *([(some, not skips)] if self.left else [])):
@@ -282,114 +254,29 @@ class ResultCheck(ABC):
         """Follow a result from the last position of the inside to the output."""
         full = self.buffer.full
         rail = self.forms.variable("rail", 0, 1)
-        inside = registers - self._payload()
-        self._check_kept(inside, {full: constant(1)}, "while the pipeline stands")
+        inside = registers - self.payload()
+        self.check_kept(inside, {full: constant(1)}, "while the pipeline stands")
         known = {**self.last_position(inside), f"rail{self.positions}": rail, **case.left}
         for name in valid:
             known = self.after(inside, {**known, full: {}}) | {name: constant(1)}
-        first = self._first_of_two(registers, known)
-        clock = self._machine.clock(State(dict(first)), {}, self._next())
-        self._check_output(clock.net, case, rail)
-
-    def _first_of_two(self, registers: Set[str], known: Mapping[str, Form]) -> dict[str, Form]:
-        """Return what registers hold of the result that leaves the output buffer next, whichever way it came there."""
-        valid, full, ready = self.buffer.valid, self.buffer.full, self.buffer.ready
-        heads = self._payload()
-        require(heads <= registers, f"a result must be made of registers of the output, not of {sorted(heads)}")
-        comes: dict[str, Form] = {**known, full: {}, self.buffer.coming: constant(1)}
-        at_once = [
-            self.after(heads, comes | {valid: constant(there)}, {ready: constant(leaves)})
-            for there, leaves in ((0, 0), (0, 1), (1, 1))
-        ]
-        for name in sorted(heads):
-            same = all(name in each and each[name] == at_once[0][name] for each in at_once)
-            require(same, f"{name} must take over a result whenever there is room for it")
-        waits: dict[str, Form] = {ready: {}}
-        seconds = self.after(registers - heads, comes | {valid: constant(1)}, waits)
-        moved = self.after(heads, seconds | {valid: constant(1), full: constant(1)}, {ready: constant(1)})
-        for name in sorted(heads):
-            same = name in moved and self.is_same(moved[name], at_once[0][name], self.netlist.widths[name])
-            require(same, f"{name} must take over the second result when the first leaves")
-        for number in (0, 1):
-            waiting = {valid: constant(1), full: constant(number)}
-            self._check_kept(heads, waiting, "while a result waits for the sink", waits)
-        second = {name for head in heads for name in self._sources(head)}
-        both = {valid: constant(1), full: constant(1)}
-        self._check_kept(second & seconds.keys(), both, "while two results wait for the sink", waits)
-        return {name: at_once[0][name] for name in heads}
-
-    def _payload(self) -> Set[str]:
-        """Return the registers that a result is made of at the output."""
-        return {name for port in (OUTPUT, FLAGS) for name in self._dependence.of_net(port)}
-
-    def _sources(self, name: str) -> frozenset[str]:
-        """Return the registers and inputs that a register takes over something of."""
-        statements = self.netlist.registers[name].statements
-        return self._dependence.of_loads(statements) | self._dependence.of_conditions(statements)
-
-    def after(
-        self, names: Set[str], registers: Mapping[str, Form], inputs: Mapping[str, Form] | None = None
-    ) -> dict[str, Form]:
-        """Return what registers hold after a clock, of those where it follows from what is known."""
-        clock = self._machine.clock(State(dict(registers)), {RESET: constant(1), **(inputs or {})}, self._next())
-        sources = {name: self._sources(name) for name in names}
-        near = {name for name, own in sources.items() if own & registers.keys() or not own}
-        words = {name: clock.register(name) for name in sorted(near)}
-        return {name: word for name, word in words.items() if self._is_known(word)}
-
-    def after_reset(self, name: str) -> Form:
-        """Return what a register holds after a reset."""
-        return self._machine.clock(State(), {RESET: {}}, self._next()).register(name)
-
-    def _check_kept(
-        self,
-        names: Set[str],
-        registers: Mapping[str, Form],
-        when: str,
-        inputs: Mapping[str, Form] | None = None,
-    ) -> None:
-        """Check that registers keep what they hold."""
-        own = {name: self.forms.variable(("kept", name), 0, (1 << self.netlist.widths[name]) - 1) for name in names}
-        clock = self._machine.clock(State({**own, **registers}), {RESET: constant(1), **(inputs or {})}, self._next())
-        for name in sorted(names):
-            right = self.is_same(clock.register(name), own[name], self.netlist.widths[name])
-            require(right, f"{name} must keep what it holds {when}")
+        first = self.first_of_two(registers, known)
+        clock = self.machine.clock(State(dict(first)), {}, self.next())
+        counted: dict[Hashable, Form] = {}
+        if self._counter is not None and case.counted is not None:
+            counted[self.graph.origin(self._counter)] = case.counted
+        self.check_output(clock.net, (rail,), counted)
 
     def check_kept_without(self, name: str, valid: str) -> None:
         """Check that a register keeps what it holds while no sample is at its position."""
-        self._check_kept({name}, {self.buffer.full: {}, valid: {}}, "while no sample comes to it")
+        self.check_kept({name}, {self.buffer.full: {}, valid: {}}, "while no sample comes to it")
 
-    def _check_output(self, net: Callable[..., Form], case: Case, rail: Form) -> None:
-        """Check the code and the flags of a result."""
-        graph, lane = self.graph, self.graph.lanes[0]
-        whole = -(-self.certificate.output.bits // 8) * 8
-        for name, width in ((OUTPUT, whole), (FLAGS, _FLAG_BITS)):
-            require(self.netlist.widths[name] == width, f"the port {name} must have {width} bits")
-        code, label = graph.seen(lane.output, ""), graph.nodes[lane.output].label
-        require(self.is_same(net(OUTPUT), code, whole), f"{OUTPUT} must be {label}, not another value")
-        for flag in flags_of(graph, lane, self.certificate, (rail,), self._limits):
-            value = flag.value
-            if self._counter is not None and case.counted is not None:
-                value = self.forms.settled(value, {graph.origin(self._counter): case.counted})
-            what = flag.name or "0, as there is no such flag"
-            right = self.is_same(net(FLAGS, flag.place, 1), value, 1)
-            require(right, f"bit {flag.place} of {FLAGS} must be {what}, not another value")
 
-    def is_same(self, word: Form, wanted: Form, width: int) -> bool:
-        """Whether two words are the same, if need be by opening what stages of the graph hand on."""
-        pair: tuple[Form, Form] | None = word, wanted
-        for _ in range(_MOST_OPENED):
-            if pair is None or same_word(self.forms, *pair, width):
-                break
-            pair = self.graph.opened(*pair)
-        else:
-            return False
-        return pair is not None
-
-    def _is_known(self, word: Form) -> bool:
-        return not any(isinstance(key, tuple) and key[0] == UNKNOWN for key in self.forms.keys(word))
-
-    def _next(self) -> int:
-        """Return a number of its own for a clock."""
-        self._number += 1
-        return self._number
+def _buffer_found(search: Search) -> Buffer:
+    """Find the control of the output buffer, and check that it is a queue of two."""
+    valid = search.register(search.net("m_axis_tvalid", {}), "m_axis_tvalid")
+    ready = search.inverted(search.net(READY, {"filling": 0}))
+    full = search.register(ready, f"not {READY}")
+    comes = search.loaded(valid, {RESET: 1, full: 0, valid: 0})
+    buffer = Buffer(valid, full, search.register(comes, f"what {valid} takes over"), SINK)
+    search.check_buffer(buffer)
+    return buffer

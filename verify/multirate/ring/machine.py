@@ -11,7 +11,7 @@ modulo `words`: that is all that is used of them.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import NamedTuple
@@ -89,10 +89,12 @@ class Machine:
         Words of a channel in each memory that is written: those of a ring, or 1.
     channel : Form
         The channel that is followed.
+    shortened : callable
+        Gives the word of a net a shorter form, as `Evaluation` takes it.
 
     Attributes
     ----------
-    netlist, forms, channel
+    netlist, forms, channel, shortened
         As given.
     pointer : Form
         What distances are counted from.
@@ -100,8 +102,15 @@ class Machine:
         Bits of x, which may be anything.
     """
 
-    def __init__(self, netlist: Netlist, forms: Forms, words: Mapping[str, int], channel: Form) -> None:
-        self.netlist, self.forms, self.channel = netlist, forms, channel
+    def __init__(
+        self,
+        netlist: Netlist,
+        forms: Forms,
+        words: Mapping[str, int],
+        channel: Form,
+        shortened: Callable[[Form, int, bool], Form] = lambda word, width, at_inlet: word,
+    ) -> None:
+        self.netlist, self.forms, self.channel, self.shortened = netlist, forms, channel, shortened
         self.pointer: Form = {}
         self.undriven = frozenset(name for name in netlist.widths if name.startswith("?"))
         self._words = words
@@ -146,7 +155,8 @@ class Clock:
     def __init__(self, machine: Machine, state: State, inputs: Mapping[str, Form], number: int) -> None:
         self._machine, self._state, self._inputs, self._number = machine, state, inputs, number
         self._netlist, self._forms = machine.netlist, machine.forms
-        self._logic = Evaluation(self._netlist, self._forms, self._content, word=self._word, cuts=machine.undriven)
+        given = self._netlist, self._forms, self._content, machine.shortened
+        self._logic = Evaluation(*given, word=self._word, cuts=machine.undriven)
         self._written: dict[str, tuple[int, Form] | None] = {}
 
     def net(self, name: str, low: int = 0, width: int | None = None) -> Form:

@@ -51,12 +51,16 @@ def reasons(pairs: Sequence[Combination]) -> list[str]:
 
 
 def print_combinations(console: Console, pairs: Sequence[Combination]) -> None:
-    """Print the table and the reasons."""
+    """Print the table, its last column below as a table of its own, and the reasons."""
     heading, rows = table_rows(pairs)
-    table = new_table("What combines", heading)
-    for row in rows:
-        table.add_row(*row)
+    *names, apart = heading
+    table, beside = new_table("What combines", names), new_table("Options of one specification", ["", apart])
+    for *verdicts, others in rows:
+        table.add_row(*verdicts)
+        if others:
+            beside.add_row(verdicts[0], others)
     console.print(table)
+    console.print(beside)
     for reason in reasons(pairs):
         console.print(reason)
 

@@ -15,8 +15,8 @@ from sosmith.gen.output.generate import generate
 from sosmith.gen.specification.specification import load
 from sosmith.interface.certificate import Certificate
 from sosmith.verify.certificate_file import DecimationEntry, on_grid
-from sosmith.verify.decimation import at_lower_rate, behind_decimator, folding_gain, remembered
 from sosmith.verify.graph import RejectedError
+from sosmith.verify.multirate.decimation import at_lower_rate, behind_decimator, folding_gain, remembered
 from sosmith.verify.specified.stated_specification import check_specification
 from sosmith.verify.verification import verify
 

@@ -1,0 +1,1 @@
+"""Which sections share hardware, and when each of them has its turn."""
