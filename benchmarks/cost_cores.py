@@ -61,7 +61,7 @@ class Core:
     lanes : int
         Samples a clock.
     clock : int
-        Clock in MHz that it looks ahead for; 0 without look-ahead.
+        Clock in MHz that it looks ahead for, or that a turn of its sections is spread for; 0 for the example's.
     multipliers : int
         Multiplier blocks that the specification names; 0 for "auto".
     order : int
@@ -71,6 +71,8 @@ class Core:
     freedom : str
         "none" or "mask" for the filter of the recipe inside a mask in place of the example's, as that of the family or
         as any; empty for the example's.
+    lsb : int
+        Allowed error in LSB of the output; 0 for the example's.
     """
 
     example: str
@@ -85,6 +87,7 @@ class Core:
     order: int = 0
     start: str = ""
     freedom: str = ""
+    lsb: int = 0
 
     @property
     def key(self) -> str:
@@ -93,7 +96,7 @@ class Core:
         wide = f" {self.bits} bits" if self.bits else ""
         chosen = f" {self.realization}" if self.realization else ""
         several = f" {self.lanes} a clock" if self.lanes > 1 else ""
-        ahead = f" look-ahead {self.clock} MHz" if self.clock else ""
+        ahead = f"{self._for_clock} {self.clock} MHz" if self.clock else ""
         blocks = f" multipliers {self.multipliers}" if self.multipliers else ""
         special = f"{guarded}{wide}{self._varied}{chosen}{several}{ahead}{blocks}{self._free}"
         return f"{self.example} {self.architecture} {self.channels}{special}"
@@ -106,14 +109,19 @@ class Core:
         wide = f", {self.bits} bits" if self.bits else ""
         chosen = f", {self.realization}" if self.realization else ""
         lanes = f", {self.lanes} samples a clock" if self.lanes > 1 else ""
-        ahead = f", look-ahead for {self.clock} MHz" if self.clock else ""
+        ahead = f",{self._for_clock} for {self.clock} MHz" if self.clock else ""
         blocks = f", multipliers = {self.multipliers}" if self.multipliers else ""
         special = f"{guarded}{wide}{self._varied}{chosen}{lanes}{ahead}{blocks}{self._free}"
         return f"{self.example} {self.architecture}{several}{special}"
 
     @property
+    def _for_clock(self) -> str:
+        return "" if self.architecture == combinations.MULTIPLEXED.name else " look-ahead"
+
+    @property
     def _varied(self) -> str:
         order = f", order {self.order}" if self.order else ""
+        order += f", {self.lsb} LSB" if self.lsb else ""
         return f"{order}, start = {self.start}" if self.start else order
 
     @property
@@ -191,8 +199,13 @@ TWO_PRODUCTS = tuple(Core(example, "folded", multipliers=2) for example in EXAMP
 FROM_ZERO = Core("audio_lowpass", "parallel", start="zero")
 """Without the logic of a steady start."""
 
+TURNS = tuple(Core("audio_lowpass", "multiplexed", clock=clock) for clock in (30, 80))
+"""Sections that share hardware, with few clocks a turn and with more."""
+
 ORDER_SIX = (
     Core("audio_lowpass", "parallel", bits=18, order=6),
+    *(Core("audio_lowpass", "multiplexed", bits=18, order=6, clock=clock) for clock in (30, 80)),
+    Core("audio_lowpass", "multiplexed", bits=18, order=6, clock=80, lsb=4),
     Core("audio_lowpass", "folded", bits=18, order=6, multipliers=2),
     Core("audio_lowpass", "folded", bits=18, order=6),
 )
@@ -201,7 +214,7 @@ ORDER_SIX = (
 MASKED = tuple(Core("audio_lowpass", "parallel", freedom=freedom) for freedom in ("none", "mask"))
 """The family's filter for a mask, and any inside it."""
 
-OF_THEIR_OWN = frozenset({*PROTECTED, *ONLINE, *REALIZED, *FAST, *TWO_PRODUCTS, *MASKED, *ORDER_SIX, FROM_ZERO})
+OF_THEIR_OWN = frozenset({*PROTECTED, *ONLINE, *REALIZED, *FAST, *TWO_PRODUCTS, *MASKED, *TURNS, *ORDER_SIX, FROM_ZERO})
 """Cores that have tables of their own."""
 
 CORES = (
@@ -220,6 +233,7 @@ CORES = (
     *FAST,
     *TWO_PRODUCTS,
     *MASKED,
+    *TURNS,
     *ORDER_SIX,
     FROM_ZERO,
 )
@@ -248,6 +262,10 @@ def design(core: Core, objective: Objective, target: str = "") -> CoreDesign:
     path = ROOT / "examples" / f"{example}.toml"
     spec = load(path)
     varied = spec.text.replace("bits = 16", f"bits = {bits}") if bits else spec.text
+    if core.lsb:
+        reach = spec.output.highest - spec.output.lowest + 1
+        allowed = float(core.lsb * spec.output.lsb * reach / 2**bits if bits else core.lsb * spec.output.lsb)
+        varied = varied.replace('max_error = "faithful"', f"max_error = {allowed!r}")
     varied = varied.replace("order = 5", f"order = {core.order}") if core.order else varied
     varied = varied.replace("[hardware]", f'[hardware]\nstart = "{core.start}"') if core.start else varied
     spec = from_text(varied, path)
@@ -258,7 +276,8 @@ def design(core: Core, objective: Objective, target: str = "") -> CoreDesign:
     if core.multipliers:
         hardware = replace(hardware, multipliers=core.multipliers)
     if core.clock:
-        hardware = replace(hardware, pipeline="look-ahead", clock=Fraction(core.clock * 10**6))
+        pipeline = "plain" if architecture == combinations.MULTIPLEXED.name else "look-ahead"
+        hardware = replace(hardware, pipeline=pipeline, clock=Fraction(core.clock * 10**6))
     wanted = replace(spec, hardware=hardware)
     first = target or next(key for key in TARGETS if objective_on(core, key) == objective)
     return design_core(wanted, core=EXAMPLES[example], realization=core.realization or None, board=TARGETS[first])

@@ -143,12 +143,13 @@ def two_products_table(record: Figures) -> str:
 def order_six_table(record: Figures) -> str:
     """Return a Markdown table of a filter of order six in all architectures that are measured for it."""
     columns = (
-        *("architecture", "multipliers", "target", "all LUT4", "FF", "RAM", "fmax, MHz (lowest to highest)"),
-        *("clocks per sample", "samples per second"),
+        *("architecture, proven to", "multipliers", "target", "all LUT4", "FF", "RAM"),
+        *("fmax, MHz (lowest to highest)", "clocks per sample", "samples per second"),
     )
     lines = [f"| {' | '.join(columns)} |", "|---" * len(columns) + "|"]
     for core in ORDER_SIX:
-        lines += [_row(core.architecture, core, key, each) for key, each in targets_in(record, core).items()]
+        name = f"{core.architecture}, {core.lsb or 1} LSB"
+        lines += [_row(name, core, key, each) for key, each in targets_in(record, core).items()]
     return "\n".join(lines)
 
 
@@ -440,11 +441,13 @@ On the ECP5 the registers at the multipliers and at the output of the program me
 
 ## Three sections of second order
 
-audio_lowpass with order 6 and 18 bits in and out, one channel, proven to one LSB:
+audio_lowpass with order 6 and 18 bits in and out, one channel:
 
 {order_six_table(record)}
 
-A core with a multiplier for each section and 8 clocks a sample would be between folded and parallel: there is none yet.
+`multiplexed` has the hardware of one section, with one or three clocks a turn
+([hardware.md](hardware.md#sections-that-take-turns)). For one LSB of 18 bits, coefficients are longer than the operands
+of a multiplier block; for four they are not.
 
 ## Any filter inside a mask
 

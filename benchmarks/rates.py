@@ -24,7 +24,7 @@ from sosmith.gen.filter.decimation import choose
 from sosmith.gen.output.decimation_facts import decimation_facts, rate_costs
 from sosmith.gen.picture import settled
 from sosmith.gen.quantity import quantity
-from sosmith.gen.specification.combinations import PARALLEL
+from sosmith.gen.specification.combinations import MULTIPLEXED, PARALLEL
 from sosmith.gen.specification.specification import FilterSpec, load
 from sosmith.gen.word_lengths.cost import LUTS_OF_A_BLOCK
 
@@ -175,6 +175,7 @@ CURVES = {
     "serial": "C2",
     "folded": "C1",
     "online": "C4",
+    "multiplexed": "C5",
     "parallel": "C0",
     "parallel, channels in turn": "C9",
     "parallel, several a clock": "C7",
@@ -208,10 +209,14 @@ def curve_of(core: Core) -> tuple[str, str]:
         several = sorted(other.channels for other in CORES if replace(other, channels=core.channels) == core)[1:]
         mark = f"{several[0]} to {several[-1]} channels" if core.channels == several[-1] else ""
         return ("parallel, channels in turn", mark) if core.architecture == PARALLEL.name else ("", "")
+    if core.architecture == MULTIPLEXED.name:
+        return core.architecture, f"for {core.clock} MHz"
     lanes = f"{core.lanes} a clock"
     if core.clock:
         # One curve over the samples of a clock; of one sample, the core that was made for the highest clock.
-        wanted = max(other.clock for other in CORES if other.lanes == core.lanes)
+        wanted = max(
+            other.clock for other in CORES if (other.lanes, other.architecture) == (core.lanes, core.architecture)
+        )
         return ("parallel, look-ahead", lanes) if core.clock == wanted else ("", "")
     if core.lanes > 1:
         return "parallel, several a clock", lanes
