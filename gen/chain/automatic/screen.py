@@ -47,6 +47,10 @@ _FLAGS = 3
 _ELLIPTIC_LUTS, _CLOCKS_OF_ORDER, _OTHER_CLOCKS = 360.0, 8, 12
 """What an IIR filter in the folded architecture takes, roughly: LUT4, and clocks for each result."""
 
+_SECTION_BITS, _OTHER_LUTS, _MORE_BITS = 12, 120.0, 6
+"""What sections with hardware of their own take, roughly: LUT4 for each bit of a section's words, LUT4 beside them, and
+bits that these words have beyond the data."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Wanted:
@@ -150,7 +154,7 @@ class Planned:
     taps : int
         How many it is expected to have; of an IIR filter, its order.
     each_clock : bool
-        Whether it takes a sample at each clock.
+        Whether it takes a sample at each clock; an IIR filter whose sections share hardware, as fast as it must.
     """
 
     kind: str
@@ -170,10 +174,10 @@ class Planned:
 
     def clocks(self, channels: int) -> int:
         """Clocks for each result of a channel, expected."""
-        if self.kind == "iir":
-            return _CLOCKS_OF_ORDER * self.taps + _OTHER_CLOCKS
         if self.each_clock:
             return self.factor
+        if self.kind == "iir":
+            return _CLOCKS_OF_ORDER * self.taps + _OTHER_CLOCKS
         return self.factor * (1 + (channels > 1)) + self.steps + 5
 
     def available(self, wanted: Wanted) -> int:
@@ -316,9 +320,9 @@ def _length(stage: Planned, wanted: Wanted) -> int:
 
 
 def _check_clocks(made: Plan, wanted: Wanted) -> None:
-    """Let filters that decimate take a sample at each clock where a ring is too slow; say of what is too slow still."""
+    """Let stages take a sample at each clock where one multiplier is too slow; say of what is too slow still."""
     for stage in made.stages:
-        if stage.factor > 1 and stage.kind != "iir" and stage.clocks(wanted.channels) > stage.available(wanted):
+        if stage.clocks(wanted.channels) > stage.available(wanted):
             stage.each_clock = wanted.each_clock
         needed, there = stage.clocks(wanted.channels), stage.available(wanted)
         if needed > there:
@@ -347,6 +351,8 @@ def _cost(made: Plan, wanted: Wanted, device: Device) -> Cost:
 
 def _cost_of(stage: Planned, wanted: Wanted, device: Device, data: int, out: int) -> Cost:
     if stage.kind == "iir":
+        if stage.each_clock:
+            return _cost_of_sections(stage, wanted, device, data)
         wide = max(1, math.ceil(data / max(device.factor_bits, 1)))
         return Cost(_ELLIPTIC_LUTS, wide**2 * (device.multipliers > 0), 60.0 * data)
     if stage.each_clock and stage.kind == "cic":
@@ -384,6 +390,14 @@ def _cost_of(stage: Planned, wanted: Wanted, device: Device, data: int, out: int
         device,
     )
     return Cost(luts_of(found, "folded", device.family), found["blocks"], found["memory_bits"])
+
+
+def _cost_of_sections(stage: Planned, wanted: Wanted, device: Device, data: int) -> Cost:
+    """Estimate sections with hardware of their own, or of one for all where there are clocks for their turns."""
+    sections, word = math.ceil(stage.taps / 2), data + _MORE_BITS
+    count = 1 if device.multipliers and sections <= stage.available(wanted) else sections
+    blocks = 2 * max(1, math.ceil(word / max(device.factor_bits, 1)))
+    return Cost(_OTHER_LUTS + count * _SECTION_BITS * word, count * blocks * (device.multipliers > 0), 0.0)
 
 
 def _cost_in_turns(stage: Planned, device: Device, sizes: tuple[int, int, int, int]) -> Cost:

@@ -115,6 +115,14 @@ def test_a_clock_as_slow_as_the_samples_is_enough() -> None:
     assert made.clocks_per_sample == 1
 
 
+def test_an_iir_filter_takes_turns_or_more_where_one_multiplier_is_too_slow() -> None:
+    made = sosmith.design_chain(asked(stopband_edge=None) | {"hardware": {"clock": 8000.0}})
+    rows = [tuple(row) for row in made.tables()[0].rows]
+    with_iir = [row[-1] for row in rows if "IIR" in row[0]]
+    assert with_iir
+    assert not any("too slow" in verdict for verdict in with_iir)
+
+
 HEAD = "specification: stage down: its limits must be such that a structure of stages keeps to them, and none does: "
 
 
