@@ -38,7 +38,7 @@ def _of_shared(unit: SharedSections, clocks: int, device: Device) -> Quantities:
     made["registers"] += (count - 1) * sum(graph.nodes[index].width for index in graph.delays)
     made["counters"] += (count - 1).bit_length()
     made["chosen"] += graph.nodes[graph.inputs[0]].width
-    made["logic"] += (
-        2 * sum(max(each).bit_length() for each in unit.constants.values() if len(set(each)) > 1) + count * clocks
-    )
+    changing = sum(max(each).bit_length() for each in unit.constants.values() if len(set(each)) > 1)
+    made["registers"] += changing + 1
+    made["logic"] += changing // 2 + count
     return made
