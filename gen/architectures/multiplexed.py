@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from sosmith.gen.architectures.architecture import Architecture
 from sosmith.gen.architectures.blocks import NO_LIMIT, Blocks
 from sosmith.gen.fpga.boards import Board
+from sosmith.gen.realizations.tied_formats import NONE_ALIKE
 from sosmith.gen.specification.combinations import MULTIPLEXED, PARALLEL
 from sosmith.gen.word_lengths.cost import cost_of_graphs
 from sosmith.gen.word_lengths.objective import SHARED_AREA, Objective
@@ -32,10 +33,7 @@ class Multiplexed(Architecture):
         try:
             _ = self.plan
         except ValueError:
-            raise ShortfallError(
-                "the multiplexed architecture must have two sections with the same operations, one behind the other, "
-                "and has none: another realization may have some, and parallel takes every one"
-            ) from None
+            raise ShortfallError(NONE_ALIKE) from None
 
     @classmethod
     def is_tried(cls, blocks: Blocks) -> bool:

@@ -24,6 +24,12 @@ from sosmith.model.errors import ShortfallError
 _BITS = 24
 """Significant bits of the coefficients when structures are compared."""
 
+NONE_ALIKE = (
+    "the multiplexed architecture must have two sections with the same operations, one behind the other, and has none: "
+    "another realization may have some, and parallel takes every one"
+)
+"""What is said of filters whose sections cannot share hardware."""
+
 Group = tuple[int, ...]
 """Numbers of sections of the same structure."""
 
@@ -56,6 +62,18 @@ def _share(stages: Sequence[Section | None]) -> bool:
     """Whether sections can share hardware; those that cannot be built do not."""
     built = [stage for stage in stages if stage is not None]
     return len(built) == len(stages) and merged(built) is not None
+
+
+def check_that_some_share(parts: Sequence[Any], realization: str) -> None:
+    """Check that two sections may have the same structure, before their formats are known.
+
+    Raises
+    ------
+    ShortfallError
+        If none have.
+    """
+    if all(len(group) < 2 for group in groups_of(parts, realization)):
+        raise ShortfallError(NONE_ALIKE)
 
 
 def standing_together(rows: Sequence[Row], realization: str) -> tuple[TiedRow, ...]:

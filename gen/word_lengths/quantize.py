@@ -20,7 +20,7 @@ from sosmith.gen.proof.cascade_proof import CascadeProof, ideal_gain
 from sosmith.gen.realizations.kept_formats import Choice, choice_of_tree, kept_or_made, tree_of_choice
 from sosmith.gen.realizations.registry import REALIZATIONS, Section, realization_of
 from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
-from sosmith.gen.realizations.tied_formats import standing_together
+from sosmith.gen.realizations.tied_formats import check_that_some_share, standing_together
 from sosmith.gen.word_lengths.bit_limits import MAX_BITS
 from sosmith.gen.word_lengths.cascade import cascade, parts_of, stages_of, unquantized
 from sosmith.gen.word_lengths.equal_shares import equally_shared
@@ -210,7 +210,10 @@ def plan(
     search, start = None, None
     if ideal is not None and realization_of(realization).searched:
         ideal = _ordered(ideal, realization, together=together) if realization_of(realization).cascade else ideal
-        search = Search(parts_of(ideal, realization), realization, before, gain, steady=steady)
+        stages = parts_of(ideal, realization)
+        if together:
+            check_that_some_share(stages, realization)
+        search = Search(stages, realization, before, gain, steady=steady)
         start = _start(search, float(share) / (1 if realization_of(realization).cascade else _FINER))
     planned = Plan(
         name=name,

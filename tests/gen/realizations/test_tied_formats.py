@@ -6,10 +6,16 @@ import pytest
 
 import sosmith
 from sosmith.gen.realizations.direct_form import best_feedback, common_feedback
-from sosmith.gen.realizations.tied_formats import groups_of, standing_together, with_the_most
+from sosmith.gen.realizations.tied_formats import (
+    check_that_some_share,
+    groups_of,
+    standing_together,
+    with_the_most,
+)
 from sosmith.gen.realizations.tied_row import TiedRow
 from sosmith.gen.realizations.transposed import common_exponent
 from sosmith.model.dataflow.graph import Op
+from sosmith.model.errors import ShortfallError
 
 LOW = (0.01, 0.02, 0.01, 1.0, -1.8, 0.84)
 """Poles next to z = 1."""
@@ -25,6 +31,16 @@ def test_sections_of_one_order_and_numerator_are_a_group() -> None:
 def test_sections_alike_stand_together_in_the_order_of_the_first() -> None:
     assert standing_together((LOW, FIRST, MIDDLE), "df1") == (LOW, MIDDLE, FIRST)
     assert standing_together((FIRST, LOW, MIDDLE), "df2t") == (FIRST, LOW, MIDDLE)
+
+
+def test_sections_of_which_none_share_are_refused_before_their_formats_are_chosen() -> None:
+    check_that_some_share((LOW, FIRST, MIDDLE), "df1")
+    sentence = (
+        r"^the multiplexed architecture must have two sections with the same operations, one behind the other, and has "
+        r"none: another realization may have some, and parallel takes every one$"
+    )
+    with pytest.raises(ShortfallError, match=sentence):
+        check_that_some_share((LOW, FIRST), "df1")
 
 
 def test_sections_that_stand_together_have_one_error_feedback() -> None:
