@@ -44,6 +44,7 @@ _CHANGES = {
     "a first turn after a reset": (r"if \(rst\) first <= 1'h1", "if (rst) first <= 1'h0"),
     "a state that a reset leaves": (r"if \(rst\) section1_v1 <= 16'h0000;\n    else if", "if"),
     "turns that a reset leaves": (r"if \(rst\) member <= 1'h0;\n    else if", "if"),
+    "turns without a first one": (r"reg member = 1'h0", "reg member"),
     "an input of another section": (r"entry } = first \?", "entry } = ~ first ?"),
     "an output of another section": (r"o0 = section1_v1\[15:6\]", "o0 = section0_v1[15:6]"),
     "a rail of another sample": (r"status3 <= status2", "status3 <= status4"),

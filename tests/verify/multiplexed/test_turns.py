@@ -37,6 +37,11 @@ def test_samples_are_an_interval_apart(position: int, other: int, apart: bool) -
     ("pattern", "by", "sentence"),
     [
         (r"reg rest = 1'h0", "reg rest = 1'h1", "rest must be 0 before the first clock, not 1"),
+        (
+            r"rest_or_enters = rest \| enters",
+            "rest_or_enters = 1'h1",
+            "rest must be 0 after a clock with aresetn = 1, output_buffer.full = 0, rest = 0, s_axis_tvalid = 0",
+        ),
         (r"\brest\b", "pause", "the core must have a register rest"),
         (
             r"enters = s_axis_tvalid & [^;]*;",
