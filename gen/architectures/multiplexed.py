@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -11,7 +11,7 @@ from sosmith.gen.architectures.blocks import NO_LIMIT, Blocks
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.realizations.tied_formats import NONE_ALIKE
 from sosmith.gen.specification.combinations import MULTIPLEXED, PARALLEL
-from sosmith.gen.word_lengths.cost import cost_of_graphs
+from sosmith.gen.word_lengths.cost import Cost, cost_of_graphs
 from sosmith.gen.word_lengths.objective import SHARED_AREA, Objective
 from sosmith.hdl.plan.sharing.sharing import Sharing, sharing
 from sosmith.model.errors import ShortfallError
@@ -72,11 +72,17 @@ class Multiplexed(Architecture):
         """No products: all take multiplier blocks."""
         return tuple(frozenset() for _ in self.datapath.stages)
 
+    @cached_property
+    def shared_cost(self) -> Cost:
+        """Operators before synthesis, those of sections that share hardware once, and the states of all."""
+        made = cost_of_graphs(self.plan.graphs)
+        others = sum((len(unit.stages) - 1) * unit.state_bits for unit in self.plan.shared)
+        return replace(made, register_bits=made.register_bits + others)
+
     @property
     def multiplier_blocks(self) -> int:
         """Multiplier blocks that it takes: those of sections that share hardware once."""
-        shared = cost_of_graphs(self.plan.graphs).multiplications
-        return sum(product.blocks_of(self.blocks.bits) for product in shared)
+        return sum(product.blocks_of(self.blocks.bits) for product in self.shared_cost.multiplications)
 
     @property
     def _latency_cycles(self) -> int:

@@ -35,7 +35,7 @@ def _of_shared(unit: SharedSections, clocks: int, device: Device) -> Quantities:
     """Count sections that share hardware: places of the states of all but one beside what one of them has."""
     graph, count = unit.graph, len(unit.stages)
     made = of_pipelined(Pipelined.of_turn(unit, clocks), device)
-    made["registers"] += (count - 1) * sum(graph.nodes[index].width for index in graph.delays)
+    made["registers"] += (count - 1) * unit.state_bits
     made["counters"] += (count - 1).bit_length()
     made["chosen"] += graph.nodes[graph.inputs[0]].width
     changing = sum(max(each).bit_length() for each in unit.constants.values() if len(set(each)) > 1)

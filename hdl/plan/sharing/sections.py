@@ -64,6 +64,11 @@ class SharedSections:
                 break
         return spread
 
+    @property
+    def state_bits(self) -> int:
+        """Bits of the states of one section."""
+        return sum(self.graph.nodes[index].width for index in self.graph.delays)
+
     @cached_property
     def kept(self) -> frozenset[int]:
         """Nodes that stay as they are during a turn: inputs and states, and bits of them."""

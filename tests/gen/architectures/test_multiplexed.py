@@ -119,6 +119,18 @@ def test_it_takes_less_than_sections_by_themselves() -> None:
     assert shared.multiplier_blocks < alone.multiplier_blocks
 
 
+def test_the_table_counts_shared_operators_once() -> None:
+    made = sosmith.design(specification(architecture="multiplexed", realization="df1_ef2"))
+    architecture = made.core.architecture
+    rows = dict(map(tuple, made.tables()[0].rows))
+    assert rows["multipliers"] == architecture.shared_cost.multiplier_sizes
+    (unit,) = architecture.plan.shared
+    bits = f"{architecture.shared_cost.adder_bits}, {architecture.shared_cost.register_bits}"
+    assert rows["adder bits, state and register bits"] == bits
+    assert architecture.shared_cost.register_bits > 3 * unit.state_bits
+    assert architecture.shared_cost.adder_bits < architecture.cost.adder_bits
+
+
 def test_it_is_an_instrument_too() -> None:
     tree = specification().as_dict()
     tree["input"] = {

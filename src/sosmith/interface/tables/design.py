@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from sosmith.gen.architectures.architecture import Architecture
 from sosmith.gen.architectures.folded_fir import FoldedFir
+from sosmith.gen.architectures.multiplexed import Multiplexed
 from sosmith.gen.architectures.polyphase import Polyphase
 from sosmith.gen.architectures.shared_fir import SharedFir
 from sosmith.gen.core import CoreDesign
@@ -217,6 +218,8 @@ def _hardware_rows(architecture: Architecture) -> list[tuple[str, str]]:
         multipliers = f"{phases.multipliers} of {size.data.bits} x {size.factor.bits}, which take turns"
         products = f"{len(phases.steps.steps)} products for a result"
         return [latency, ("multipliers", f"{multipliers}: {products}"), ("line", f"{phases.length:,} samples")]
+    if isinstance(architecture, Multiplexed):
+        cost = architecture.shared_cost
     if program is None:
         sizes = f"{cost.adder_bits}, {cost.register_bits}"
         return [latency, ("multipliers", cost.multiplier_sizes), ("adder bits, state and register bits", sizes)]
