@@ -26,6 +26,7 @@ from __future__ import annotations
 
 import heapq
 import math
+from collections.abc import Sequence, Set
 from typing import NamedTuple
 
 from sosmith.hdl.plan.pipeline import loop_delays, operation_time, recursive
@@ -45,10 +46,15 @@ class _Term(NamedTuple):
 
 def regrouped(graph: Graph) -> Graph:
     """Return the graph with the sums in its loops regrouped; the time is that since the newest state."""
-    loops = loop_delays(graph)
-    inside = recursive(graph)
+    return with_places(graph, recursive(graph), _times(graph, loop_delays(graph)))[0]
+
+
+def with_places(graph: Graph, inside: Set[int], times: Sequence[float]) -> tuple[Graph, list[int]]:
+    """Return the graph with the sums `inside` regrouped, and where each node of the first is in it.
+
+    `times` says when the value of each node is there, in additions. A sum that is part of a larger one has none, -1.
+    """
     parts = _parts_of_sums(graph, inside)
-    times = _times(graph, loops)
     g = GraphBuilder()
     wires: list[Wire] = []
     for index, node in enumerate(graph.nodes):
@@ -62,10 +68,10 @@ def regrouped(graph: Graph) -> Graph:
             wires.append(g.copied(node, [] if node.op is Op.DELAY else [wires[i] for i in node.operands]))
     for i in graph.delays:
         g.connect(wires[i], wires[graph.nodes[i].operands[0]])
-    return g.build([wires[i] for i in graph.outputs])
+    return g.build([wires[i] for i in graph.outputs]), [int(wire) for wire in wires]
 
 
-def _parts_of_sums(graph: Graph, inside: set[int]) -> set[int]:
+def _parts_of_sums(graph: Graph, inside: Set[int]) -> set[int]:
     """Return the sums, and what states their ranges, that nothing uses but one other sum."""
     users: dict[int, list[int]] = {}
     for index, node in enumerate(graph.nodes):

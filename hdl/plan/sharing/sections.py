@@ -7,11 +7,15 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import count
 
-from sosmith.hdl.plan.pipeline import NO_LOGIC, operation_time
+from sosmith.hdl.plan.pipeline import ADDITION, NO_LOGIC, operation_time
+from sosmith.hdl.plan.regrouped_sums import with_places
 from sosmith.hdl.plan.sharing.fit import Fit, fit
 from sosmith.model.dataflow.graph import Graph, Node, Op
 from sosmith.model.dataflow.structure import Stage
 from sosmith.model.sections.start import StartStage
+
+_CHOICE = 0.5
+"""Time in additions of the choice of a section's input."""
 
 _STATES = frozenset({Op.INPUT, Op.CONSTANT, Op.DELAY})
 """What stays as it is while a section has its turn."""
@@ -127,8 +131,23 @@ def _shared(stages: tuple[Stage, ...], longest: Graph, members: Sequence[_Member
         return None
     if any(node.op is Op.TRUNCATE and not _as_long(node, nodes, members) for node in nodes):
         return None
-    states = {index: tuple(member.fit.values.get(index) for member in members) for index in longest.delays}
-    return SharedSections(stages, Graph(tuple(nodes), longest.inputs, longest.outputs), constants, states)
+    graph, places = _with_input_late(Graph(tuple(nodes), longest.inputs, longest.outputs))
+    states = {places[index]: tuple(member.fit.values.get(index) for member in members) for index in longest.delays}
+    return SharedSections(stages, graph, {places[index]: each for index, each in constants.items()}, states)
+
+
+def _with_input_late(graph: Graph) -> tuple[Graph, list[int]]:
+    """Return the graph with sums in an order that adds last what is there last, and where each node is in it.
+
+    States and constants are there from the beginning of a turn; the input is chosen first.
+    """
+    times: list[float] = []
+    for node in graph.nodes:
+        before = 0.0 if node.op in _STATES else max(times[index] for index in node.operands)
+        took = _CHOICE if node.op is Op.INPUT else operation_time(graph, node) / ADDITION
+        times.append(before + took)
+    inside = {index for index, node in enumerate(graph.nodes) if graph.concatenated(node) is None}
+    return with_places(graph, inside, times)
 
 
 def _as_long(node: Node, nodes: Sequence[Node], members: Sequence[_Member]) -> bool:

@@ -25,7 +25,7 @@ from sosmith.model.sections.start import PassingStage
 MOST_CLOCKS = 4
 """Most clocks that a turn is spread over: with more, no clock is faster."""
 
-_CHOICES = 1.2
+_CHOICES = 1.3
 """Ratio of what a clock takes where sections share hardware to what it takes where they do not, by the same operations:
 the choices between sections, and the wires to them. From placed cores of order 6 on an ECP5, 1 to 4 clocks a turn."""
 
