@@ -32,7 +32,7 @@ from sosmith.verify.graph import require
 from sosmith.verify.multiplexed.turns import REST, Turns, turns_of
 from sosmith.verify.multirate.followed import Followed
 from sosmith.verify.multirate.ring.machine import Machine, State
-from sosmith.verify.parallel.check import CLOCK, HardwareVerdict
+from sosmith.verify.parallel.check import CLOCK, PORTS, HardwareVerdict
 from sosmith.verify.parallel.control import RESET, SOURCE
 from sosmith.verify.parallel.equality import same_word
 from sosmith.verify.parallel.forms import Forms, shifted
@@ -42,7 +42,7 @@ from sosmith.verify.parallel.split import split
 from sosmith.verify.program.normal_form import Form, constant, plus
 from sosmith.verify.progress import Progress
 from sosmith.verify.reader.recursion import deep_recursion
-from sosmith.verify.reader.source import read_source
+from sosmith.verify.reader.source import read_modules
 
 _FEW_OPENED = 3
 """Most stages that are opened to say in few words what a register holds; it may stay in many."""
@@ -93,7 +93,13 @@ def check_multiplexed(text: str, certificate: Certificate, item: ItemEntry) -> M
     """
     plain = item.channels == item.samples == 1 and not item.hold
     require(plain, "sections that take turns must have one channel, and one sample a beat")
-    netlist = flattened(read_source(text, certificate.name).modules, CLOCK)
+    modules = read_modules(text, certificate.name)
+    ports = {*modules[certificate.name].ports}
+    require(ports == PORTS, f"the ports must be {', '.join(sorted(PORTS))}, not {', '.join(sorted(ports))}")
+    netlist = flattened(modules, CLOCK)
+    require(not netlist.memories, "the core must have no memory")
+    for name, register in netlist.registers.items():
+        require(register.first is not None, f"{name} must have a value before the first clock")
     with deep_recursion():
         netlist.inlets |= {name for name in netlist.widths if name.endswith(_ENTRY)}
         graph = GraphCodes(certificate, Forms())
@@ -166,6 +172,8 @@ class _Check(Followed):
         if not at_inlet or short is not word or not values or len(values) < len(word):
             return short
         zeros = min((value & -value).bit_length() - 1 for value in values)
+        if zeros >= width:
+            return word
         code = {monomial: int(value) >> zeros for monomial, value in word.items()}
         shortest = self.graph.shortened(code, width - zeros, at_inlet)
         return word if shortest is code else shifted(shortest, zeros)
@@ -181,7 +189,6 @@ class _Check(Followed):
         """Check that registers keep what they hold while the pipeline stands, or no sample is where it loads them."""
         full, valid = self.buffer.full, self._turns.valid
         self.check_kept(self._inside, {full: constant(1)}, "while the pipeline stands")
-        require(not self.netlist.memories.keys() & self._written(), "the core must have no memory that is written")
         for positions in sorted(set(self._positions.values()) - {()}):
             interval = self._turns.interval
             names = {name for name, own in self._positions.items() if own == positions}
@@ -193,9 +200,6 @@ class _Check(Followed):
             for rest in range(1, interval) if source else ():  # one that is offered does not enter
                 self.check_kept(names, {**empty, REST: constant(rest)}, "while no sample may enter")
 
-    def _written(self) -> set[str]:
-        return {name for name, memory in self.netlist.memories.items() if memory.statements}
-
     def _check_reset(self) -> None:
         """Check that states are 0 before the first sample."""
         for name in self._states:
@@ -204,10 +208,8 @@ class _Check(Followed):
 
     def _is_reset(self, name: str) -> bool:
         """Whether a register holds after a reset what it does before the first clock, and is loaded by samples."""
-        first, width = self.netlist.registers[name].first, self.netlist.widths[name]
-        if first is None or not self._positions[name]:
-            return False
-        return same_word(self.forms, self.after_reset(name), constant(first), width)
+        first, width = self.netlist.registers[name].first or 0, self.netlist.widths[name]
+        return self._positions[name] != () and same_word(self.forms, self.after_reset(name), constant(first), width)
 
     # What they hold.
 
@@ -247,8 +249,10 @@ class _Check(Followed):
 
     def _lasts(self, name: str) -> bool:
         """Whether samples load a register once each, and with the same from the first one on."""
-        once = len(self._positions[name]) == 1 and name in self._states
-        return once and self.graph.lasts(self.graph.origin(self._states[name])[0])
+        if len(self._positions[name]) != 1 or name not in self._states:
+            return False
+        node, ago = self.graph.origin(self._states[name])
+        return ago == 1 and self.graph.lasts(node)
 
     def _begun(self, constants: Set[str], position: int) -> dict[str, Form]:
         """Return what the sample before has left in registers which it has passed for good with this position."""

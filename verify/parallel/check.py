@@ -47,9 +47,11 @@ from sosmith.verify.reader.syntax import Module
 
 CLOCK = "aclk"
 OUTPUT, FLAGS, OUTPUT_DEST = "m_axis_tdata", "m_axis_tuser", "m_axis_tdest"
-_PORTS = frozenset(
+PORTS = frozenset(
     {CLOCK, "aresetn", DATA, "s_axis_tvalid", "s_axis_tready", OUTPUT, FLAGS, "m_axis_tvalid", "m_axis_tready"}
 )
+"""Ports of a core for one channel."""
+
 _FLAG_BITS = 8
 
 
@@ -160,7 +162,7 @@ def check_modules(
 ) -> HardwareVerdict:
     """Prove what modules compute, the top first; the rest is as of `check_hardware`."""
     ports = set(next(iter(modules.values())).ports)
-    wanted = _PORTS if channels == 1 else _PORTS | {DEST, OUTPUT_DEST}
+    wanted = PORTS if channels == 1 else PORTS | {DEST, OUTPUT_DEST}
     require(ports == wanted, f"the ports must be {', '.join(sorted(wanted))}, not {', '.join(sorted(ports))}")
     with deep_recursion():
         return _checked(flattened(modules, CLOCK), certificate, channels, inside)

@@ -276,6 +276,9 @@ class Search:
         def content(name: str) -> Form:
             if name in case:
                 return constant(case[name])
+            register = self._netlist.registers.get(name)
+            known = register is None or register.first is not None
+            require(known, f"{name} must have a value before the first clock, as it counts for what moves")
             return forms.variable(name, 0, (1 << self._netlist.widths[name]) - 1)
 
         return forms, Evaluation(self._netlist, forms, content, cuts=self._cuts)

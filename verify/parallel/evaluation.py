@@ -119,17 +119,21 @@ class Evaluation:
             self._open.discard(key)
         return self._known[key]
 
-    def loaded(self, statements: Sequence[Statement]) -> tuple[Expression, Form] | None:
+    def loaded(
+        self, statements: Sequence[Statement], before: tuple[Expression, Form] | None = None
+    ) -> tuple[Expression, Form] | None:
         """Return what statements load, as target and word; None if nothing is loaded.
+
+        `before` is what statements before them load, which counts where these load nothing.
 
         Raises
         ------
         RejectedError
             If it depends on data whether anything is loaded, or words at two places are.
         """
-        load: tuple[Expression, Form] | None = None
+        load = before
         for statement in statements:
-            loaded = self._executed(statement)
+            loaded = self._executed(statement, load)
             if load is not None and loaded is not None and load[0] != loaded[0]:
                 raise RejectedError("it must not be loaded at two places at a clock")
             load = loaded or load
@@ -143,14 +147,14 @@ class Evaluation:
         """Return the product of two forms."""
         return self._forms.times(a, b)
 
-    def _executed(self, statement: Statement) -> tuple[Expression, Form] | None:
+    def _executed(self, statement: Statement, before: tuple[Expression, Form] | None) -> tuple[Expression, Form] | None:
         if isinstance(statement, Load):
             return statement.target, self._extended(statement.value, self._netlist.width(statement.target))
         assert isinstance(statement, Choice)
         select = self._any(statement.condition)
         if not select.keys() - {ONE}:
-            return self.loaded(statement.yes if select else statement.no)
-        yes, no = self.loaded(statement.yes), self.loaded(statement.no)
+            return self.loaded(statement.yes if select else statement.no, before)
+        yes, no = self.loaded(statement.yes, before), self.loaded(statement.no, before)
         if yes is None and no is not None and isinstance(no[0], Bits):
             yes = no[0], self.word(no[0])  # it keeps what it holds
         if no is None and yes is not None and isinstance(yes[0], Bits):

@@ -87,7 +87,10 @@ def _parsed(text: str, top: str | None, unknowns: bool) -> Source:
     _check_tree(modules, top)
     _check_size(modules, top)
     for name, module in modules.items():
-        _check_nets(name, module, modules)
+        try:
+            _check_nets(name, module, modules)
+        except RecursionError:
+            raise RejectedError(f"expressions and statements of {name} must not be nested as deep as that") from None
     _check_clocks(modules, top)
     rest = {name: module.copy() for name, module in modules.items() if name != top}
     return Source("".join(f"{line}\n" for line in printed), {top: modules[top], **rest})
