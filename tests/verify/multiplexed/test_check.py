@@ -10,6 +10,7 @@ from tests.verify.multiplexed.small_cores import CASES, made
 from tests.verify.multirate.single_cores import Made, changed, rejected, rejection
 from tests.verify.parallel.simulated import outputs
 
+from sosmith.verify.certificate_file import Operation
 from sosmith.verify.graph import RejectedError
 from sosmith.verify.multiplexed.check import check_multiplexed
 from sosmith.verify.verification import verify
@@ -131,12 +132,32 @@ def first_inverted_for_a_while() -> tuple[Made, str]:
     )
 
 
+def loaded_twice() -> tuple[Made, str]:
+    """Load whether a sample is inside twice at a clock, the second time only where the data say so."""
+    core = made("from zero")
+    own = "    if (!aresetn) i_valid <= 1'h0;\n    else if (advance) i_valid <= enters;\n"
+    twice = "    i_valid <= forged_0;\n    if (forged_1) i_valid <= forged_2;\n  end\n"
+    nets = (
+        "  assign forged_0 = ~ i_valid;\n  assign wanted = advance ? enters : i_valid;\n"
+        "  assign forged_2 = & { aresetn, wanted };\n  assign forged_other = wanted != i_valid;\n"
+        "  assign forged_1 = | { rst, forged_other, s_axis_tdata[0] };\n"
+    )
+    declared = "".join(f"  wire {name};\n" for name in ("forged_0", "forged_1", "forged_2", "forged_other", "wanted"))
+    text = changed(
+        core.text, re.escape(f"always_ff @(posedge aclk)\n{own}"), f"always_ff @(posedge aclk) begin\n{twice}"
+    )
+    return core, changed(
+        changed(text, "  wire not_rest;\n", f"  wire not_rest;\n{declared}"), "  assign rst =", f"{nets}  assign rst ="
+    )
+
+
 FORGED = (
     kept_while_one_is_offered,
     started_again,
     counted_at_the_end,
     a_turn_at_the_end,
     first_inverted_for_a_while,
+    loaded_twice,
 )
 
 
@@ -146,6 +167,110 @@ def test_what_is_forged_by_hand_is_found(forged: Callable[[], tuple[Made, str]])
     core, text = forged()
     assert any(outputs(core.text, 600, seed) != outputs(text, 600, seed) for seed in range(4))
     assert " must " in rejection(check_multiplexed, core, text)
+
+
+def with_flag(text: str, declared: str, nets: str) -> str:
+    """Let a net `odd` mark results as saturated, too."""
+    own = "  assign o_saturated_next = |"
+    nets = f"{nets}  assign o_saturated_next = | {{ odd, others }};\n  assign others = |"
+    return in_module(text, "output_stage", f"  wire odd;\n  wire others;\n{declared}", (own, nets))
+
+
+def delayed_port(port: str, declared: str, first: str) -> str:
+    """Give a port another name, and its own name to a register behind it."""
+    text = re.sub(rf"(module turns\([^;]*?){port}", r"\1other", made().text, count=1)
+    behind = f"  input {declared}other;\n  wire {declared}other;\n  reg {declared}{port} = {first};\n"
+    text = changed(text, re.escape(f"  input {declared}{port};\n  wire {declared}{port};\n"), behind)
+    process = "  always_ff @(posedge aclk)\n"
+    return text.replace(process, f"{process}    if (advance) {port} <= other;\n{process}", 1)
+
+
+_PORTS = "aclk, aresetn, m_axis_tdata, m_axis_tready, m_axis_tuser, m_axis_tvalid, s_axis_tdata"
+_PORTS += ", s_axis_tready, s_axis_tvalid"
+_OTHER_VALID = ", ".join(sorted(_PORTS.replace("s_axis_tvalid", "other").split(", ")))
+
+_REFUSED: dict[str, tuple[Callable[[], str], str]] = {
+    "a register of a port's name, data": (
+        lambda: delayed_port("s_axis_tdata", "[7:0] ", "8'h00"),
+        f"the ports must be {_PORTS}, not {_PORTS.replace('s_axis_tdata', 'other')}",
+    ),
+    "a register of a port's name, valid": (
+        lambda: delayed_port("s_axis_tvalid", "", "1'h0"),
+        f"the ports must be {_PORTS}, not {_OTHER_VALID}",
+    ),
+    "a number of x": (
+        lambda: with_flag(made().text, "  wire u;\n", "  assign u = 1'hx;\n  assign odd = u & u;\n"),
+        "the SystemVerilog must have a number with its width after 'any_rounded_7_6_2 ; assign u =', not \"1'hx\"",
+    ),
+    "a register without a first value": (
+        lambda: with_flag(
+            made().text, "  reg u;\n", "  always_ff @(posedge clk)\n    u <= u;\n  assign odd = u & u;\n"
+        ),
+        "output_stage.u must have a value before the first clock",
+    ),
+    "a memory": (
+        lambda: with_flag(
+            made().text,
+            "  reg [0:0] m [1:0];\n  initial begin\n    m[0] = 1'h0;\n    m[1] = 1'h0;\n  end\n",
+            "  assign odd = m[code_register[0]];\n",
+        ),
+        "the core must have no memory",
+    ),
+}
+
+
+@pytest.mark.parametrize(("text", "sentence"), _REFUSED.values(), ids=_REFUSED)
+def test_what_a_core_may_not_have(text: Callable[[], str], sentence: str) -> None:
+    core = made()
+    assert rejection(check_multiplexed, core, text()) == sentence
+
+
+def test_the_entry_of_another_hardware_may_be_narrower_than_the_power_of_two_in_its_word() -> None:
+    core = made("from zero")
+    nets = "  assign wide = counted * 8'h04;\n  assign entry = wide[0];\n  assign odd = entry;\n"
+    text = with_flag(core.text, "  wire [7:0] wide;\n  wire entry;\n", nets)
+    assert outputs(core.text, 600, 0) == outputs(text, 600, 0)
+    assert rejection(check_multiplexed, core, text) == ""
+
+
+def test_what_is_right_from_the_second_sample_on_only_is_found() -> None:
+    """A certificate may have a 1 of two samples ago, which is 0 for two samples; nobody else uses it."""
+    core = made("from zero")
+    stage = core.certificate.stages[0]
+    one = len(stage.nodes)
+    delay = {"op": Operation.DELAY, "frac": 0, "low": 0, "high": 1, "parameter": 0, "parameter_frac": 0}
+    more = (
+        delay | {"op": Operation.CONSTANT, "operands": (), "low": 1, "parameter": 1, "name": "one"},
+        delay | {"operands": (one,), "name": "s1"},
+        delay | {"operands": (one + 1,), "name": "s2"},
+    )
+    nodes = (*stage.nodes, *(stage.nodes[0].model_copy(update=node) for node in more))
+    stages = (stage.model_copy(update={"nodes": nodes}), *core.certificate.stages[1:])
+    certificate = core.certificate.model_copy(update={"stages": stages})
+    assert verify(certificate).bound == core.certificate.claims.bound
+
+    process = "  always_ff @(posedge aclk)\n"
+    behind = [("section0_s1", "b1"), ("b1", "b2"), ("b2", "b3")]
+    loads = "".join(
+        f"{process}    if (!aresetn) section0_{name} <= 1'h0;\n    else if (kept_load) section0_{name} <= {value};\n"
+        for name, value in (("s1", "1'h1"), ("s2", "section0_s1"))
+    ) + "".join(f"{process}    if (advance) {later} <= {earlier};\n" for earlier, later in behind)
+    registers = "".join(f"  reg {name} = 1'h0;\n" for name in ("section0_s1", "section0_s2", "b1", "b2", "b3"))
+    text = changed(core.text, "  wire not_rest;\n", f"  wire not_rest;\n{registers}").replace(
+        process, f"{loads}{process}", 1
+    )
+    check_multiplexed(text, certificate, core.item)
+    forged = with_input(with_input(text, "output_stage", "b3", "b3"), "output_stage", "s2", "section0_s2")
+    forged = in_module(
+        forged,
+        "output_stage",
+        "  wire odd;\n  wire [6:0] more;\n",
+        ("else code_register <= code_register_next[6:0];", "else code_register <= more;"),
+        ("", "  assign odd = b3 ? 1'h0 : s2;\n  assign more = code_register_next[6:0] + { 6'h00, odd };\n"),
+    )
+    assert any(outputs(text, 600, seed) != outputs(forged, 600, seed) for seed in range(6))
+    with pytest.raises(RejectedError, match=r" must "):
+        check_multiplexed(forged, certificate, core.item)
 
 
 @pytest.mark.parametrize("source", ["m_axis_tready", "s_axis_tdata[0]", "aresetn", "rest"])

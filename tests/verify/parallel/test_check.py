@@ -6,6 +6,7 @@ import pytest
 from tests.gen.designs import ALL, parallel_design
 from tests.verify.parallel.cores import ODD, Made, made, small, specified
 from tests.verify.parallel.rejections import NODE, rejection, sweep
+from tests.verify.parallel.simulated import outputs
 from tests.verify.small_specifications import INSTRUMENT, PLAIN, STEADY_INSTRUMENT, UNSIGNED
 
 from sosmith.gen.core import design_core
@@ -340,6 +341,44 @@ def test_what_no_node_says_is_checked(old: str, new: str, sentence: str) -> None
 def test_a_text_that_asks_for_much_is_refused(old: str, new: str, sentence: str) -> None:
     core = small()
     assert re.fullmatch(sentence, rejection(core, core.text.replace(old, new, 1)))
+
+
+def in_buffer(text: str, declared: str, old: str, new: str, nets: str = "") -> str:
+    """Change the output buffer of a core: declarations after its header, a text in it, and what comes at its end."""
+    start = text.index("module plain_output_buffer(")
+    end = text.index("endmodule", start)
+    head, body = text[start:end].split(";", 1)
+    assert body.count(old) == 1
+    return f"{text[:start]}{head};\n{declared}{body.replace(old, new)}{nets}{text[end:]}"
+
+
+def test_of_two_loads_at_a_clock_the_first_one_counts_where_data_leave_out_the_second() -> None:
+    core = small()
+    own = "  always_ff @(posedge clk)\n    if (full_reset) full <= 1'h0;\n    else if (!full) full <= i_valid;\n"
+    names = ("filled", "wanted", "inverted", "changes", "stay", "load")
+    nets = (
+        "  assign filled = full | i_valid;\n  assign stay = ~ full_reset;\n  assign wanted = & { stay, filled };\n"
+        "  assign inverted = ~ full;\n  assign changes = wanted != full;\n"
+        "  assign load = | { rst, changes, output_stage_code[0] };\n"
+        "  always_ff @(posedge clk) begin\n    full <= inverted;\n    if (load) full <= wanted;\n  end\n"
+    )
+    text = in_buffer(core.text, "".join(f"  wire {name};\n" for name in names), own, nets)
+    assert outputs(core.text, 400, 0) != outputs(text, 400, 0)
+    assert re.fullmatch(r"output_buffer\.full must be 0 after a clock with .*", rejection(core, text))
+
+
+def test_control_without_a_first_value_is_refused() -> None:
+    core = small()
+    text = in_buffer(
+        core.text,
+        "  reg u;\n  wire not_u;\n  wire odd;\n  wire next_or_odd;\n",
+        "o_valid <= o_valid_next;",
+        "o_valid <= next_or_odd;",
+        "  always_ff @(posedge clk)\n    u <= u;\n  assign not_u = ~ u;\n  assign odd = u & not_u;\n"
+        "  assign next_or_odd = o_valid_next | odd;\n",
+    )
+    sentence = "output_buffer.u must have a value before the first clock, as it counts for what moves"
+    assert rejection(core, text) == sentence
 
 
 def test_without_wear_its_flags_are_0() -> None:

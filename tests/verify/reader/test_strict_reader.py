@@ -262,8 +262,9 @@ def test_a_second_block_of_words_counts() -> None:
 
 
 def test_neither_depth_nor_size_ends_in_a_traceback() -> None:
-    deep = "{ " * 3000 + "a" + " }" * 3000
-    refused(edited("a + held", deep), "^expressions and statements of top must not be nested as deep as that$")
+    for depth in (3000, 900, 600):
+        deep = "{ " * depth + "a" + " }" * depth
+        refused(edited("a + held", deep), "^expressions and statements of top must not be nested as deep as that$")
     refused(
         edited("    if (a[0]) held <= n1;", "    " + "if (a[0]) " * 3000 + "held <= n1;"),
         "^statements of top must not be nested as deep as that$",
