@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import pytest
 
 import sosmith
@@ -43,8 +45,13 @@ def test_sections_of_which_none_share_are_refused_before_their_formats_are_chose
         check_that_some_share((LOW, FIRST), "df1")
 
 
+def own_feedback(row: tuple[float, ...]) -> tuple[int, int]:
+    """Return the error feedback that is best for a section by itself."""
+    return best_feedback((Fraction(row[4]), Fraction(row[5])), (-2, 1), 2)
+
+
 def test_sections_that_stand_together_have_one_error_feedback() -> None:
-    low, middle = (best_feedback((row[4], row[5]), (-2, 1), 2) for row in (LOW, MIDDLE))  # type: ignore[arg-type]
+    low, middle = (own_feedback(row) for row in (LOW, MIDDLE))
     assert low != middle
     rows = standing_together((LOW, MIDDLE), "df1_ef2")
     assert all(isinstance(row, TiedRow) for row in rows)
@@ -54,7 +61,7 @@ def test_sections_that_stand_together_have_one_error_feedback() -> None:
 
 
 def test_the_common_feedback_is_the_best_of_one() -> None:
-    assert common_feedback((LOW,), 2) == best_feedback((LOW[4], LOW[5]), (-2, 1), 2)  # type: ignore[arg-type]
+    assert common_feedback((LOW,), 2) == own_feedback(LOW)
     assert common_feedback((LOW, LOW), 2) == common_feedback((LOW,), 2)
 
 
