@@ -32,7 +32,7 @@ from sosmith.verify.graph import require
 from sosmith.verify.multiplexed.turns import REST, Turns, turns_of
 from sosmith.verify.multirate.followed import Followed
 from sosmith.verify.multirate.ring.machine import Machine, State
-from sosmith.verify.parallel.check import CLOCK, PORTS, HardwareVerdict
+from sosmith.verify.parallel.check import CLOCK, HardwareVerdict, check_ports
 from sosmith.verify.parallel.control import RESET, SOURCE
 from sosmith.verify.parallel.equality import same_word
 from sosmith.verify.parallel.forms import Forms, shifted
@@ -94,8 +94,7 @@ def check_multiplexed(text: str, certificate: Certificate, item: ItemEntry) -> M
     plain = item.channels == item.samples == 1 and not item.hold
     require(plain, "sections that take turns must have one channel, and one sample a beat")
     modules = read_modules(text, certificate.name)
-    ports = {*modules[certificate.name].ports}
-    require(ports == PORTS, f"the ports must be {', '.join(sorted(PORTS))}, not {', '.join(sorted(ports))}")
+    check_ports(modules)
     netlist = flattened(modules, CLOCK)
     require(not netlist.memories, "the core must have no memory")
     for name, register in netlist.registers.items():

@@ -47,11 +47,9 @@ from sosmith.verify.reader.syntax import Module
 
 CLOCK = "aclk"
 OUTPUT, FLAGS, OUTPUT_DEST = "m_axis_tdata", "m_axis_tuser", "m_axis_tdest"
-PORTS = frozenset(
+_PORTS = frozenset(
     {CLOCK, "aresetn", DATA, "s_axis_tvalid", "s_axis_tready", OUTPUT, FLAGS, "m_axis_tvalid", "m_axis_tready"}
 )
-"""Ports of a core for one channel."""
-
 _FLAG_BITS = 8
 
 
@@ -157,13 +155,24 @@ class Inside:
     lanes: int = 1
 
 
+def check_ports(modules: Mapping[str, Module], channels: int = 1) -> None:
+    """Check that the first of some modules has the ports of a core, and no others.
+
+    Raises
+    ------
+    RejectedError
+        If it has not.
+    """
+    ports = set(next(iter(modules.values())).ports)
+    wanted = _PORTS if channels == 1 else _PORTS | {DEST, OUTPUT_DEST}
+    require(ports == wanted, f"the ports must be {', '.join(sorted(wanted))}, not {', '.join(sorted(ports))}")
+
+
 def check_modules(
     modules: Mapping[str, Module], certificate: Certificate, channels: int, inside: Inside
 ) -> HardwareVerdict:
     """Prove what modules compute, the top first; the rest is as of `check_hardware`."""
-    ports = set(next(iter(modules.values())).ports)
-    wanted = PORTS if channels == 1 else PORTS | {DEST, OUTPUT_DEST}
-    require(ports == wanted, f"the ports must be {', '.join(sorted(wanted))}, not {', '.join(sorted(ports))}")
+    check_ports(modules, channels)
     with deep_recursion():
         return _checked(flattened(modules, CLOCK), certificate, channels, inside)
 

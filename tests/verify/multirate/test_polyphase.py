@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 
 import pytest
@@ -130,3 +131,20 @@ def test_what_it_is_not_for(change: dict[str, object]) -> None:
     sentence = r"^a filter that takes a sample at each clock must have one channel, and hold no results$"
     with pytest.raises(RejectedError, match=sentence):
         check_polyphase(core.text, core.certificate, core.item.model_copy(update=change))
+
+
+@pytest.mark.parametrize(
+    ("port", "bits", "first"), [("s_axis_tdata", "[7:0] ", "8'h00"), ("s_axis_tvalid", "", "1'h0")]
+)
+def test_a_register_is_not_taken_for_a_port_of_its_name(port: str, bits: str, first: str) -> None:
+    core = made()
+    text = changed(core.text, rf"(module little\([^;]*?){port}", r"\1other")
+    text = changed(
+        text,
+        rf"  input {re.escape(bits)}{port};\n  wire {re.escape(bits)}{port};\n",
+        f"  input {bits}other;\n  wire {bits}other;\n  reg {bits}{port} = {first};\n",
+    )
+    process = "  always_ff @(posedge aclk)\n"
+    text = text.replace(process, f"{process}    {port} <= other;\n{process}", 1)
+    with pytest.raises(RejectedError, match=r"^the ports must be aclk, aresetn, .*, not .*other.*$"):
+        check_polyphase(text, core.certificate, core.item)

@@ -32,14 +32,14 @@ from sosmith.verify.multirate.followed import Followed
 from sosmith.verify.multirate.logic import Logic, Part, check_parts
 from sosmith.verify.multirate.ring.machine import State
 from sosmith.verify.multirate.ring.verdict import RingVerdict
-from sosmith.verify.parallel.check import CLOCK
+from sosmith.verify.parallel.check import CLOCK, check_ports
 from sosmith.verify.parallel.control import RESET, SINK, Buffer, Search
 from sosmith.verify.parallel.graph_codes import DATA
 from sosmith.verify.parallel.netlist import Netlist, flattened
 from sosmith.verify.parallel.split import split
 from sosmith.verify.program.normal_form import Form, constant, plus
 from sosmith.verify.progress import Progress
-from sosmith.verify.reader.source import read_source
+from sosmith.verify.reader.source import read_modules
 
 _WHOLE = re.compile(r"(?:sum|comb|difference|line|phase)\d+|left|phase|filled|total")
 """Registers that stay whole, whatever they take over."""
@@ -71,7 +71,9 @@ def decimating_netlist(text: str, certificate: Certificate, item: ItemEntry) -> 
         item.channels == 1 and not item.hold,
         "a filter that takes a sample at each clock must have one channel, and hold no results",
     )
-    return flattened(read_source(text, certificate.name).modules, CLOCK)
+    modules = read_modules(text, certificate.name)
+    check_ports(modules)
+    return flattened(modules, CLOCK)
 
 
 class ResultCheck(Followed, ABC):
