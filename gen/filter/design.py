@@ -102,8 +102,8 @@ class Filter:
 
     @cached_property
     def impulse_response(self) -> Array:
-        """Impulse response, until it has decayed below 1e-12 of its envelope."""
-        return impulse_response(self.sos)
+        """Impulse response, until it has decayed below 1e-12 of its envelope, whatever the order of the sections."""
+        return impulse_response(np.array(sorted(self.rows), dtype=np.float64))
 
     @property
     def dc_gain(self) -> float:

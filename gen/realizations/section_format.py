@@ -11,6 +11,13 @@ from sosmith.model.dataflow.graph import Range
 WIDE = 1 << 256
 """Placeholder limit of a code whose range is not known yet; never used in hardware."""
 
+MIN_BITS = 4
+"""Significant bits of a coefficient at which the search starts."""
+
+MAX_BITS = 40
+"""Largest number of significant bits of a coefficient, and of fraction bits of a signal, that is tried. No useful
+design needs more."""
+
 
 def unknown_range(frac: int) -> Range:
     """Return the range of a signal for which only the fraction bits are known."""

@@ -9,9 +9,8 @@ from fractions import Fraction
 from sosmith.gen.filter.design import Filter
 from sosmith.gen.proof.cascade_proof import CascadeProof, coefficient_extent, rounding_gains
 from sosmith.gen.realizations.registry import Section
-from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
+from sosmith.gen.realizations.section_format import MAX_BITS, MIN_BITS, SectionFormat, unknown_range
 from sosmith.gen.realizations.tied_formats import groups_of, with_the_most
-from sosmith.gen.word_lengths.bit_limits import MAX_BITS, MIN_BITS
 from sosmith.gen.word_lengths.cascade import cascade, parts_of, stages_of, unquantized
 from sosmith.model.dataflow.graph import Range
 from sosmith.model.errors import ShortfallError

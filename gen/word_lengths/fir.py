@@ -21,8 +21,7 @@ from sosmith.gen.proof.cascade_proof import CascadeProof
 from sosmith.gen.realizations.coefficients import lowest_terms, with_fewer_digits
 from sosmith.gen.realizations.fir import Coefficient, coefficients_of, on_grid
 from sosmith.gen.realizations.registry import Section
-from sosmith.gen.realizations.section_format import SectionFormat
-from sosmith.gen.word_lengths.bit_limits import MAX_BITS
+from sosmith.gen.realizations.section_format import MAX_BITS, SectionFormat
 from sosmith.gen.word_lengths.cascade import cascade
 from sosmith.model.dataflow.adder_graph import signed_digits
 from sosmith.model.dataflow.graph import Range

@@ -12,7 +12,7 @@ from fractions import Fraction
 
 from sosmith.gen.proof.polynomial_error import horner_error, rounded
 from sosmith.gen.realizations.coefficients import lowest_terms
-from sosmith.gen.word_lengths.bit_limits import MAX_BITS
+from sosmith.gen.realizations.section_format import MAX_BITS
 from sosmith.model.dataflow.graph import Range
 from sosmith.model.dataflow.structure import Stage
 from sosmith.model.errors import ShortfallError

@@ -16,12 +16,12 @@ from functools import cached_property, lru_cache
 from typing import cast
 
 from sosmith.gen.filter.design import Filter
+from sosmith.gen.filter.sections import Row
 from sosmith.gen.proof.cascade_proof import CascadeProof, ideal_gain
 from sosmith.gen.realizations.kept_formats import Choice, choice_of_tree, kept_or_made, tree_of_choice
 from sosmith.gen.realizations.registry import REALIZATIONS, Section, realization_of
-from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
+from sosmith.gen.realizations.section_format import MAX_BITS, SectionFormat, unknown_range
 from sosmith.gen.realizations.tied_formats import check_that_some_share, standing_together
-from sosmith.gen.word_lengths.bit_limits import MAX_BITS
 from sosmith.gen.word_lengths.cascade import cascade, parts_of, stages_of, unquantized
 from sosmith.gen.word_lengths.equal_shares import equally_shared
 from sosmith.gen.word_lengths.fir import fir_stages
@@ -74,6 +74,8 @@ class Plan:
         Once formats are trimmed, others to fall back on if the whole does not suit.
     loads : bool
         Whether other coefficients can be loaded.
+    otherwise : Plan or None
+        The same with its sections in another order, to fall back on if the proof of this one makes it larger.
     """
 
     name: str
@@ -93,6 +95,7 @@ class Plan:
     quantized: Quantized | None = None
     instead: tuple[Choice, ...] = ()
     loads: bool = False
+    otherwise: Plan | None = None
 
     @property
     def allowed(self) -> Fraction:
@@ -123,7 +126,8 @@ class Plan:
         if self.search is None or self.ideal is None:
             return None
         ports, asked = (*self.inputs, self.output), (self.max_error, self.polynomial, self.ideal.exact)
-        return self.search.key, self.start, self.instead, ports, asked, self.steady
+        before = None if self.otherwise is None else self.otherwise.key
+        return self.search.key, self.start, self.instead, ports, asked, self.steady, before
 
     @property
     def is_long(self) -> bool:
@@ -137,6 +141,19 @@ class Plan:
         other = replace(self, search=search, objective=objective)
         by_taps = self.ideal is not None and self.ideal.is_fir
         return replace(other, quantized=_by_taps(other)) if by_taps and objective != self.objective else other
+
+    def with_rows(self, rows: tuple[Row, ...], formats: Choice) -> Plan:
+        """Return the same plan for sections in another order.
+
+        It starts from `formats` if these keep to the error allowed in that order too, else from equal shares.
+        """
+        assert self.ideal is not None
+        ideal = replace(self.ideal, rows=rows)
+        stages = parts_of(ideal, self.realization)
+        search = Search(stages, self.realization, self.input_stages, self.gain, steady=self.steady)
+        search = search.under(self.objective)
+        start = formats if search.error(formats) <= float(self.allowed) else _start(search, float(self.share))
+        return replace(self, ideal=ideal, search=search, start=start, instead=())
 
     def trimmed(self) -> Plan:
         """Return a copy with formats trimmed until no step saves any more."""
@@ -303,6 +320,8 @@ def prove(planned: Plan) -> Quantized:
     ShortfallError
         If no formats within the limits keep to the error allowed.
     """
+    if planned.otherwise is not None:
+        return _smaller_of_two(planned, planned.otherwise)
     if planned.quantized is not None:
         return planned.quantized
     ideal, search, start = planned.ideal, planned.search, planned.start
@@ -333,6 +352,19 @@ def prove(planned: Plan) -> Quantized:
             allowed -= max(2 * excess / planned.output.lsb, allowed / 64)
             choice = search.trimmed(search.start(float(planned.share), MAX_BITS) or start, float(allowed))
     return _equally_shared(planned, ideal)
+
+
+def _smaller_of_two(planned: Plan, otherwise: Plan) -> Quantized:
+    """Prove a plan, and the other one if the first is not smaller once it is proven."""
+    of_datapath = planned.objective.of_datapath
+    try:
+        quantized = prove(replace(planned, otherwise=None))
+    except ShortfallError:
+        return prove(otherwise)
+    if of_datapath(quantized.datapath) < otherwise.size:
+        return quantized
+    other = prove(otherwise)
+    return min(quantized, other, key=lambda each: of_datapath(each.datapath))
 
 
 def _equally_shared(planned: Plan, ideal: Filter) -> Quantized:

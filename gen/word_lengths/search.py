@@ -29,9 +29,8 @@ import numpy as np
 from sosmith.gen.realizations.coefficients import lowest_terms, round_significant, with_fewer_digits
 from sosmith.gen.realizations.kept_formats import Choice
 from sosmith.gen.realizations.registry import realization_of
-from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
+from sosmith.gen.realizations.section_format import MIN_BITS, SectionFormat, unknown_range
 from sosmith.gen.realizations.tied_formats import Group, groups_of, tied_start, tied_step
-from sosmith.gen.word_lengths.bit_limits import MIN_BITS
 from sosmith.gen.word_lengths.cost import MULTIPLIER_BITS
 from sosmith.gen.word_lengths.estimates import Array, Estimate, estimates_of, largest_magnitude
 from sosmith.gen.word_lengths.input_stage import InputStage

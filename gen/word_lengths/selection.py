@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 
 from sosmith.gen.realizations.kept_formats import kept_or_made
 from sosmith.gen.realizations.registry import BEST_KEPT, REALIZATIONS, realizations_for
+from sosmith.gen.word_lengths.exchanges import in_better_order, may_be_ordered
 from sosmith.gen.word_lengths.objective import Objective
 from sosmith.gen.word_lengths.quantize import Plan, prove
 from sosmith.gen.word_lengths.quantized import Quantized
@@ -62,6 +63,7 @@ class Selection:
         self._key = key
         self._plans: dict[str, Plan] = {}
         self._trimmed: set[str] = set()
+        self._ordered: set[str] = set()
         self._proven: dict[str, Quantized] = {}
         self._failures: dict[str, str] = {}
         self._sizes: dict[str, float] = {}
@@ -80,6 +82,7 @@ class Selection:
         if name in self._failures:
             raise ShortfallError(self._failures[name])
         self._trim(name)
+        self._order(name)
         return self._prove(name)
 
     def cheapest(self) -> tuple[Quantized, str]:
@@ -160,6 +163,7 @@ class Selection:
         for name in sorted(names, key=self._size):
             if best is not None and self._size(name) >= best[0]:
                 break
+            self._order(name)
             try:
                 size = self._sizes[name] = self._size_once_proven(name)
             except ShortfallError as error:
@@ -203,6 +207,7 @@ class Selection:
         for known in (self._plans, self._failures, self._sizes):
             known.clear()
         self._trimmed.clear()
+        self._ordered.clear()
 
     def _reason(self, quantized: Quantized, failures: set[str], unsuited: set[str], dropped: list[str]) -> str:
         short = {*failures, *(name for name in self._plans if self._size(name) == math.inf)}
@@ -244,6 +249,13 @@ class Selection:
         self._progress(f"trimming, {name}")
         self._plans[name] = self._plans[name].trimmed()
         self._trimmed.add(name)
+
+    def _order(self, name: str) -> None:
+        """Exchange sections of a trimmed plan where that makes it smaller."""
+        if name not in self._ordered and may_be_ordered(self._plans[name]):
+            self._progress(f"order of sections, {name}")
+            self._plans[name] = in_better_order(self._plans[name])
+            self._ordered.add(name)
 
     def _prove(self, name: str) -> Quantized:
         if name in self._failures:

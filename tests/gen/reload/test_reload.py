@@ -183,7 +183,7 @@ def test_the_parallel_bank_holds_the_constants() -> None:
         for name, (integer, _) in section.coefficients.items()
     }
     assert values == expected
-    with pytest.raises(ShortfallError, match=r"^the set must fit the hardware: section1.product_A2 must fit 18 bits, "):
+    with pytest.raises(ShortfallError, match=r"^the set must fit the hardware: section1.product_A2 must fit 20 bits, "):
         other_set(hardware, ideal=moved(hardware, "2"), max_error=Fraction(1, 1000))
 
 

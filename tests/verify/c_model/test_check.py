@@ -83,7 +83,7 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Model]:
         path = folder / f"{name}.toml"
         words = FIXED.replace("df1_ef1", REALIZATIONS.get(name, "df1_ef1"))
         text = TEXTS[name]
-        words = words.replace("parallel", "folded") if name == "ring" else words
+        words = words.replace("parallel", "folded") if name in {"ring", "cascade"} else words
         text = text.replace("\n[filter]", f"\n{words}[filter]") if "[filter]" in text else text + words
         path.write_text(text, encoding="utf-8")
         return of(design_core(load(path)))
