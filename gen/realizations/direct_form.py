@@ -207,7 +207,9 @@ def direct_form(
     except ValueError as error:
         raise ShortfallError(f"{name} must be stable with coefficients of {rounding.bits} bits: {error}") from None
     tied = row.feedback if isinstance(row, TiedRow) else None
-    return replace(section, feedback=tied or best_feedback(section.denominator, integer_part, feedback_order))
+    feedback = tied or best_feedback(section.denominator, integer_part, feedback_order)
+    # Where sections take turns, states are there before the input is: what is added up of them alone delays nothing.
+    return replace(section, feedback=feedback, adds_early=not isinstance(row, TiedRow))
 
 
 def best_feedback(denominator: tuple[Fraction, Fraction], integer_part: tuple[int, int], order: int) -> tuple[int, int]:

@@ -217,7 +217,7 @@ def operation_time(graph: Graph, node: Node, *, powers: bool = False) -> int:
     if node.op in NO_LOGIC or graph.concatenated(node) is not None:
         return 0
     if node.op in {Op.SCALE, Op.MULTIPLY} and not graph.is_gate(node):
-        return _MULTIPLICATION + _takes_several(graph, node) * _PARTIAL_PRODUCT
+        return _MULTIPLICATION + takes_several(graph, node) * _PARTIAL_PRODUCT
     return ADDITION
 
 
@@ -236,7 +236,7 @@ def _factors(graph: Graph, node: Node) -> list[tuple[int, bool]]:
     return factors
 
 
-def _takes_several(graph: Graph, node: Node) -> bool:
+def takes_several(graph: Graph, node: Node) -> bool:
     """Whether a product takes more than one multiplier block."""
     factors = _factors(graph, node)
     signed = any(sign for _, sign in factors)  # a block takes both operands signed or neither

@@ -127,6 +127,9 @@ class DirectForm1:
         Fraction bits of the output.
     v_range : tuple of int
         Smallest and largest code of v, from peak gains; v has `total_frac` fraction bits.
+    adds_early : bool
+        Whether the operand of a product of outputs alone is added up at the sample before: the loop is shorter then,
+        but a word more is remembered.
     """
 
     name: str
@@ -136,6 +139,7 @@ class DirectForm1:
     x: Range
     y_frac: int
     v_range: tuple[int, int]
+    adds_early: bool = True
 
     def __post_init__(self) -> None:
         check_products(self.products, self.integer_part)
@@ -213,7 +217,7 @@ class DirectForm1:
         """Whether the operand of a product is added up at the sample before."""
         drops = p.floored is not None and p.floored < self._product_frac(p)
         whole = p.kept is None or p.kept >= self._operand_frac(p)
-        return drops and whole and p.range is not None and all(p.y) and not any(p.x)
+        return self.adds_early and drops and whole and p.range is not None and all(p.y) and not any(p.x)
 
     @property
     def _floored_fracs(self) -> list[int]:

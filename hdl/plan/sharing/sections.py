@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import count
 
-from sosmith.hdl.plan.pipeline import ADDITION, NO_LOGIC, operation_time
+from sosmith.hdl.plan.pipeline import ADDITION, NO_LOGIC, operation_time, takes_several
 from sosmith.hdl.plan.regrouped_sums import with_places
 from sosmith.hdl.plan.sharing.fit import Fit, fit
 from sosmith.model.dataflow.graph import Graph, Node, Op
@@ -16,6 +16,10 @@ from sosmith.model.sections.start import StartStage
 
 _CHOICE = 0.5
 """Time in additions of the choice of a section's input."""
+
+_BETWEEN_BLOCKS = 8
+"""Time of the wires between the multiplier blocks of a product, in units of `operation_time`: from placed cores, as
+`sosmith.hdl.plan.sharing.sharing` has them."""
 
 _STATES = frozenset({Op.INPUT, Op.CONSTANT, Op.DELAY})
 """What stays as it is while a section has its turn."""
@@ -60,7 +64,7 @@ class SharedSections:
 
     @cached_property
     def _spreads(self) -> list[tuple[int, list[int]]]:
-        times = [operation_time(self.graph, node) for node in self.graph.nodes]
+        times = [_time(self.graph, node) for node in self.graph.nodes]
         spread: list[tuple[int, list[int]]] = []
         for period in count(max(1, *times)):
             spread.append((period, _as_early(self.graph, times, period)))
@@ -187,6 +191,13 @@ def _with_room(before: Sequence[Node], node: Node, several: Sequence[Node]) -> N
     low = min([0, *(own.low << frac - own.frac for own in several)])
     high = max([0, *(own.high << frac - own.frac for own in several)])
     return node._replace(frac=frac, low=low, high=high, parameter_frac=parameter_frac)
+
+
+def _time(graph: Graph, node: Node) -> int:
+    """Return how long an operation takes, in units of `operation_time`."""
+    took = operation_time(graph, node)
+    of_blocks = took and node.op in {Op.SCALE, Op.MULTIPLY} and not graph.is_gate(node)
+    return took + _BETWEEN_BLOCKS if of_blocks and takes_several(graph, node) else took
 
 
 def _as_early(graph: Graph, times: Sequence[int], period: int) -> list[int]:

@@ -94,3 +94,22 @@ def test_sections_that_stand_together_have_one_exponent() -> None:
     assert {row.delta_exponent for row in rows if isinstance(row, TiedRow)} == {common_exponent((LOW, MIDDLE))}
     assert len(groups_of((LOW, MIDDLE), "delta")) == 2
     assert len(groups_of(rows, "delta")) == 1
+
+
+def test_sections_that_take_turns_add_up_states_when_they_are_needed() -> None:
+    """Such a sum is there before the input is, and a word that is remembered for it would be one of each section."""
+    spec = {
+        "name": "tied",
+        "sample_rate": 48000.0,
+        "input": {"x": {"bits": 16, "range": [-1.0, 1.0], "signed": True}},
+        "filter": {"family": "butterworth", "kind": "lowpass", "order": 4, "cutoff": 1000.0},
+        "output": {"bits": 16, "range": [-1.0, 1.0], "signed": True, "max_error": "faithful"},
+    }
+
+    def remembered(architecture: str) -> set[str]:
+        design = sosmith.design({**spec, "hardware": {"architecture": architecture, "realization": "df1_ef2"}})
+        nodes = [node for stage in design.core.datapath.stages for node in stage.graph.nodes]
+        return {node.name for node in nodes if node.op is Op.DELAY and node.name.startswith("taps_")}
+
+    assert remembered("parallel") == {"taps_A1_1"}
+    assert remembered("multiplexed") == set()

@@ -12,8 +12,8 @@ import sosmith
 CASES: dict[str, dict[str, Any]] = {
     "direct form": {"realization": "df1_ef2"},
     "from zero": {"realization": "df1_ef2", "start": "zero"},
-    "three clocks a turn": {"realization": "df1_ef2", "clock": 80e6},
-    "from zero, three clocks a turn": {"realization": "df1_ef2", "clock": 80e6, "start": "zero"},
+    "three clocks a turn": {"realization": "df1_ef2", "clock": 120e6},
+    "from zero, three clocks a turn": {"realization": "df1_ef2", "clock": 120e6, "start": "zero"},
     "a section alone": {"realization": "df1", "order": 5},
     "three sections": {"realization": "df2t", "order": 6, "clock": 60e6},
     "delta": {"realization": "delta", "start": "zero"},
