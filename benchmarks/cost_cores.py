@@ -199,13 +199,13 @@ TWO_PRODUCTS = tuple(Core(example, "folded", multipliers=2) for example in EXAMP
 FROM_ZERO = Core("audio_lowpass", "parallel", start="zero")
 """Without the logic of a steady start."""
 
-TURNS = tuple(Core("audio_lowpass", "multiplexed", clock=clock) for clock in (30, 80))
+TURNS = tuple(Core("audio_lowpass", "multiplexed", clock=clock) for clock in (30, 60))
 """Sections that share hardware, with few clocks a turn and with more."""
 
 ORDER_SIX = (
     Core("audio_lowpass", "parallel", bits=18, order=6),
-    *(Core("audio_lowpass", "multiplexed", bits=18, order=6, clock=clock) for clock in (30, 80)),
-    Core("audio_lowpass", "multiplexed", bits=18, order=6, clock=80, lsb=4),
+    *(Core("audio_lowpass", "multiplexed", bits=18, order=6, clock=clock) for clock in (30, 75)),
+    *(Core("audio_lowpass", "multiplexed", bits=18, order=6, clock=clock, lsb=4) for clock in (30, 100)),
     Core("audio_lowpass", "folded", bits=18, order=6, multipliers=2),
     Core("audio_lowpass", "folded", bits=18, order=6),
 )

@@ -445,7 +445,7 @@ audio_lowpass with order 6 and 18 bits in and out, one channel:
 
 {order_six_table(record)}
 
-`multiplexed` has the hardware of one section, with one or three clocks a turn
+`multiplexed` has the hardware of one section, with one or more clocks a turn
 ([hardware.md](hardware.md#sections-that-take-turns)). For one LSB of 18 bits, coefficients are longer than the operands
 of a multiplier block; for four they are not.
 
