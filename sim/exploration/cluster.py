@@ -10,7 +10,14 @@ from sosmith.sim.exploration.evaluation import Point, evaluate
 from sosmith.sim.exploration.grid import Task
 
 _BATCH = 2_000
-"""Tasks that the scheduler knows of at a time; each takes it well under a millisecond."""
+"""Designs that the scheduler knows of at a time."""
+
+_MOST = 16
+"""Most designs of one Dask task: what comes back together, and is done again if its worker dies."""
+
+_ROUNDS = 4
+"""Tasks that each thread of the workers gets of what is left, about: fewer designs in each of them towards the end, so
+that no worker has much to do when the others have nothing."""
 
 _CONNECT = 10
 """Seconds until a scheduler must have answered."""
@@ -19,8 +26,8 @@ _CONNECT = 10
 def on_cluster(batches: Iterable[Sequence[Task]], address: str) -> Generator[Point, None, None]:
     """Yield the results of tasks as they come from the workers of the scheduler at `address`.
 
-    A task whose worker dies is done again by another one; the scheduler hands out each result once. When the caller
-    stops, what has not begun is dropped.
+    Several designs are one task of Dask's, fewer towards the end. If its worker dies, another one does it again; the
+    scheduler hands out each result once. When the caller stops, what has not begun is dropped.
 
     Raises
     ------
@@ -43,14 +50,36 @@ def on_cluster(batches: Iterable[Sequence[Task]], address: str) -> Generator[Poi
         raise ToolError(f"a Dask scheduler must answer at {address or 'an address'}, not: {error}") from None
     try:
         for tasks in itertools.chain.from_iterable(map(_parts, batches)):
-            futures = [client.submit(evaluate, task, key=f"sosmith-{task.key}") for task in tasks]
+            threads = sum(client.nthreads().values())
+            groups = groups_of(tasks, threads)
+            futures = [client.submit(_evaluated, group, key=f"sosmith-{group[0].key}") for group in groups]
             for future in as_completed(futures, loop=client.loop):
-                yield future.result()
+                yield from future.result()
                 future.release()
     except KilledWorker as error:
         raise ToolError(f"the cluster's workers must live until their designs are done, not: {error}") from None
     finally:
         client.close()
+
+
+def groups_of(tasks: Sequence[Task], threads: int) -> list[Sequence[Task]]:
+    """Return tasks in groups, in their order, the smaller the fewer are left for so many `threads`.
+
+    >>> [len(group) for group in groups_of(range(40), 2)]
+    [5, 4, 3, 3, 3, 2, 2, 2, 2, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1]
+    """
+    groups: list[Sequence[Task]] = []
+    start = 0
+    while start < len(tasks):
+        size = max(1, min(_MOST, (len(tasks) - start) // (_ROUNDS * max(threads, 1))))
+        groups.append(tasks[start : start + size])
+        start += size
+    return groups
+
+
+def _evaluated(tasks: Sequence[Task]) -> list[Point]:
+    """Return the results of tasks, which a worker makes one after the other."""
+    return [evaluate(task) for task in tasks]
 
 
 def _parts(tasks: Sequence[Task]) -> Iterable[Sequence[Task]]:
