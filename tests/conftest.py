@@ -115,6 +115,14 @@ def _formats_are_kept(searches_anew: bool, monkeypatch: pytest.MonkeyPatch, _for
 
 
 @pytest.fixture(autouse=True)
+def _bitstreams_are_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Make each bitstream: tests put other programs in place of those that do."""
+    kept = sys.modules.get("sosmith.gen.fpga.kept_bitstreams")
+    if kept is not None:
+        monkeypatch.setattr(kept, "cache_folder", lambda: None)
+
+
+@pytest.fixture(autouse=True)
 def _figures_are_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Draw the figures of each report: a test may look at them, or change what draws them."""
     kept = sys.modules.get("sosmith.gen.report.figures.kept")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
@@ -14,6 +14,7 @@ from typing import Any
 
 from sosmith.gen.fpga.block_registers import with_block_registers
 from sosmith.gen.fpga.boards import Board
+from sosmith.gen.fpga.kept_bitstreams import Made, kept_or_made
 from sosmith.gen.fpga.lost_drivers import check_drivers
 from sosmith.gen.fpga.platform_plan import SEED, board_plan, text_of
 from sosmith.gen.fpga.tools import Tool, find_tool
@@ -133,7 +134,7 @@ def build(
 ) -> Bitstream:
     """Make a bitstream; takes some tens of seconds, and a minute more on the very first call.
 
-    Two calls with the same programs give the same bytes.
+    Two calls with the same programs give the same bytes; the second one finds what the first one has made.
 
     Parameters
     ----------
@@ -161,35 +162,49 @@ def build(
     plan = board_plan(verilog, top, name, board, wiring)
     commands = [_translated(command) for command in json.loads(text_of(plan, f"build_{name}.json"))["commands"]]
     tools = {command[0]: find_tool(command[0]) for command in commands}
+    files = {file: text_of(plan, file).encode() for file in plan.files}
+    versions = {tool.name: tool.version for tool in tools.values()}
+    made = kept_or_made(files, commands, versions, lambda: _made(files, commands, tools, name, board, progress))
+    return Bitstream(
+        board=board,
+        name=name,
+        content=made.content,
+        used={
+            kind: (cells["used"], cells["available"])
+            for kind, cells in sorted(made.report["utilization"].items())
+            if cells["available"]
+        },
+        clocks=tuple(
+            Clock(clock, round(timing["achieved"], 2), round(timing["constraint"], 2))
+            for clock, timing in sorted(made.report["fmax"].items())
+        ),
+        path=_slowest_path(made.report),
+        versions=versions,
+        log=made.log,
+    )
+
+
+def _made(
+    files: Mapping[str, bytes],
+    commands: Sequence[Sequence[str]],
+    tools: Mapping[str, Tool],
+    name: str,
+    board: Board,
+    progress: Callable[[str], None],
+) -> Made:
+    """Call the programs, one after the other, in a folder with the files."""
     with TemporaryDirectory(prefix="sosmith-") as scratch:
         place = Path(scratch)
-        for file in plan.files:
-            (place / file).write_bytes(text_of(plan, file).encode())
+        for file, content in files.items():
+            (place / file).write_bytes(content)
         for command in commands:
             progress(_STEPS.get(command[0], "placement and routing"))
             _carry_out(tools[command[0]], command[1:], place, board)
             if command[0] == "yosys":
                 _pack(place / f"{name}.json")
         report = json.loads((place / "report.json").read_text(encoding="utf-8"))
-        bitstream_file = place / f"{name}.{_SUFFIX[board.device.family]}"
-        clocks = tuple(
-            Clock(clock, round(timing["achieved"], 2), round(timing["constraint"], 2))
-            for clock, timing in sorted(report["fmax"].items())
-        )
-        return Bitstream(
-            board=board,
-            name=name,
-            content=bitstream_file.read_bytes(),
-            used={
-                kind: (cells["used"], cells["available"])
-                for kind, cells in sorted(report["utilization"].items())
-                if cells["available"]
-            },
-            clocks=clocks,
-            path=_slowest_path(report),
-            versions={tool.name: tool.version for tool in tools.values()},
-            log=_read(place / _LOG),
-        )
+        bitstream = place / f"{name}.{_SUFFIX[board.device.family]}"
+        return Made(bitstream.read_bytes(), report, _read(place / _LOG))
 
 
 def _pack(netlist: Path) -> None:
