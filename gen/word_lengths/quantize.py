@@ -152,8 +152,19 @@ class Plan:
         stages = parts_of(ideal, self.realization)
         search = Search(stages, self.realization, self.input_stages, self.gain, steady=self.steady)
         search = search.under(self.objective)
-        start = formats if search.error(formats) <= float(self.allowed) else _start(search, float(self.share))
-        return replace(self, ideal=ideal, search=search, start=start, instead=())
+        other = replace(self, ideal=ideal, search=search, start=formats, instead=())
+        return other if search.error(formats) <= float(self.allowed) else other.started_anew()
+
+    def started_anew(self) -> Plan:
+        """Return the same plan with formats of equal shares, to be trimmed."""
+        assert self.search is not None
+        return replace(self, start=_start(self.search, float(self.share)), instead=())
+
+    def merely_trimmed(self) -> Plan:
+        """Return a copy with formats trimmed without a look at what costs nothing: not the smallest ones, but soon."""
+        if self.search is None or self.start is None:
+            return self
+        return replace(self, start=self.search.merely_trimmed(self.start, float(self.allowed)))
 
     def trimmed(self) -> Plan:
         """Return a copy with formats trimmed until no step saves any more."""

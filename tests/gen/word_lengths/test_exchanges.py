@@ -37,13 +37,23 @@ def audio() -> Plan:
     return trimmed(butterworth(5, AUDIO))
 
 
+@cache
+def better() -> Plan:
+    return in_better_order(audio())
+
+
+@cache
+def in_all_orders() -> list[Plan]:
+    return [exchanges._ordered(audio(), [*order]).trimmed() for order in permutations(range(3))]
+
+
 def rows_of(planned: Plan) -> list[tuple[float, ...]]:
     assert planned.ideal is not None
     return [tuple(row) for row in planned.ideal.rows]
 
 
 def test_the_sections_of_audio_lowpass_take_fewer_adders_in_another_order() -> None:
-    before, after = audio(), in_better_order(audio())
+    before, after = audio(), better()
     assert after.size < before.size
     assert after.otherwise is before
     assert rows_of(after) != rows_of(before)
@@ -51,22 +61,19 @@ def test_the_sections_of_audio_lowpass_take_fewer_adders_in_another_order() -> N
 
 
 def test_no_order_of_three_sections_is_smaller() -> None:
-    before, best = audio(), in_better_order(audio())
-    sizes = [exchanges._ordered(before, [*order]).size for order in permutations(range(3))]
-    assert best.size == min(sizes)
+    assert better().size == min(way.size for way in in_all_orders())
 
 
 def test_the_other_order_is_proven_to_the_same_bound() -> None:
-    quantized = prove(in_better_order(audio()))
+    quantized = prove(better())
     assert quantized.bound <= 1
     assert audio().objective.of_datapath(quantized.datapath) < audio().size
-    assert [tuple(row) for row in quantized.filter.rows] == rows_of(in_better_order(audio()))  # type: ignore[union-attr]
+    assert [tuple(row) for row in quantized.filter.rows] == rows_of(better())  # type: ignore[union-attr]
 
 
 def test_an_order_that_is_larger_once_it_is_proven_is_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
-    better = in_better_order(audio())
-    worst = max((exchanges._ordered(audio(), [*order]) for order in permutations(range(3))), key=lambda each: each.size)
-    assert worst.size > audio().size > better.size
+    worst = max(in_all_orders(), key=lambda each: each.size)
+    assert worst.size > audio().size > better().size
     proven = prove(replace(worst, otherwise=audio()))
     assert proven.datapath == prove(audio()).datapath
 
@@ -76,7 +83,7 @@ def test_an_order_that_is_larger_once_it_is_proven_is_not_taken(monkeypatch: pyt
     monkeypatch.setattr("sosmith.gen.word_lengths.quantize.cascade", short)
     monkeypatch.setattr("sosmith.gen.word_lengths.quantize._equally_shared", short)
     with pytest.raises(ShortfallError, match=r"^no$"):
-        prove(better)
+        prove(better())
 
 
 def test_only_sections_whose_words_count_bit_by_bit_are_exchanged() -> None:
@@ -88,8 +95,10 @@ def test_only_sections_whose_words_count_bit_by_bit_are_exchanged() -> None:
     assert in_better_order(replace(audio(), objective=program)).otherwise is None
 
 
-def test_of_many_sections_neighbours_are_exchanged() -> None:
+def test_any_two_of_up_to_four_sections_are_exchanged() -> None:
     assert exchanges._exchanged([0, 1, 2]) == [[1, 0, 2], [2, 1, 0], [0, 2, 1]]
     assert len(exchanges._exchanged([*range(4)])) == 6
-    assert exchanges._exchanged([0, 1, 2, 3, 4])[1:3] == [[0, 2, 1, 3, 4], [0, 1, 3, 2, 4]]
-    assert len(exchanges._exchanged([*range(5)])) == 4
+    formats = audio().start
+    assert formats is not None
+    many = replace(formats, formats=(*formats.formats, *formats.formats))
+    assert not may_be_ordered(replace(audio(), start=many))
