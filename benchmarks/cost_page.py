@@ -504,7 +504,7 @@ The project's own goals. Where a goal says only "LUT4", both ways of counting ar
 {goal_table(record)}
 
 What was tried for missed goals, and the obstacle:
-{tries()}
+{tries(record)}
 
 ## Comparison with other projects
 
