@@ -14,6 +14,9 @@ share sums as in RAG-n (Dempster and Macleod, Use of minimum-adder multiplier bl
 Transactions on Circuits and Systems II 42, 1995): the constant that takes least is made first, and its sums are there
 for the others.
 
+What was found so for a constant is compared with all graphs of up to four sums, and with many of five
+(`sosmith.model.arithmetic.few_sums`), which reuse a sum in more ways than steps that leave simpler numbers do.
+
 What is minimized is the number of adder bits. The lowest bits of a sum, where only one of both has any, take none
 unless that one is subtracted. At most one more sum follows another than in a balanced tree of the constant's digits,
 since each is a carry chain on the way of a sample.
@@ -26,10 +29,11 @@ Adder(multiple=75, left=(1, 4), right=(1, 0), subtract=True)
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from functools import cache
 from typing import NamedTuple
 
+from sosmith.model.arithmetic.few_sums import ALL, Split, cheapest
 from sosmith.model.dataflow.graph import Graph, Op
 
 _SEARCHED = 72
@@ -47,6 +51,9 @@ _COMPARED = 8
 _OPERAND_BITS = 16
 """Width of the operand for which adder bits are minimized; the choice hardly depends on it."""
 
+_MOST_VALUES = 1 << 22
+"""Values that are made of all sets of sums, for all constants: bounds the time of looking for few sums."""
+
 Term = tuple[int, int]
 """A multiple, as the number of its sum from 1 on or 0 for the operand itself, and how far it is shifted to the left."""
 
@@ -60,19 +67,11 @@ class Adder(NamedTuple):
     subtract: bool
 
 
-class _Split(NamedTuple):
-    """A number as ``parts[0] << shifts[0]`` plus or minus ``parts[1] << shifts[1]``; the parts are odd."""
-
-    parts: tuple[int, int]
-    shifts: tuple[int, int]
-    subtract: bool
-
-
 class _Solution(NamedTuple):
     """Adder bits that a number takes, and the split of every sum among them, simpler ones first."""
 
     bits: int
-    splits: Mapping[int, _Split]
+    splits: Mapping[int, Split]
 
 
 def odd_part(value: int) -> tuple[int, int]:
@@ -105,15 +104,27 @@ def adder_graph(constants: tuple[int, ...]) -> tuple[Adder, ...]:
 
     A multiple by c is the operand or one of the sums, ``odd_part(c)[0]``, shifted to the left by ``odd_part(c)[1]``.
     """
-    levels = {1: 0}
-    splits: dict[int, _Split] = {}
     wanted = {odd_part(constant)[0] for constant in constants} - {1}
-    most = _MOST_TRIED // max(len(wanted), 1)
+    end = 1 << (_OPERAND_BITS - 1)
+    # fewer bits for one constant may leave less to share with the next
+    return min((_one_by_one(wanted, few) for few in (False, True)), key=lambda sums: adder_bits(sums, -end, end - 1))
+
+
+def _one_by_one(constants: Collection[int], few: bool) -> tuple[Adder, ...]:
+    """Return the sums that give odd constants, the simplest first; each by few sums, if so, where that takes less."""
+    levels = {1: 0}
+    splits: dict[int, Split] = {}
+    wanted = {*constants}
+    most, most_values = (limit // max(len(wanted), 1) for limit in (_MOST_TRIED, _MOST_VALUES))
     while wanted:
         search = _Search(levels, most)
         simplest = sorted(wanted, key=lambda number: (len(signed_digits(number)), _by_size(number)))[:_COMPARED]
-        candidates = [search.cheapest(number, _most_levels(number)) for number in sorted(simplest, key=_by_size)]
-        for number, split in min(candidates, key=lambda candidate: candidate.bits).splits.items():
+        candidates = {
+            number: search.cheapest(number, _most_levels(number)) for number in sorted(simplest, key=_by_size)
+        }
+        chosen = min(candidates, key=lambda number: candidates[number].bits)
+        found = candidates[chosen].splits
+        for number, split in (_cheaper(levels, chosen, found, most_values) if few else found).items():
             levels[number] = 1 + max(levels[part] for part in split.parts)
             splits[number] = split
         wanted -= levels.keys()
@@ -131,7 +142,21 @@ def adder_graph(constants: tuple[int, ...]) -> tuple[Adder, ...]:
     )
 
 
-def _in_order(splits: Mapping[int, _Split]) -> dict[int, int]:
+def _cheaper(there: Mapping[int, int], number: int, splits: Mapping[int, Split], most: int) -> Mapping[int, Split]:
+    """Return the splits that give a number, or those of fewer adder bits in a few sums.
+
+    One sum more than all ways of which are looked at is tried only where so many do not give the number.
+    """
+    for sums in range(1, ALL + 2):
+        below = sum(_searched_bits(made, split.shifts, split.subtract) for made, split in splits.items())
+        # nearly every sum takes the bits of the operand, or more
+        if sums * _OPERAND_BITS >= below or (sums > ALL and len(splits) <= ALL):
+            break
+        splits = cheapest(there, number, _most_levels(number), sums, _searched_bits, below, most) or splits
+    return splits
+
+
+def _in_order(splits: Mapping[int, Split]) -> dict[int, int]:
     """Return the numbers of the sums, each of which follows what it is made of.
 
     One that was made on a level too high for a later constant is made again on a lower one, of later sums.
@@ -183,6 +208,12 @@ def _bits(multiple: int, shifts: tuple[int, int], subtract: bool, low: int, high
     return width - (second if second else 0 if subtract else first)
 
 
+def _searched_bits(multiple: int, shifts: tuple[int, int], subtract: bool) -> int:
+    """Return the bits of a sum that take an adder, for the operand for which they are minimized."""
+    end = 1 << (_OPERAND_BITS - 1)
+    return _bits(multiple, shifts, subtract, -end, end - 1)
+
+
 class _Search:
     """Finds out what odd numbers take, given the multiples that are there, and on which level of sums each is."""
 
@@ -207,12 +238,11 @@ class _Search:
 
     def _taken_apart(self, number: int, levels: int) -> _Solution | None:
         best: _Solution | None = None
-        end = 1 << (_OPERAND_BITS - 1)
         for split in self._splits(number):
-            bits = _bits(number, split.shifts, split.subtract, -end, end - 1)
+            bits = _searched_bits(number, split.shifts, split.subtract)
             if best is not None and bits + max(map(self._least, split.parts)) >= best.bits:
                 continue
-            splits: dict[int, _Split] = {}
+            splits: dict[int, Split] = {}
             for part in dict.fromkeys(split.parts):
                 solution = self._solution(part, levels - 1)
                 if solution is None or (best is not None and bits + solution.bits >= best.bits):
@@ -227,13 +257,13 @@ class _Search:
         """Adder bits that a number takes at least, by its number of digits."""
         return 0 if number in self._there else (len(signed_digits(number)) - 1).bit_length() * _OPERAND_BITS
 
-    def _splits(self, number: int) -> Iterator[_Split]:
+    def _splits(self, number: int) -> Iterator[Split]:
         digits = signed_digits(number)
         top = abs(number).bit_length()
         for k in range(1, top):
             for factor, subtract in (((1 << k) + 1, False), ((1 << k) - 1, True)):
                 if 1 < factor < abs(number) and number % factor == 0:
-                    yield _Split((number // factor,) * 2, (k, 0), subtract)
+                    yield Split((number // factor,) * 2, (k, 0), subtract)
         for cut in range(1, len(digits)):
             low = sum(sign << power for sign, power in digits[:cut])
             yield from _signed((low, 0), odd_part(number - low))
@@ -248,13 +278,13 @@ class _Search:
                     yield from _signed(term, part)
 
 
-def _signed(a: Term, b: Term) -> Iterator[_Split]:
+def _signed(a: Term, b: Term) -> Iterator[Split]:
     """Yield a sum of two numbers, given as odd ones with shifts: of positive ones, or with the lowest bits for free."""
     (x, i), (y, j) = sorted((a, b), key=lambda term: term[0] < 0)
     if y < 0:
-        yield _Split((x, -y), (i, j), subtract=True)
+        yield Split((x, -y), (i, j), subtract=True)
     if y > 0 or (x > 0 and j == 0 and y != -1):
-        yield _Split((x, y), (i, j), subtract=False)
+        yield Split((x, y), (i, j), subtract=False)
 
 
 def _most_levels(number: int) -> int:

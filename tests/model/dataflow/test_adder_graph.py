@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from sosmith.model.dataflow.adder_graph import (
     Adder,
+    _one_by_one,
     adder_bits,
     adder_graph,
     by_operand,
@@ -96,6 +97,24 @@ def test_the_first_numbers_that_take_so_many(number: int, adders: int) -> None:
     """Gustafsson, Dempster and Wanhammar, Extended results for minimum-adder constant integer multipliers (2002)."""
     assert len(adder_graph((number,))) == adders
     assert all(len(adder_graph((n,))) < adders for n in range(max(1, number - 60), number))
+
+
+@pytest.mark.parametrize(("number", "sums"), [(108265, 4), (244403, 5), (277759, 3)])
+def test_a_constant_whose_digits_leave_no_simpler_number(number: int, sums: int) -> None:
+    """Taken apart step by step, the first two are made of six sums, the third of four."""
+    adders = adder_graph((number,))
+    assert len(adders) == sums
+    assert multiples(adders, 1) == [1, *(adder.multiple for adder in adders)]
+    assert max(levels(adders).values()) <= 4
+
+
+def test_few_sums_for_one_constant_that_would_leave_less_to_share() -> None:
+    """The sums that take least for one of both are of less use for the other."""
+    constants = (1895, 409)
+    digits, few = (_one_by_one(constants, few) for few in (False, True))
+    end = 1 << 15
+    assert adder_bits(digits, -end, end - 1) < adder_bits(few, -end, end - 1)
+    assert adder_graph(constants) == digits
 
 
 def test_constants_share_sums() -> None:
