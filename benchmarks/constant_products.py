@@ -1,0 +1,146 @@
+"""Compares sums of products by constants with an integer program: `python -m benchmarks.constant_products`.
+
+Writes benchmarks/constant_products.json and the table of docs/hardware.md, in some minutes. `--document` only writes
+the table from that record again. The solver stops after a time, so that its figures are not the same on every machine:
+it measures `adder_graph`, and takes no part in a design.
+"""
+
+from __future__ import annotations
+
+import json
+import random
+import re
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+from benchmarks.adder_program import NODES, SECONDS, fewest_bits
+
+from sosmith.gen.core import design_core
+from sosmith.gen.specification.combinations import PARALLEL
+from sosmith.gen.specification.specification import load
+from sosmith.model.dataflow.adder_graph import adder_bits, adder_graph, by_operand, odd_part, scalings
+
+ROOT = Path(__file__).resolve().parent.parent
+RECORD = ROOT / "benchmarks" / "constant_products.json"
+DOCUMENT = ROOT / "docs" / "hardware.md"
+SPECIFICATIONS = ("audio_lowpass", "flange_wear_bench", "flange_wear_locomotive", "recipes/short_taps")
+DRAWN = tuple((count, bits) for count in (2, 4, 8) for bits in (8, 12, 16))
+"""Constants of a set, and their bits."""
+SETS = 2
+SEED = 1
+OPERAND = (-(1 << 15), (1 << 15) - 1)
+"""Range of the operand of drawn constants."""
+
+_TABLE = re.compile(r"(?<=<!-- constant products -->\n).*?(?=<!-- end of constant products -->)", re.DOTALL)
+
+
+@dataclass(frozen=True)
+class Row:
+    """Products of one operand: sums and adder bits that are made, that the integer program finds, and its bound.
+
+    Attributes
+    ----------
+    source : str
+        A specification, or how the constants are drawn.
+    constants : int
+        Different odd parts but 1.
+    sums, bits, seconds
+        Of `adder_graph`; seconds of processor time.
+    program_sums, program_bits, bound, program_seconds
+        Of the integer program, see `benchmarks.adder_program.Result`.
+    """
+
+    source: str
+    constants: int
+    sums: int
+    bits: int
+    seconds: float
+    program_sums: int
+    program_bits: int
+    bound: int
+    program_seconds: float
+
+
+def sets() -> Iterator[tuple[str, tuple[int, ...], int, int]]:
+    """Yield where constants are from, the constants of each operand, and its range."""
+    for name in SPECIFICATIONS:
+        spec = load(ROOT / "examples" / f"{name}.toml")
+        hardware = replace(spec.hardware, architecture=PARALLEL.name, multipliers=0)
+        for stage in design_core(replace(spec, hardware=hardware)).datapath.stages:
+            graph = stage.graph
+            for operand, products in by_operand(graph, scalings(graph)):
+                node = graph.nodes[operand]
+                yield spec.name, tuple(graph.nodes[index].parameter for index in products), node.low, node.high
+    draws = random.Random(SEED)
+    for count, bits in DRAWN:
+        for _ in range(SETS):
+            drawn = tuple(draws.randrange(1 << (bits - 1), 1 << bits) for _ in range(count))
+            yield f"{count} of {bits} bits, drawn", drawn, *OPERAND
+
+
+def measure(source: str, constants: tuple[int, ...], low: int, high: int) -> Row:
+    """Return a row for the products of an operand in low..high."""
+    adder_graph.cache_clear()  # the design has asked for it
+    start = time.process_time()
+    adders = adder_graph(constants)
+    between = time.process_time()
+    result = fewest_bits(constants, low, high)
+    return Row(
+        source=source,
+        constants=len({odd_part(constant)[0] for constant in constants} - {1}),
+        sums=len(adders),
+        bits=adder_bits(adders, low, high),
+        seconds=round(between - start, 2),
+        program_sums=result.sums,
+        program_bits=result.bits,
+        bound=result.bound,
+        program_seconds=round(time.process_time() - between, 1),
+    )
+
+
+def table(rows: list[Row]) -> str:
+    """Return the Markdown table of a record, a row for all operands of the same source."""
+    lines = [
+        f"By `python -m benchmarks.constant_products`; HiGHS stops after {NODES} nodes or {SECONDS:g} seconds.",
+        "",
+        "| constants | operands | sums | adder bits | seconds | program: sums | bits | seconds | its bound |",
+        "|---|---|---|---|---|---|---|---|---|",
+    ]
+    for source in dict.fromkeys(row.source for row in rows):
+        of = [row for row in rows if row.source == source]
+        lines.append(
+            f"| {source} | {len(of)} | {sum(row.sums for row in of)} | {sum(row.bits for row in of)} "
+            f"| {sum(row.seconds for row in of):.1f} | {sum(row.program_sums for row in of)} "
+            f"| {sum(row.program_bits for row in of)} | {sum(row.program_seconds for row in of):.0f} "
+            f"| {sum(row.bound for row in of)} |"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def recorded() -> list[Row]:
+    """Return the rows of the record."""
+    return [Row(**row) for row in json.loads(RECORD.read_text(encoding="utf-8"))]
+
+
+def with_table(text: str) -> str:
+    """Return the document with the table of the record."""
+    return _TABLE.sub(lambda _: table(recorded()), text)
+
+
+def main() -> None:
+    """Measure unless asked not to, and write the table."""
+    if "--document" not in sys.argv[1:]:
+        rows = []
+        for source, constants, low, high in sets():
+            if {odd_part(constant)[0] for constant in constants} - {1}:
+                rows.append(measure(source, constants, low, high))
+                print(rows[-1], file=sys.stderr, flush=True)
+        RECORD.write_text(json.dumps([asdict(row) for row in rows], indent=1) + "\n", encoding="utf-8")
+    DOCUMENT.write_text(with_table(DOCUMENT.read_text(encoding="utf-8")), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
