@@ -53,7 +53,7 @@ class Cic(AtEachClock):
         del before
         from sosmith.hdl.cores.cic import CicCore  # only what makes hardware loads Amaranth
 
-        return CicCore(self.datapath)
+        return CicCore(self.datapath, self.copies_per_result)
 
     def title(self, realization: str | None) -> str:
         """Return its name, and what it is made of."""

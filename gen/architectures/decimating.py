@@ -13,14 +13,12 @@ from sosmith.model.errors import ShortfallError
 
 @dataclass(frozen=True)
 class AtEachClock(Architecture):
-    """Hardware that takes a sample at each clock, and gives a result once."""
+    """Hardware that takes a sample at each clock."""
 
     terms = PARALLEL
     is_filled = True
 
     def __post_init__(self) -> None:
-        if self.hold:
-            raise ShortfallError("filter.hold must be false in the parallel architecture, which gives a result once")
         try:
             _ = self.plan
         except ValueError as error:
@@ -42,6 +40,11 @@ class AtEachClock(Architecture):
             If it does not suit the datapath.
         """
         raise NotImplementedError
+
+    @property
+    def copies_per_result(self) -> int:
+        """Times that each result is handed out."""
+        return self.plan.factor if self.hold else 1
 
     @property
     def _latency_cycles(self) -> int:

@@ -60,7 +60,7 @@ class Polyphase(AtEachClock):
         del before
         from sosmith.hdl.cores.polyphase import PolyphaseCore  # only what makes hardware loads Amaranth
 
-        return PolyphaseCore(self.datapath)
+        return PolyphaseCore(self.datapath, self.copies_per_result)
 
     def reason(self, why: str, available: int) -> str:
         """Say in a sentence that it was chosen and `why`."""

@@ -50,8 +50,10 @@ def quantities_of(architecture: Architecture, device: Device) -> Quantities:
         made = of_rings(architecture, device)
     elif isinstance(architecture, Cic):
         made = of_cic(architecture)
+        made["counters"] += (architecture.copies_per_result - 1).bit_length()
     elif isinstance(architecture, Polyphase):
         made = of_polyphase(architecture, device)
+        made["counters"] += (architecture.copies_per_result - 1).bit_length()
     elif isinstance(architecture, Multiplexed):
         made = of_multiplexed(architecture, device)
     elif architecture.program is not None:

@@ -42,6 +42,8 @@ class CicCore(DecimatingCore):
     ----------
     datapath : Datapath
         What it computes: one FIR section of moving sums, the output stage, and a downsampler.
+    copies : int
+        Times that each result is handed out.
 
     Members
     -------
@@ -49,9 +51,9 @@ class CicCore(DecimatingCore):
         As those of `sosmith.hdl.shell.shell.Shell`.
     """
 
-    def __init__(self, datapath: Datapath) -> None:
+    def __init__(self, datapath: Datapath, copies: int = 1) -> None:
         self._plan = cic_plan(datapath)
-        super().__init__(datapath, self._plan)
+        super().__init__(datapath, self._plan, copies)
 
     def sums(self, m: Module, sample: Entered) -> Summed:
         """Build integrators, combs, and the rounding."""

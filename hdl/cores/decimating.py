@@ -3,8 +3,8 @@ r"""What every FIR filter has that decimates and takes a sample at each clock: i
 ::
 
     s_axis --> phase, rail --> inside: sums of samples --> value --> [limited] --> output_buffer --> m_axis
-                  |                                          ^
-                  +--> filling, filled                       +--- left: results that do not count yet
+                  |                                          ^                          ^ leaves
+                  +--> filling, filled                       +--- left                [copies]
 
 A sample with the phase 0 brings a result, which needs no other. All registers move at the clocks at which `advance`,
 which comes from a register of the output buffer, is high.
@@ -12,6 +12,8 @@ which comes from a register of the output buffer, is high.
 With a steady start, the first sample goes in so many times before it is accepted that nothing is left of what was there
 before; the results that it has by then do not count, and `left` says how many they are. With a start from zero, a reset
 clears what is remembered, and `left` counts the results that are flagged as settling.
+
+A result that is held stays in the output buffer until it has been handed out R times, as `copies` counts.
 
 Latency: that of the inside, a clock where results are limited, and one of the output buffer.
 """
@@ -72,6 +74,8 @@ class DecimatingCore(Shell):
         What it computes: one FIR section, the output stage, and a downsampler.
     plan : DecimatingPlan
         How samples become results.
+    copies : int
+        Times that each result is handed out.
 
     Members
     -------
@@ -79,8 +83,9 @@ class DecimatingCore(Shell):
         As those of `sosmith.hdl.shell.shell.Shell`.
     """
 
-    def __init__(self, datapath: Datapath, plan: DecimatingPlan) -> None:
+    def __init__(self, datapath: Datapath, plan: DecimatingPlan, copies: int = 1) -> None:
         self._pace = plan
+        self._copies = copies
         super().__init__(datapath)
 
     @abstractmethod
@@ -118,7 +123,18 @@ class DecimatingCore(Shell):
             saturated=result.saturated,
             settling=result.settling,
         ).flags
-        self.hand_out(m, buffer, result.valid, [(result.code, flags)])
+        self.hand_out(m, buffer, result.valid, [(result.code, flags)], leaves=self._leaves(m))
+
+    def _leaves(self, m: Module) -> Value | None:
+        """Return whether the result at the output leaves, if it is there; None if it does with each handshake."""
+        if self._copies == 1:
+            return None
+        copies, leaves = Signal(range(self._copies), name="copies"), Signal(name="leaves")
+        last = copies == self._copies - 1
+        m.d.comb += leaves.eq(self.m_axis_tready & last)
+        with m.If(self.m_axis_tvalid & self.m_axis_tready):
+            m.d.sync += copies.eq(Mux(last, 0, copies + 1))
+        return leaves
 
     def _fill(self, m: Module, ends: Value) -> Signal:
         """Return whether the first sample still fills the filter, from the last of each R times that it goes in."""

@@ -50,6 +50,8 @@ class PolyphaseCore(DecimatingCore):
     ----------
     datapath : Datapath
         What it computes: one FIR section that keeps samples, the output stage, and a downsampler.
+    copies : int
+        Times that each result is handed out.
 
     Members
     -------
@@ -57,9 +59,9 @@ class PolyphaseCore(DecimatingCore):
         As those of `sosmith.hdl.shell.shell.Shell`.
     """
 
-    def __init__(self, datapath: Datapath) -> None:
+    def __init__(self, datapath: Datapath, copies: int = 1) -> None:
         self._plan = polyphase_plan(datapath)
-        super().__init__(datapath, self._plan)
+        super().__init__(datapath, self._plan, copies)
 
     def sums(self, m: Module, sample: Entered) -> Summed:
         """Build the line, the multipliers and the total."""

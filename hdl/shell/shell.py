@@ -184,8 +184,13 @@ class Shell(wiring.Component):
         valid: Value,
         results: Sequence[tuple[Value, Value]],
         channel: Value | None = None,
+        *,
+        leaves: Value | None = None,
     ) -> None:
-        """Pass results through the buffer to `m_axis_*`: code and flags of each lane, in the bits of `Flag`."""
+        """Pass results through the buffer to `m_axis_*`: code and flags of each lane, in the bits of `Flag`.
+
+        A result leaves with its handshake, unless `leaves` says when it does.
+        """
         bits = len(self.m_axis_tdata) // self.lanes
         word = {
             "codes": Cat(extended(code, bits) for code, _ in results),
@@ -196,7 +201,7 @@ class Shell(wiring.Component):
             buffer.i_valid.eq(valid),
             buffer.i_data.eq(Cat(*word.values())),
             self.m_axis_tvalid.eq(buffer.o_valid),
-            buffer.o_ready.eq(self.m_axis_tready),
+            buffer.o_ready.eq(self.m_axis_tready if leaves is None else leaves),
         ]
         handed = data.View(data.StructLayout({name: len(value) for name, value in word.items()}), buffer.o_data)
         flags = iter(handed.flags)

@@ -46,7 +46,6 @@ def test_it_is_chosen_for_a_cic_filter() -> None:
     ("taps", "filter_", "hardware"),
     [
         ([1 / 8, 2 / 8, 1 / 8], {}, {"clock": 1e7}),
-        (MEANS, {"hold": True}, {"clock": 1e7}),
         (MEANS, {}, {"clock": 1e7, "reload": True}),
         (MEANS, {}, {"clock": 1e7, "protect": "detect"}),
         (MEANS, {}, {"clock": 1e7, "architecture": "folded"}),
@@ -57,10 +56,11 @@ def test_a_ring_is_made_of_others(taps: list[float], filter_: dict[str, Any], ha
     assert made.architecture == "folded"
 
 
-def test_results_are_not_held() -> None:
-    sentence = r"filter\.hold must be false in the parallel architecture, which gives a result once$"
-    with pytest.raises(sosmith.ShortfallError, match=sentence):
-        sosmith.design(specification(MEANS, filter_={"hold": True}, architecture="parallel"))
+@pytest.mark.parametrize("taps", [MEANS, [0.5, 0.25, 0.25]])
+def test_results_are_held(taps: list[float]) -> None:
+    made = sosmith.design(specification(taps, filter_={"hold": True}, architecture="parallel"))
+    assert made.core.architecture.copies_per_result == 4
+    assert made.cycles_per_sample == 1
 
 
 def test_taps_must_be_exact() -> None:

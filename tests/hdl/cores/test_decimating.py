@@ -10,6 +10,8 @@ from typing import Any
 
 import pytest
 from benchmarks.synthesis import TARGETS, Area, place, synthesize
+from tests.hdl.cores.resets import check_resets
+from tests.interface.decimating_firs import draw
 
 import sosmith
 from sosmith.gen.output.verilog import core_verilog
@@ -50,6 +52,14 @@ def test_all_results_leave_another_core() -> None:
     for core in (PolyphaseCore, CicCore):
         with pytest.raises(ValueError, match=r" must "):
             core(replace(datapath, downsampler=None))
+
+
+@pytest.mark.parametrize(("seed", "hold"), [(41, True), (3, True), (44, False)])
+def test_results_are_those_of_the_model_after_any_reset(seed: int, hold: bool, tmp_path: Path) -> None:
+    tree = draw(seed).specification.as_dict() | {"channels": 1}
+    tree["filter"]["hold"], tree["hardware"]["architecture"] = hold, "parallel"
+    seen = check_resets(sosmith.design(sosmith.Specification.load(tree)), tmp_path, seed)
+    assert min(seen) > 3
 
 
 @pytest.mark.slow

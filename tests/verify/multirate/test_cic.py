@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
 import pytest
 from tests.verify.multirate.single_cores import Made, changed, proven_alone, rejected, rejection
+from tests.verify.parallel.simulated import Inputs, run
 
 import sosmith
 from sosmith.verify.certificate_file import DownsamplingEntry
@@ -19,11 +21,12 @@ CASES = {
     "steady, limited": ("steady", True, True),
     "steady": ("steady", False, True),
     "without a sign": ("steady", False, False),
+    "held": ("zero", True, True, 3, True),
 }
 
 
 @cache
-def made(start: str = "zero", limited: bool = True, signed: bool = True, middle: int = 3) -> Made:
+def made(start: str = "zero", limited: bool = True, signed: bool = True, middle: int = 3, hold: bool = False) -> Made:
     """Make two moving sums of three samples, which decimate by 3; with another tap in the middle, they are products."""
     most = 8.0 if limited else 16.0  # the largest result is 9
     architecture = "parallel" if middle == 3 else "folded"
@@ -31,7 +34,7 @@ def made(start: str = "zero", limited: bool = True, signed: bool = True, middle:
         "name": "little",
         "sample_rate": 1000.0,
         "input": {"x": {"bits": 5, "range": [-1.0 * signed, 1.0], "signed": signed}},
-        "filter": {"taps": [1, 2, middle, 2, 1], "decimate": 3},
+        "filter": {"taps": [1, 2, middle, 2, 1], "decimate": 3, "hold": hold},
         "output": {"bits": 7, "range": [-most, most], "signed": True},
         "hardware": {"start": start, "clock": 1e5, "architecture": architecture},
     }
@@ -39,7 +42,7 @@ def made(start: str = "zero", limited: bool = True, signed: bool = True, middle:
 
 
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES)
-def test_clocks_are_those_of_the_plan(case: tuple[str, bool, bool]) -> None:
+def test_clocks_are_those_of_the_plan(case: tuple[Any, ...]) -> None:
     core = made(*case)
     verdict = check_cic(core.text, core.certificate, core.item)
     architecture = core.design.core.architecture
@@ -47,6 +50,8 @@ def test_clocks_are_those_of_the_plan(case: tuple[str, bool, bool]) -> None:
     assert verdict.latency == architecture.latency_cycles == 6 + case[1]
     assert verdict.result_clocks == architecture.cycles_per_result == 3
     assert verdict.interval == architecture.cycles_per_sample == 1
+    copies = architecture.copies_per_result
+    assert verdict.progress == (1 + copies, verdict.latency + copies - 1, verdict.clearing)
     assert (verdict.adder_bits, verdict.states) == (4 * architecture.plan.width, 4)
     assert verify(core.certificate).bound == core.certificate.claims.bound
 
@@ -84,10 +89,61 @@ def test_what_is_changed_is_found(pattern: str, by: str) -> None:
     assert rejection(check_cic, core, changed(core.text, pattern, by))
 
 
+_HELD_CHANGES = {
+    "a copy too few": (r"copies_is_2 = copies == 2'h2", "copies_is_2 = copies == 2'h1"),
+    "copies that leave without a handshake": (r"leaves = m_axis_tready & \w+", "leaves = copies == 2'h2"),
+    "a count without a handshake": (r"else if \((\w+)\) copies <=", "else if (m_axis_tready) copies <="),
+    "a count that a reset leaves": (r"if \(!aresetn\) copies <= 2'h0;\n    else if", "if"),
+    "a first count": (r"reg \[1:0\] copies = 2'h0", "reg [1:0] copies = 2'h1"),
+    "a result that leaves with each handshake": (r"\.o_ready\(leaves\)", ".o_ready(m_axis_tready)"),
+}
+
+
+@pytest.mark.parametrize(("pattern", "by"), _HELD_CHANGES.values(), ids=_HELD_CHANGES)
+def test_what_is_changed_of_a_held_result_is_found(pattern: str, by: str) -> None:
+    core = made(hold=True)
+    assert rejection(check_cic, core, core.text) == ""
+    assert rejection(check_cic, core, changed(core.text, pattern, by))
+
+
+def test_results_that_are_held_are_no_others() -> None:
+    once, held = made(), made(hold=True)
+    assert rejection(check_cic, once, held.text)
+    sentence = "a core that holds results must have a net leaves, which says when one leaves"
+    assert rejection(check_cic, held, once.text) == sentence
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_held_result_leaves_in_time(seed: int) -> None:
+    """Once the sink is ready, whatever waited before."""
+    core = made(hold=True)
+    pace = check_cic(core.text, core.certificate, core.item).progress
+    inputs = Inputs(core.text, 700, seed)
+    for clock, row in enumerate(inputs.rows):
+        row["aresetn"] = 1
+        if clock % 50 > 12:
+            row["m_axis_tready"] = 1
+    seen = run(inputs)
+    copies, samples, results = 0, 0, list[int]()
+    for clock, (row, out) in enumerate(zip(inputs.rows, seen, strict=True)):
+        if row["s_axis_tvalid"] and out["s_axis_tready"]:
+            if samples % 3 == 0:
+                results.append(clock)
+            samples += 1
+        if row["m_axis_tready"] and out["m_axis_tvalid"]:
+            begun = results[copies // 3]
+            if copies % 3 == 0 and all(row["m_axis_tready"] for row in inputs.rows[begun:clock]):
+                assert clock - begun <= pace.given
+            copies += 1
+    for first in range(13, 650, 50):  # the sink is ready from here on
+        assert any(row["s_axis_tready"] for row in seen[first : first + pace.taken])
+    assert copies > 300
+
+
 @pytest.mark.sweep(1)
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES)
 @pytest.mark.parametrize("seed", range(4))
-def test_whatever_is_edited_is_found(case: tuple[str, bool, bool], seed: int) -> None:
+def test_whatever_is_edited_is_found(case: tuple[Any, ...], seed: int) -> None:
     """What is accepted all the same does the same in simulation."""
     assert rejected(check_cic, made(*case), 30, seed) > 15
 
@@ -152,9 +208,7 @@ def test_a_certificate_of_other_taps() -> None:
         check_cic(made().text, other.certificate, other.item)
 
 
-@pytest.mark.parametrize("change", [{"channels": 2}, {"hold": True}])
-def test_what_it_is_not_for(change: dict[str, object]) -> None:
+def test_what_it_is_not_for() -> None:
     core = made()
-    sentence = r"^a filter that takes a sample at each clock must have one channel, and hold no results$"
-    with pytest.raises(RejectedError, match=sentence):
-        check_cic(core.text, core.certificate, core.item.model_copy(update=change))
+    with pytest.raises(RejectedError, match=r"^a filter that takes a sample at each clock must have one channel$"):
+        check_cic(core.text, core.certificate, core.item.model_copy(update={"channels": 2}))

@@ -79,14 +79,14 @@ def check_cic(text: str, certificate: Certificate, item: ItemEntry) -> CicVerdic
     """
     netlist = decimating_netlist(text, certificate, item)
     with deep_recursion():
-        return _Check(netlist, certificate).checked()
+        return _Check(netlist, certificate, item).checked()
 
 
 class _Check(ResultCheck):
     """The check of a core."""
 
-    def __init__(self, netlist: Netlist, certificate: Certificate) -> None:
-        super().__init__(netlist, certificate)
+    def __init__(self, netlist: Netlist, certificate: Certificate, item: ItemEntry) -> None:
+        super().__init__(netlist, certificate, item)
         factor, order = self.entrance.factor, self.fills_for(self.entrance.factor)
         width = self.netlist.widths.get("sum1", 0)
         most = factor**order

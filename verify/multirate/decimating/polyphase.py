@@ -55,14 +55,14 @@ def check_polyphase(text: str, certificate: Certificate, item: ItemEntry) -> Rin
     """
     netlist = decimating_netlist(text, certificate, item)
     with deep_recursion():
-        return _Check(netlist, certificate).checked()
+        return _Check(netlist, certificate, item).checked()
 
 
 class _Check(ResultCheck):
     """The check of a core."""
 
-    def __init__(self, netlist: Netlist, certificate: Certificate) -> None:
-        super().__init__(netlist, certificate)
+    def __init__(self, netlist: Netlist, certificate: Certificate, item: ItemEntry) -> None:
+        super().__init__(netlist, certificate, item)
         positions = 0
         while f"valid{positions + 1}" in self.netlist.registers:
             positions += 1

@@ -12,7 +12,8 @@
    remembered is 0 after a reset, and results count from the first one on.
 3. From what the inside has at its last position, and the flag there, every register that a result is made of holds what
    is computed of them while the result is at its position, and keeps it while the pipeline stands. The output buffer is
-   a queue of two. What leaves is the output of the certificate's graph, with its flags.
+   a queue of two. What leaves is the output of the certificate's graph, with its flags; a result that is held stays
+   there until it has been handed out R times (`sosmith.verify.multirate.decimating.held`).
 
 Names of registers count in the first step: under a wrong name a proof is not found. The source must keep a sample on
 offer until it is accepted, as AXI4-Stream asks.
@@ -28,6 +29,7 @@ from dataclasses import dataclass
 from sosmith.verify.certificate_file import Certificate, ItemEntry
 from sosmith.verify.graph import RejectedError, require
 from sosmith.verify.multirate.decimating.entrance import READY, Beside, Entrance, Others
+from sosmith.verify.multirate.decimating.held import LEAVES, Held, let_out
 from sosmith.verify.multirate.followed import Followed
 from sosmith.verify.multirate.logic import Logic, Part, check_parts
 from sosmith.verify.multirate.ring.machine import State
@@ -60,17 +62,14 @@ class Case:
 
 
 def decimating_netlist(text: str, certificate: Certificate, item: ItemEntry) -> Netlist:
-    """Read the SystemVerilog of a core for one channel, whose results leave once.
+    """Read the SystemVerilog of a core for one channel.
 
     Raises
     ------
     RejectedError
         If it is for others, or has anything that cannot be read.
     """
-    require(
-        item.channels == 1 and not item.hold,
-        "a filter that takes a sample at each clock must have one channel, and hold no results",
-    )
+    require(item.channels == 1, "a filter that takes a sample at each clock must have one channel")
     modules = read_modules(text, certificate.name)
     check_ports(modules)
     return flattened(modules, CLOCK)
@@ -84,15 +83,19 @@ class ResultCheck(Followed, ABC):
     netlist : Netlist
     certificate : Certificate
         Its certificate, with a downsampling.
+    item : ItemEntry
+        What it is about.
     """
 
-    def __init__(self, netlist: Netlist, certificate: Certificate) -> None:
+    def __init__(self, netlist: Netlist, certificate: Certificate, item: ItemEntry) -> None:
         down = certificate.downsampling
         assert down is not None
         (self.port,) = certificate.inputs
-        whole = split(netlist, {name for name in netlist.registers if _WHOLE.fullmatch(name)})
-        self._search = Search(whole)
-        super().__init__(whole, certificate, _buffer_found(self._search))
+        self._whole = split(netlist, {name for name in netlist.registers if _WHOLE.fullmatch(name)})
+        self._copies = down.factor if item.hold else 1
+        followed, sink = (let_out(self._whole), LEAVES) if self._copies > 1 else (self._whole, SINK)
+        self._search = Search(followed)
+        super().__init__(followed, certificate, _buffer_found(self._search, sink))
         (self.input,) = self.graph.lanes[0].inputs
         self._counter: int | None = None
         self.remembered = self._memory()
@@ -158,7 +161,8 @@ class ResultCheck(Followed, ABC):
     def check(self) -> int:
         """Check everything; return the clocks from the edge that accepts a sample to the one that gives its result."""
         beside = Beside(self.entrance, self.positions, self.left, self.comes)
-        parts: list[Part] = [self.entrance, beside, *self.parts]
+        held = [Held(self._copies, self.buffer.valid)] if self._copies > 1 else []
+        parts: list[Part] = [self.entrance, beside, *held, *self.parts]
         named = dict.fromkeys(name for part in parts for name in part.registers)
         for name in named:
             register = self.netlist.registers.get(name)
@@ -167,7 +171,7 @@ class ResultCheck(Followed, ABC):
             require(register.first is not None, f"{name} must have a value before the first clock")
         valid = self._positions_of_results()
         others = self.netlist.registers.keys() - named.keys()
-        check_parts(self.netlist, [*parts, Others(frozenset(others))], self.entrance.signals)
+        check_parts(self._whole, [*parts, Others(frozenset(others))], self.entrance.signals)
         inside = others - {self.buffer.valid, self.buffer.full, *valid}
         for case in self._cases():
             self._check_result(case, valid, inside)
@@ -186,7 +190,7 @@ class ResultCheck(Followed, ABC):
             clearing=cleared,
             result_clocks=factor,
             factor=factor,
-            pace=Progress(2, latency, cleared),
+            pace=Progress(1 + self._copies, latency + self._copies - 1, cleared),
         )
 
     def _positions_of_results(self) -> list[str]:
@@ -273,12 +277,12 @@ class ResultCheck(Followed, ABC):
         self.check_kept({name}, {self.buffer.full: {}, valid: {}}, "while no sample comes to it")
 
 
-def _buffer_found(search: Search) -> Buffer:
-    """Find the control of the output buffer, and check that it is a queue of two."""
+def _buffer_found(search: Search, sink: str) -> Buffer:
+    """Find the control of the output buffer, and check that it is a queue of two, which a result leaves with `sink`."""
     valid = search.register(search.net("m_axis_tvalid", {}), "m_axis_tvalid")
     ready = search.inverted(search.net(READY, {"filling": 0}))
     full = search.register(ready, f"not {READY}")
     comes = search.loaded(valid, {RESET: 1, full: 0, valid: 0})
-    buffer = Buffer(valid, full, search.register(comes, f"what {valid} takes over"), SINK)
+    buffer = Buffer(valid, full, search.register(comes, f"what {valid} takes over"), sink)
     search.check_buffer(buffer)
     return buffer
