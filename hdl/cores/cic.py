@@ -27,7 +27,7 @@ from amaranth.hdl import Module, Signal, Value
 
 from sosmith.hdl.axi_stream import extended
 from sosmith.hdl.cores.decimating import DecimatingCore, Entered, Summed
-from sosmith.hdl.plan.decimating.cic import cic_plan
+from sosmith.hdl.plan.decimating.cic import CicPlan, cic_plan
 from sosmith.hdl.plan.rounded_sum import rounding
 from sosmith.model.dataflow.datapath import Datapath
 
@@ -78,17 +78,18 @@ class CicCore(DecimatingCore):
             moves = self.later(m, advance, moves, f"moved{k}")
         rounded = self.rounded()
         with m.If(advance):
-            m.d.sync += rounded.eq(self._with_half(value))
+            m.d.sync += rounded.eq(with_half(self.datapath, plan, value))
         return Summed(rounded, moves)
 
-    def _with_half(self, value: Value) -> Value:
-        """Add to the last difference what rounds it, above the bits that stay as they are, and leave out the rest."""
-        plan, (port,) = self._plan, self.datapath.inputs
-        whole = value.as_signed() if port.signed else value
-        grid, begin = rounding([self.datapath])
-        places = grid - plan.frac
-        zeros = (begin & -begin).bit_length() - 1 if begin else 0
-        if zeros > places:
-            whole, places, begin, grid = whole >> (zeros - places), 0, begin >> zeros, grid - zeros
-        total = (whole << places) + begin
-        return total >> grid if grid > 0 else total << -grid
+
+def with_half(datapath: Datapath, plan: CicPlan, value: Value) -> Value:
+    """Add to the last difference what rounds it, above the bits that stay as they are, and leave out the rest."""
+    (port,) = datapath.inputs
+    whole = value.as_signed() if port.signed else value
+    grid, begin = rounding([datapath])
+    places = grid - plan.frac
+    zeros = min((begin & -begin).bit_length() - 1, max(grid, 0)) if begin else 0
+    if zeros > places:
+        whole, places, begin, grid = whole >> (zeros - places), 0, begin >> zeros, grid - zeros
+    total = (whole << places) + begin
+    return total >> grid if grid > 0 else total << -grid

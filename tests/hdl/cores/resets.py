@@ -12,7 +12,7 @@ import numpy as np
 
 import sosmith
 from sosmith.gen.output.verilog import core_verilog
-from sosmith.hdl.plan.streams import channel_bits
+from sosmith.hdl.plan.streams import dest_width
 
 BENCH = """
 module bench;
@@ -78,7 +78,7 @@ def check_resets(design: sosmith.Design, folder: Path, seed: int, *, beats: int 
     (port,), channels = design.core.datapath.inputs, spec.channels
     bits = 8 * -(-port.bits // 8)
     several = channels > 1
-    dest_bits = 8 * -(-channel_bits(channels) // 8) if several else 1
+    dest_bits = dest_width(channels) if several else 1
     words = [_beat(rng, port, channels) for _ in range(beats)]
     lines = [f"{channel << bits | code % (1 << port.bits):x}" for channel, code in words]
     (folder / "beats.hex").write_text("\n".join(lines) + "\n", encoding="utf-8")
@@ -89,7 +89,7 @@ def check_resets(design: sosmith.Design, folder: Path, seed: int, *, beats: int 
         word=bits + dest_bits - 1,
         last=beats - 1,
         name=spec.name,
-        clocks=beats * 12 + 4 * design.core.architecture.latency_cycles * (channels + 2) + 400,
+        clocks=beats * 20 + 4 * design.core.architecture.latency_cycles * (channels + 2) + 400,
         every=max(100, 3 * design.core.architecture.latency_cycles),
     )
     if not several:
@@ -116,7 +116,8 @@ def _beat(rng: random.Random, port: sosmith.Port, channels: int) -> tuple[int, i
     if channels == 1:
         return 0, code
     channel = rng.choice([0, channels - 1, rng.randrange(channels), rng.randrange(channels)])
-    return (channel if rng.random() < 0.95 else rng.randrange(channels, 256)), code
+    beyond = 1 << dest_width(channels)
+    return (channel if rng.random() < 0.95 or channels == beyond else rng.randrange(channels, beyond)), code
 
 
 Run = tuple[list[list[str]], list[list[str]]]
@@ -137,9 +138,16 @@ def _runs(lines: list[str]) -> Iterator[Run]:
     yield samples, results
 
 
+def _wanted(design: sosmith.Design, codes: list[int], channel: int) -> tuple[list[int], list[int]]:
+    """Return the results and flags of a channel: as of the same samples in all of them, as each may have own limits."""
+    block = np.repeat(np.array(codes, np.int64)[:, np.newaxis], design.specification.checked.channels, axis=1)
+    results, status = design.core.datapath.compute_with_status(block[:, :, np.newaxis])
+    return results[:, channel].tolist(), status[:, channel].tolist()
+
+
 def _check_run(design: sosmith.Design, samples: list[list[str]], results: list[list[str]], *, last: bool) -> None:
     """Check the results that came between two resets."""
-    spec, datapath = design.specification.checked, design.core.datapath
+    spec = design.specification.checked
     factor, port = int(spec.filter.decimate or 1), design.core.datapath.inputs[0]
     codes: dict[int, list[int]] = {}
     order: list[tuple[int, int]] = []
@@ -152,9 +160,7 @@ def _check_run(design: sosmith.Design, samples: list[list[str]], results: list[l
             order += [(channel, len(own) // factor)] * design.core.architecture.copies_per_result
         code = int(word, 16) % (1 << port.bits)
         own.append(code - (1 << port.bits) if code > port.highest else code)
-    wanted = {
-        channel: datapath.compute_with_status(np.array(own, np.int64)[:, np.newaxis]) for channel, own in codes.items()
-    }
+    wanted = {channel: _wanted(design, own, channel) for channel, own in codes.items()}
     assert len(results) <= len(order)
     assert not last or len(results) == len(order), f"{len(results)} of {len(order)} results left"
     for (channel, number), (where, word, flags) in zip(order, results, strict=False):

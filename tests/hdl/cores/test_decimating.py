@@ -54,12 +54,13 @@ def test_all_results_leave_another_core() -> None:
             core(replace(datapath, downsampler=None))
 
 
-@pytest.mark.parametrize(("seed", "hold"), [(41, True), (3, True), (44, False)])
+@pytest.mark.parametrize(("seed", "hold"), [(41, True), (3, True), (57, False)])
 def test_results_are_those_of_the_model_after_any_reset(seed: int, hold: bool, tmp_path: Path) -> None:
     tree = draw(seed).specification.as_dict() | {"channels": 1}
     tree["filter"]["hold"], tree["hardware"]["architecture"] = hold, "parallel"
     seen = check_resets(sosmith.design(sosmith.Specification.load(tree)), tmp_path, seed)
-    assert min(seen) > 3
+    assert seen.results > 3
+    assert seen.resets > 1
 
 
 @pytest.mark.slow
