@@ -19,7 +19,7 @@ from sosmith.gen.architectures.polyphase import Polyphase
 from sosmith.gen.architectures.serial import Serial
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.specification.choices import AUTO
-from sosmith.gen.specification.combinations import CIC_DECIMATE, FIR_DECIMATE, FOLDED, PARALLEL, Option, Terms
+from sosmith.gen.specification.combinations import CHANNELS, CIC_DECIMATE, FIR_DECIMATE, FOLDED, PARALLEL, Option, Terms
 from sosmith.model.dataflow.datapath import Datapath
 
 SMALLEST_FIRST: tuple[type[Architecture], ...] = (Serial, Folded, Multiplexed, Parallel, Online)
@@ -42,8 +42,10 @@ def candidates(
     """
     folded: tuple[type[Architecture], ...] = (NarrowFir, FoldedFir) if blocks.asked is None else (NarrowFir,)
     ways: tuple[tuple[Terms, tuple[type[Architecture], ...]], ...] = ()
-    if CIC_DECIMATE in options:  # adders alone, without a multiplier or memory, before one multiplier and rings
+    if CIC_DECIMATE in options and CHANNELS not in options:  # adders alone, without a multiplier or memory
         ways = ((PARALLEL, (Cic,)), (FOLDED, folded))
+    elif CIC_DECIMATE in options:  # the adders have more memories than one multiplier and rings
+        ways = ((FOLDED, folded), (PARALLEL, (Cic,)))
     elif FIR_DECIMATE in options:
         ways = ((FOLDED, folded), (PARALLEL, (Polyphase,)))
     if ways:

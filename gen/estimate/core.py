@@ -49,7 +49,7 @@ def quantities_of(architecture: Architecture, device: Device) -> Quantities:
     elif isinstance(architecture, FoldedFir):
         made = of_rings(architecture, device)
     elif isinstance(architecture, Cic):
-        made = of_cic(architecture)
+        made = of_cic(architecture, device)
         made["counters"] += (architecture.copies_per_result - 1).bit_length()
     elif isinstance(architecture, Polyphase):
         made = of_polyphase(architecture, device)

@@ -250,7 +250,8 @@ PARALLEL = Terms(
         (RELOAD, NO_MULTIPLIERS): _FIXED,
         (RELOAD, CIC_DECIMATE): _NO_TAPS,
         (RELOAD, FIR_DECIMATE): LATER,
-        **dict.fromkeys(((one, other) for one in (CHANNELS, PROTECT) for other in (FIR_DECIMATE, CIC_DECIMATE)), LATER),
+        (CHANNELS, FIR_DECIMATE): LATER,
+        **dict.fromkeys(((PROTECT, other) for other in (FIR_DECIMATE, CIC_DECIMATE)), LATER),
     },
 )
 FOLDED = Terms("folded", {SEVERAL: _SLOW, LOOK_AHEAD: _SLOW, NO_MULTIPLIERS: _ONE_BLOCK})

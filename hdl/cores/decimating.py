@@ -66,7 +66,7 @@ class Summed(NamedTuple):
 
 
 class DecimatingCore(Shell):
-    """An FIR filter that decimates, for one channel, with a sample at each clock.
+    """An FIR filter that decimates, with a sample at each clock; `fill` makes it for one channel.
 
     Parameters
     ----------
@@ -76,6 +76,8 @@ class DecimatingCore(Shell):
         How samples become results.
     copies : int
         Times that each result is handed out.
+    channels : int
+        Number of channels.
 
     Members
     -------
@@ -83,10 +85,10 @@ class DecimatingCore(Shell):
         As those of `sosmith.hdl.shell.shell.Shell`.
     """
 
-    def __init__(self, datapath: Datapath, plan: DecimatingPlan, copies: int = 1) -> None:
+    def __init__(self, datapath: Datapath, plan: DecimatingPlan, copies: int = 1, channels: int = 1) -> None:
         self._pace = plan
         self._copies = copies
-        super().__init__(datapath)
+        super().__init__(datapath, channels)
 
     @abstractmethod
     def sums(self, m: Module, sample: Entered) -> Summed:
@@ -114,7 +116,8 @@ class DecimatingCore(Shell):
             m.d.sync += rail.eq(rail_now & ~completes)
         (code,) = self.codes(self.s_axis_tdata)
         summed = self.sums(m, Entered(advance, self.s_axis_tvalid, enters, phase, completes, code))
-        result = self._limited(m, advance, summed)
+        counts, settling = self._left(m, advance, summed.comes)
+        result = self.limited(m, advance, summed, counts=counts, settling=settling)
         flags = status_of_result(
             m,
             self.datapath,
@@ -123,9 +126,9 @@ class DecimatingCore(Shell):
             saturated=result.saturated,
             settling=result.settling,
         ).flags
-        self.hand_out(m, buffer, result.valid, [(result.code, flags)], leaves=self._leaves(m))
+        self.hand_out(m, buffer, result.valid, [(result.code, flags)], leaves=self.leaves(m))
 
-    def _leaves(self, m: Module) -> Value | None:
+    def leaves(self, m: Module) -> Value | None:
         """Return whether the result at the output leaves, if it is there; None if it does with each handshake."""
         if self._copies == 1:
             return None
@@ -147,9 +150,8 @@ class DecimatingCore(Shell):
                 m.d.sync += filling.eq(0)
         return filling
 
-    def _limited(self, m: Module, advance: Value, summed: Summed) -> _Result:
+    def limited(self, m: Module, advance: Value, summed: Summed, *, counts: Value, settling: Value) -> _Result:
         """Limit results where they may be outside; let none pass that does not count."""
-        counts, settling = self._left(m, advance, summed.comes)
         valid = self.later(m, advance, summed.comes & counts, "result_valid")
         settling = self.later(m, advance, settling, "settling", reset_less=True)
         if not self._pace.limits:

@@ -37,6 +37,8 @@ class Followed:
     certificate : Certificate
     buffer : Buffer
         Its output buffer.
+    channels : int
+        Number of channels, of which a result is followed of any one.
 
     Attributes
     ----------
@@ -46,13 +48,16 @@ class Followed:
     graph : GraphCodes
         What it must compute.
     machine : Machine
+    channel : Form
+        The channel of the result; 0 if there is only one.
     """
 
-    def __init__(self, netlist: Netlist, certificate: Certificate, buffer: Buffer) -> None:
+    def __init__(self, netlist: Netlist, certificate: Certificate, buffer: Buffer, channels: int = 1) -> None:
         self.netlist, self.certificate, self.buffer = netlist, certificate, buffer
         self.forms = Forms()
         self.graph = GraphCodes(certificate, self.forms)
-        self.machine = Machine(netlist, self.forms, {}, {})
+        self.channel = self.forms.variable("channel", 0, channels - 1) if channels > 1 else {}
+        self.machine = Machine(netlist, self.forms, {}, self.channel)
         self._limits = wear_limits(self, netlist, certificate, "")
         self._dependence = Dependence(netlist, frozenset())
         self._number = 0

@@ -215,7 +215,7 @@ class Logic:
         self._netlist, self._case, self._ranges = netlist, case, ranges
         self._layout, self._one_hot = signals
         undriven = {name for name in netlist.widths if name not in netlist.drivers and name not in netlist.registers}
-        self._nets = Evaluation(netlist, self.forms, self.word, word=self.read, cuts=undriven)
+        self._nets = Evaluation(netlist, self.forms, self.word, word=self.read, cuts=undriven, fields=self._field)
 
     def limits(self, name: str) -> tuple[int, int]:
         """Return the limits of a register, an input, or what leaves the core behind, in this case.
@@ -249,12 +249,24 @@ class Logic:
             return self.signal(name)
         total: Form = {}
         done, width = 0, self._netlist.widths[name]
-        for signal, bits, low in self._layout[name]:
-            part = self.forms.floor(shifted(self.signal(signal), -low))
-            total = plus(total, self.forms.unsigned(part, bits), 1 << done)
-            done += bits
+        for field in self._layout[name]:
+            total = plus(total, self._part(field), 1 << done)
+            done += field.width
         require(done <= width, f"{name} must have {done} bits, not {width}")
         return plus(total, self.forms.variable("rest", 0, (1 << width - done) - 1), 1 << done)
+
+    def _field(self, name: str, low: int, width: int) -> Form | None:
+        """Return bits of a word that are just one of its parts, of which alone something must be known then."""
+        done = 0
+        for field in self._layout.get(name, ()):
+            if (done, field.width) == (low, width):
+                return self._part(field)
+            done += field.width
+        return None
+
+    def _part(self, field: Field) -> Form:
+        signal, bits, low = field
+        return self.forms.unsigned(self.forms.floor(shifted(self.signal(signal), -low)), bits)
 
     def signal(self, name: str) -> Form:
         """Return the value of a signal that is a net or a field of one."""

@@ -94,6 +94,11 @@ class Netlist:
         self.fields[field.name] = self.fields.get(name, name)
         self.drivers.setdefault(name, []).append(Driver(low, field.width, Bits(field.name), 0))
 
+    def with_input(self, name: str) -> Netlist:
+        """Return the netlist with a net that is an input, in place of what drives it."""
+        drivers = {other: own for other, own in self.drivers.items() if other != name}
+        return replace(self, ports={**self.ports, name: "input"}, drivers=drivers)
+
     def holder(self, name: str) -> str | None:
         """Return the register that a net is, or whose bits it has below constant ones; None for others."""
         if name in self.registers:

@@ -7,7 +7,7 @@ interpolation", 1981): N integrators at each sample, N combs at every R-th, modu
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 from sosmith.hdl.plan.decimating.plan import DecimatingPlan, paced
 from sosmith.hdl.plan.rounded_sum import finest
@@ -53,8 +53,55 @@ class CicPlan(DecimatingPlan):
 
     @property
     def register_bits(self) -> int:
-        """Bits of integrators, and of what combs remember and give."""
+        """Bits of integrators, and of what combs remember and give, of one channel."""
         return 3 * self.order * self.width
+
+
+@dataclass(frozen=True, kw_only=True)
+class ChannelCicPlan(CicPlan):
+    """Integrators and combs whose states are in memories, with a word for each channel.
+
+    Attributes
+    ----------
+    channels : int
+        Number of channels, at least 2.
+    order, width, frac, factor, filled, settling, limits
+        As of `CicPlan`.
+    """
+
+    channels: int
+
+    @property
+    def clocks(self) -> int:
+        """One for what is kept of the channel, one for each integrator and comb, and one for the rounding."""
+        return super().clocks + 1
+
+    @property
+    def latency_cycles(self) -> int:
+        """Clocks from the edge that accepts a sample to the one that can output its result.
+
+        That of the first sample of a channel, which may fill the filter before, at every second clock.
+        """
+        return super().latency_cycles + 2 * self.fills * self.factor
+
+    @property
+    def reset_cycles(self) -> int:
+        """Clocks after a reset until a sample is accepted, in which a word for each channel is cleared."""
+        return self.channels
+
+
+def channel_cic_plan(datapath: Datapath, channels: int) -> ChannelCicPlan:
+    """Return the integrators and combs of a datapath that is one FIR filter which decimates, for several channels.
+
+    Raises
+    ------
+    ValueError
+        As `cic_plan`, or if there are no several channels.
+    """
+    if channels < 2:
+        raise ValueError(f"channels must be at least 2, not {channels}")
+    plan = cic_plan(datapath)
+    return ChannelCicPlan(**{each.name: getattr(plan, each.name) for each in fields(plan)}, channels=channels)
 
 
 def cic_plan(datapath: Datapath) -> CicPlan:

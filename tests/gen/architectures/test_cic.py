@@ -10,7 +10,8 @@ import pytest
 import sosmith
 from sosmith.gen.estimate.estimate import estimated
 from sosmith.gen.fpga.boards import find_board
-from sosmith.hdl.plan.decimating.cic import cic_plan
+from sosmith.hdl.plan.decimating.cic import channel_cic_plan, cic_plan
+from sosmith.model.dataflow.cic import impulse_response
 
 
 def specification(taps: list[float], *, filter_: dict[str, Any] | None = None, **hardware: Any) -> Any:
@@ -61,6 +62,56 @@ def test_results_are_held(taps: list[float]) -> None:
     made = sosmith.design(specification(taps, filter_={"hold": True}, architecture="parallel"))
     assert made.core.architecture.copies_per_result == 4
     assert made.cycles_per_sample == 1
+
+
+def several(channels: int = 3, **hardware: Any) -> Any:
+    tree = specification(MEANS).as_dict() | {"channels": channels, "sample_rate": 1e5, "hardware": hardware}
+    return sosmith.Specification.load(tree)
+
+
+def test_several_channels_have_memories() -> None:
+    made = sosmith.design(several(clock=1e6, architecture="parallel"))
+    assert made.reasons["architecture"] == (
+        "parallel: asked for in the specification; 2 integrators and as many combs of 12 bits, a sample a clock"
+    )
+    architecture = made.core.architecture
+    filled = 2 * 2 * 4  # the first sample of a channel, at every second clock
+    assert (architecture.plan.clocks, architecture.latency_cycles) == (6, 6 + 1 + filled)
+    assert (architecture.reset_cycles, architecture.cycles_per_sample) == (3, 1)
+    found = estimated(architecture, find_board("ulx3s_25f"))
+    assert found is not None
+    assert found.memory_bits == 3 * (4 * 12 + 4)
+
+
+def test_several_channels_have_adders_where_a_ring_is_too_slow_or_has_no_multiplier() -> None:
+    assert sosmith.design(several(clock=1e7)).architecture == "folded"
+    assert sosmith.design(several(clock=1e7, multipliers=0)).architecture == "parallel"
+    quick = sosmith.design(several(clock=3e5))
+    assert quick.architecture == "parallel"
+    assert "the folded architecture takes 1" in quick.reasons["architecture"]
+    with pytest.raises(sosmith.ShortfallError, match=r"the parallel architecture takes 4 clocks for 4 samples: at a "):
+        sosmith.design(several(clock=2.9e5, architecture="parallel"))
+
+
+@pytest.mark.parametrize("channels", [4, 32])
+def test_memories_of_channels_are_estimated(channels: int) -> None:
+    """Synthesis for an ECP5 takes 626 to 840 LUT4, and 442 to 641 flip-flops: LUT RAM has words for 16 channels."""
+    order, factor = (4, 16) if channels == 4 else (3, 8)
+    tree = several(channels, architecture="parallel", clock=48e6).as_dict()
+    tree["filter"] |= {"taps": [tap / factor**order for tap in impulse_response(factor, order)], "decimate": factor}
+    tree["input"]["x"]["bits"] = tree["output"]["bits"] = 16
+    del tree["output"]["max_error"]
+    found = estimated(sosmith.design(sosmith.Specification.load(tree)).core.architecture, find_board("ulx3s_25f"))
+    assert found is not None
+    luts, flip_flops = (640, 630) if channels == 4 else (840, 442)
+    assert found.luts == pytest.approx(luts, rel=0.15)
+    assert found.flip_flops == pytest.approx(flip_flops, rel=0.15)
+
+
+def test_one_channel_has_no_memories() -> None:
+    datapath = sosmith.design(specification(MEANS)).core.datapath
+    with pytest.raises(ValueError, match=r"^channels must be at least 2, not 1$"):
+        channel_cic_plan(datapath, 1)
 
 
 def test_taps_must_be_exact() -> None:

@@ -57,7 +57,7 @@ def rejected(check: Check, core: Made, count: int, seed: int) -> int:
     """Edit a text at random; what is accepted must do the same in simulation. Return how many are rejected."""
 
     def seen(text: str) -> object:
-        return outputs(text, 400, seed)
+        return outputs(text, 400, seed, core.item.channels)
 
     edited = random_edits(core.text, count, seed)
     return swept(edited, lambda text: rejection(check, core, text), seen, core.text)["rejected"]

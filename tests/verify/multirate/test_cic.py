@@ -206,9 +206,3 @@ def test_a_certificate_of_other_taps() -> None:
     other = made(middle=4)
     with pytest.raises(RejectedError, match=r"^m_axis_tdata must be node \d+ .* of output_stage, not another value$"):
         check_cic(made().text, other.certificate, other.item)
-
-
-def test_what_it_is_not_for() -> None:
-    core = made()
-    with pytest.raises(RejectedError, match=r"^a filter that takes a sample at each clock must have one channel$"):
-        check_cic(core.text, core.certificate, core.item.model_copy(update={"channels": 2}))

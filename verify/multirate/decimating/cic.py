@@ -8,7 +8,9 @@ Each register takes over what `sosmith.verify.multirate.decimating.ladder` says.
 moving sums, modulo ``2**width``, once each comb holds a result: what the sums held before does not count, as each comb
 takes away a power of the polynomial that comes of it. So the last difference is the sum of the samples times the taps
 of N moving sums, as that fits so many bits; after N R times the first sample, that is so whatever there was before.
-Everything else is as for any core that decimates (`sosmith.verify.multirate.decimating.results`).
+Several channels have memories in place of sums and combs, of which each is shown the same by itself
+(`sosmith.verify.multirate.decimating.channels`). Everything else is as for any core that decimates
+(`sosmith.verify.multirate.decimating.results`).
 """
 
 from __future__ import annotations
@@ -18,9 +20,11 @@ from dataclasses import dataclass, fields
 
 from sosmith.verify.certificate_file import Certificate, ItemEntry
 from sosmith.verify.graph import require
+from sosmith.verify.multirate.decimating.channel_ladder import ChannelLadder
+from sosmith.verify.multirate.decimating.channels import ChannelEntrance
 from sosmith.verify.multirate.decimating.ladder import Ladder
 from sosmith.verify.multirate.decimating.results import ResultCheck, decimating_netlist
-from sosmith.verify.multirate.logic import Logic, Part
+from sosmith.verify.multirate.logic import Logic, MemoryPart, Part
 from sosmith.verify.multirate.ring.verdict import RingVerdict
 from sosmith.verify.parallel.netlist import Netlist
 from sosmith.verify.program.normal_form import Form, constant, plus
@@ -77,7 +81,7 @@ def check_cic(text: str, certificate: Certificate, item: ItemEntry) -> CicVerdic
     RejectedError
         If it computes anything else, or has anything that is not known here.
     """
-    netlist = decimating_netlist(text, certificate, item)
+    netlist = decimating_netlist(text, certificate, item.channels)
     with deep_recursion():
         return _Check(netlist, certificate, item).checked()
 
@@ -93,7 +97,11 @@ class _Check(ResultCheck):
         low, high = (-(1 << width - 1), (1 << width - 1) - 1) if self.port.signed and width else (0, (1 << width) - 1)
         fits = low <= self.port.lowest * most and self.port.highest * most <= high
         require(fits, f"sum1 must have bits for {most} times the range of the input, not {width} bits")
-        self._ladder = Ladder(self.entrance, order, width)
+        self._ladder: Ladder | ChannelLadder
+        if isinstance(self.entrance, ChannelEntrance):
+            self._ladder = ChannelLadder(self.entrance, order, width)
+        else:
+            self._ladder = Ladder(self.entrance, order, width)
 
     def fills_for(self, factor: int) -> int:
         """Return N, which follows from what the graph remembers."""
@@ -108,6 +116,11 @@ class _Check(ResultCheck):
     def parts(self) -> Sequence[Part]:
         """Integrators and combs."""
         return [self._ladder]
+
+    @property
+    def memories(self) -> MemoryPart | None:
+        """Those of several channels."""
+        return self._ladder if isinstance(self._ladder, ChannelLadder) else None
 
     @property
     def positions(self) -> int:

@@ -12,7 +12,7 @@ as an input.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from sosmith.verify.graph import require
 from sosmith.verify.multirate.decimating.entrance import by_ends
@@ -77,5 +77,4 @@ def let_out(netlist: Netlist) -> Netlist:
     """
     named = netlist.widths.get(LEAVES) == 1 and LEAVES in netlist.drivers
     require(named, f"a core that holds results must have a net {LEAVES}, which says when one leaves")
-    drivers = {name: own for name, own in netlist.drivers.items() if name != LEAVES}
-    return replace(netlist, ports={**netlist.ports, LEAVES: "input"}, drivers=drivers)
+    return netlist.with_input(LEAVES)

@@ -24,6 +24,7 @@ from collections.abc import Hashable, Iterator, Mapping, Sequence, Set
 
 from sosmith.verify.certificate_file import Certificate, ItemEntry
 from sosmith.verify.graph import require
+from sosmith.verify.multirate.decimating.entrance import Entrance
 from sosmith.verify.multirate.decimating.line import Line
 from sosmith.verify.multirate.decimating.results import ResultCheck, decimating_netlist
 from sosmith.verify.multirate.logic import Logic, Part
@@ -53,7 +54,8 @@ def check_polyphase(text: str, certificate: Certificate, item: ItemEntry) -> Rin
     RejectedError
         If it computes anything else, or has anything that is not known here.
     """
-    netlist = decimating_netlist(text, certificate, item)
+    require(item.channels == 1, "a filter that takes a sample at each clock must have one channel")
+    netlist = decimating_netlist(text, certificate, item.channels)
     with deep_recursion():
         return _Check(netlist, certificate, item).checked()
 
@@ -76,6 +78,7 @@ class _Check(ResultCheck):
         require(
             length <= self.remembered + 1, f"the line must hold at most {self.remembered + 1} samples, not {length}"
         )
+        assert isinstance(self.entrance, Entrance)  # that of one channel
         self._line = Line(self.entrance, length, positions)
 
     def fills_for(self, factor: int) -> int:

@@ -9,7 +9,8 @@
    inside that have names there.
 2. With a steady start, the first sample goes in so often before it is accepted that all that the inside remembers is
    that sample. The results that it has by then are left out, as `left` counts them. With a start from zero, all that is
-   remembered is 0 after a reset, and results count from the first one on.
+   remembered is 0 after a reset, and results count from the first one on. Of several channels, each has a first sample
+   and a count of its own (`sosmith.verify.multirate.decimating.channels`); a result is followed of any one.
 3. From what the inside has at its last position, and the flag there, every register that a result is made of holds what
    is computed of them while the result is at its position, and keeps it while the pipeline stands. The output buffer is
    a queue of two. What leaves is the output of the certificate's graph, with its flags; a result that is held stays
@@ -28,13 +29,15 @@ from dataclasses import dataclass
 
 from sosmith.verify.certificate_file import Certificate, ItemEntry
 from sosmith.verify.graph import RejectedError, require
+from sosmith.verify.multirate.decimating.channels import ChannelBeside, ChannelEntrance, read_of, with_near
 from sosmith.verify.multirate.decimating.entrance import READY, Beside, Entrance, Others
 from sosmith.verify.multirate.decimating.held import LEAVES, Held, let_out
 from sosmith.verify.multirate.followed import Followed
-from sosmith.verify.multirate.logic import Logic, Part, check_parts
+from sosmith.verify.multirate.logic import Logic, MemoryPart, Part, check_parts
 from sosmith.verify.multirate.ring.machine import State
 from sosmith.verify.multirate.ring.verdict import RingVerdict
-from sosmith.verify.parallel.check import CLOCK, check_ports
+from sosmith.verify.parallel.channels import DEST
+from sosmith.verify.parallel.check import CLOCK, OUTPUT_DEST, check_ports
 from sosmith.verify.parallel.control import RESET, SINK, Buffer, Search
 from sosmith.verify.parallel.graph_codes import DATA
 from sosmith.verify.parallel.netlist import Netlist, flattened
@@ -43,8 +46,13 @@ from sosmith.verify.program.normal_form import Form, constant, plus
 from sosmith.verify.progress import Progress
 from sosmith.verify.reader.source import read_modules
 
-_WHOLE = re.compile(r"(?:sum|comb|difference|line|phase)\d+|left|phase|filled|total")
+_WHOLE = re.compile(
+    r"(?:sum|comb|difference|line|phase|channel)\d+|left|phase|filled|total|sample|channel|copies|\w+_memory_read"
+)
 """Registers that stay whole, whatever they take over."""
+
+_FULL = "output_buffer.full"
+"""The register of the output buffer of several channels that is 1 while it has no room."""
 
 _COUNT_BITS = 64
 """Bits in which counts are compared: more than any has."""
@@ -61,17 +69,16 @@ class Case:
     counted: Form | None
 
 
-def decimating_netlist(text: str, certificate: Certificate, item: ItemEntry) -> Netlist:
-    """Read the SystemVerilog of a core for one channel.
+def decimating_netlist(text: str, certificate: Certificate, channels: int) -> Netlist:
+    """Read the SystemVerilog of a core for so many channels.
 
     Raises
     ------
     RejectedError
-        If it is for others, or has anything that cannot be read.
+        If it has other ports, or anything that cannot be read.
     """
-    require(item.channels == 1, "a filter that takes a sample at each clock must have one channel")
     modules = read_modules(text, certificate.name)
-    check_ports(modules)
+    check_ports(modules, channels)
     return flattened(modules, CLOCK)
 
 
@@ -92,10 +99,12 @@ class ResultCheck(Followed, ABC):
         assert down is not None
         (self.port,) = certificate.inputs
         self._whole = split(netlist, {name for name in netlist.registers if _WHOLE.fullmatch(name)})
-        self._copies = down.factor if item.hold else 1
+        self._copies, self._channels = down.factor if item.hold else 1, item.channels
+        self._whole = with_near(self._whole) if self._several else self._whole
         followed, sink = (let_out(self._whole), LEAVES) if self._copies > 1 else (self._whole, SINK)
         self._search = Search(followed)
-        super().__init__(followed, certificate, _buffer_found(self._search, sink))
+        full = _FULL if self._several else None
+        super().__init__(followed, certificate, _buffer_found(self._search, sink, full), self._channels)
         (self.input,) = self.graph.lanes[0].inputs
         self._counter: int | None = None
         self.remembered = self._memory()
@@ -105,8 +114,21 @@ class ResultCheck(Followed, ABC):
         counted = 0 if self._counter is None else self.graph.nodes[self._counter].entry.high
         require(not (down.filled and counted), "no result must be settling where the first sample fills the filter")
         fills = self.fills_for(down.factor) if down.filled else 0
-        self.entrance = Entrance(self.port, down.factor, fills, self.buffer.full)
         self.left = fills or -(-counted // down.factor)
+        self.entrance: Entrance | ChannelEntrance = Entrance(self.port, down.factor, fills, self.buffer.full)
+        if self._several:
+            settling, dest = self.left * (not fills), self.netlist.widths[DEST]
+            whole = -(-(self._channels - 1).bit_length() // 8) * 8
+            for port in (DEST, OUTPUT_DEST):
+                require(self.netlist.widths[port] == whole, f"the port {port} must have {whole} bits")
+            self.entrance = ChannelEntrance(
+                self.port, down.factor, fills, self.buffer.full, self._channels, settling, dest
+            )
+
+    @property
+    def _several(self) -> bool:
+        """Whether there are several channels."""
+        return self._channels > 1
 
     # What the inside is.
 
@@ -120,9 +142,14 @@ class ResultCheck(Followed, ABC):
         """Parts of the hardware inside."""
 
     @property
+    def memories(self) -> MemoryPart | None:
+        """That of the parts inside that has memories."""
+        return None
+
+    @property
     @abstractmethod
     def positions(self) -> int:
-        """Positions of a sample before the register of its result."""
+        """Positions of a sample before the register of its result, but for the one in front of several channels."""
 
     @abstractmethod
     def comes(self, now: Logic) -> bool:
@@ -160,37 +187,46 @@ class ResultCheck(Followed, ABC):
 
     def check(self) -> int:
         """Check everything; return the clocks from the edge that accepts a sample to the one that gives its result."""
-        beside = Beside(self.entrance, self.positions, self.left, self.comes)
         held = [Held(self._copies, self.buffer.valid)] if self._copies > 1 else []
-        parts: list[Part] = [self.entrance, beside, *held, *self.parts]
+        parts: list[Part] = [self.entrance, self._beside, *held, *self.parts]
         named = dict.fromkeys(name for part in parts for name in part.registers)
         for name in named:
             register = self.netlist.registers.get(name)
             if register is None:
                 raise RejectedError(f"the core must have a register {name}")
-            require(register.first is not None, f"{name} must have a value before the first clock")
+            known = register.first is not None or name in {read_of(memory) for memory in self.netlist.memories}
+            require(known, f"{name} must have a value before the first clock")
         valid = self._positions_of_results()
         others = self.netlist.registers.keys() - named.keys()
-        check_parts(self._whole, [*parts, Others(frozenset(others))], self.entrance.signals)
+        check_parts(self._whole, [*parts, Others(frozenset(others))], self.entrance.signals, self.memories)
         inside = others - {self.buffer.valid, self.buffer.full, *valid}
         for case in self._cases():
             self._check_result(case, valid, inside)
-        return self.positions + len(valid) + 1
+        return self._several + self.positions + len(valid) + 1
+
+    @property
+    def _beside(self) -> Part:
+        """What goes along with samples."""
+        if isinstance(self.entrance, ChannelEntrance):
+            return ChannelBeside(self.entrance, self.positions)
+        return Beside(self.entrance, self.positions, self.left, self.comes)
 
     def verdict(self, states: int) -> RingVerdict:
         """Check everything; return what is proven, of a core with so many states."""
         latency, factor = self.check(), self.entrance.factor
-        cleared = self.entrance.fills * factor
+        filled = self.entrance.fills * factor
+        cleared, waits = (self._channels, 2 * filled) if self._several else (filled, 0)
+        stands = self._copies + (self._copies - 1) * (self.positions + _MOST_POSITIONS) * self._several
         return RingVerdict(
             registers=len(self.netlist.registers),
             memories=len(self.netlist.memories),
             states=states,
-            latency=latency,
-            waits=0,
+            latency=latency + waits,
+            waits=int(self._several),
             clearing=cleared,
             result_clocks=factor,
             factor=factor,
-            pace=Progress(1 + self._copies, latency + self._copies - 1, cleared),
+            pace=Progress(1 + waits + self._several + stands, latency + waits + stands - 1 + self._several, cleared),
         )
 
     def _positions_of_results(self) -> list[str]:
@@ -201,7 +237,7 @@ class ResultCheck(Followed, ABC):
         search, full = self._search, self.buffer.full
         chain = [self.buffer.coming]
         inner = {name for case, _ in self.coming() for name in case}
-        counted = {"left": 0} if self.entrance.fills else {}
+        counted = self._that_counts
         while len(chain) < _MOST_POSITIONS:
             before = search.one_register(search.loaded(chain[0], {RESET: 1, full: 0, chain[0]: 0, **counted}))
             if before is None or before in inner:
@@ -219,22 +255,41 @@ class ResultCheck(Followed, ABC):
         """
         full = self.buffer.full
         self.check_kept({first}, {full: constant(1)}, "while the pipeline stands")
-        some = self.forms.variable("some left", 1, (1 << self.left.bit_length()) - 1) if self.left else {}
-        skips = self.entrance.fills > 0
-        for left, counts in (({}, True), *([(some, not skips)] if self.left else [])):
-            count: Mapping[str, Form] = {"left": left} if self.left else {}
+        for count, counts in self._counting():
             for inside, comes in self.coming():
                 word = self.after({first}, {**inside, **count, full: {}}).get(first)
                 right = word is not None and self.is_same(word, constant(int(comes and counts)), 1)
                 require(right, f"{first} must be 1 behind a result that counts, and 0 otherwise")
 
+    @property
+    def _that_counts(self) -> Mapping[str, int]:
+        """What control registers hold with a result that counts, where the first ones do not."""
+        if not self.entrance.fills:
+            return {}
+        return {f"counts{self.positions}": 1} if self._several else {"left": 0}
+
+    def _counting(self) -> list[tuple[Mapping[str, Form], bool]]:
+        """Return what may be known of whether a result counts, and whether it does."""
+        skips, top = self.entrance.fills > 0, (1 << self.left.bit_length()) - 1
+        if self._several:
+            name = f"counts{self.positions}"
+            return [({name: constant(counts)}, bool(counts)) for counts in (0, 1)] if skips else [({}, True)]
+        if not self.left:
+            return [({}, True)]
+        return [({"left": {}}, True), ({"left": self.forms.variable("some left", 1, top)}, not skips)]
+
     def _cases(self) -> list[Case]:
         """Return what is known of a result that counts: that it has settled, or that it has not."""
-        left: Mapping[str, Form] = {"left": {}} if self.left else {}
+        settled: Mapping[str, Form] = {"left": {}} if self.left else {}
+        not_settled: Mapping[str, Form] = {}
+        if self._several:
+            settled = {f"settling{self.positions}": {}} if self.left and not self.entrance.fills else {}
+            not_settled = dict.fromkeys(settled, constant(1))
         if self._counter is None:
-            return [Case(left, None)]
-        most, some = self._counted(), self.forms.variable("left", 1, self.left)
-        return [Case(left, constant(most)), Case({"left": some}, self.forms.variable("counted", 0, most - 1))]
+            return [Case(settled, None)]
+        most = self._counted()
+        not_settled = not_settled or {"left": self.forms.variable("left", 1, self.left)}
+        return [Case(settled, constant(most)), Case(not_settled, self.forms.variable("counted", 0, most - 1))]
 
     def _counted(self) -> int:
         """Return how many samples the graph counts, one by one, and flags while it does.
@@ -263,6 +318,7 @@ class ResultCheck(Followed, ABC):
         inside = registers - self.payload()
         self.check_kept(inside, {full: constant(1)}, "while the pipeline stands")
         known = {**self.last_position(inside), f"rail{self.positions}": rail, **case.left}
+        known |= {f"channel{self.positions}": self.channel} if self._several else {}
         for name in valid:
             known = self.after(inside, {**known, full: {}}) | {name: constant(1)}
         first = self.first_of_two(registers, known)
@@ -271,17 +327,23 @@ class ResultCheck(Followed, ABC):
         if self._counter is not None and case.counted is not None:
             counted[self.graph.origin(self._counter)] = case.counted
         self.check_output(clock.net, (rail,), counted)
+        if self._several:
+            right = self.is_same(clock.net(OUTPUT_DEST), self.channel, self.netlist.widths[OUTPUT_DEST])
+            require(right, f"{OUTPUT_DEST} must be the channel of the sample, not another value")
 
     def check_kept_without(self, name: str, valid: str) -> None:
         """Check that a register keeps what it holds while no sample is at its position."""
         self.check_kept({name}, {self.buffer.full: {}, valid: {}}, "while no sample comes to it")
 
 
-def _buffer_found(search: Search, sink: str) -> Buffer:
-    """Find the control of the output buffer, and check that it is a queue of two, which a result leaves with `sink`."""
+def _buffer_found(search: Search, sink: str, full: str | None) -> Buffer:
+    """Find the control of the output buffer, and check that it is a queue of two, which a result leaves with `sink`.
+
+    `full` is its register that is 1 while it has no room, if it is known by name.
+    """
     valid = search.register(search.net("m_axis_tvalid", {}), "m_axis_tvalid")
-    ready = search.inverted(search.net(READY, {"filling": 0}))
-    full = search.register(ready, f"not {READY}")
+    if full is None:
+        full = search.register(search.inverted(search.net(READY, {"filling": 0})), f"not {READY}")
     comes = search.loaded(valid, {RESET: 1, full: 0, valid: 0})
     buffer = Buffer(valid, full, search.register(comes, f"what {valid} takes over"), sink)
     search.check_buffer(buffer)
