@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from sosmith.gen.architectures.decimating import AtEachClock
 from sosmith.gen.architectures.fir_steps import ExactTaps
 from sosmith.gen.word_lengths.cost import Cost, cost_of_graphs
-from sosmith.hdl.plan.decimating.cic import CicPlan, channel_cic_plan, cic_plan
+from sosmith.hdl.plan.decimating.cic import CicPlan, cic_plan
 
 if TYPE_CHECKING:
     from amaranth.lib.wiring import Component
@@ -34,7 +34,7 @@ class Cic(AtEachClock):
     @cached_property
     def plan(self) -> CicPlan:
         """Integrators and combs, and their clocks."""
-        return cic_plan(self.datapath) if self.channels == 1 else channel_cic_plan(self.datapath, self.channels)
+        return cic_plan(self.datapath, self.channels)
 
     @property
     def _own_cost(self) -> Cost:

@@ -39,7 +39,7 @@ class Polyphase(AtEachClock):
     @cached_property
     def plan(self) -> PolyphasePlan:
         """Which multiplier takes which product, and their clocks."""
-        return polyphase_plan(self.datapath)
+        return polyphase_plan(self.datapath, self.channels)
 
     @property
     def multiplications(self) -> tuple[Multiplication, ...]:
@@ -58,8 +58,11 @@ class Polyphase(AtEachClock):
 
     def _core(self, *, before: bool = False) -> Component:
         del before
-        from sosmith.hdl.cores.polyphase import PolyphaseCore  # only what makes hardware loads Amaranth
+        from sosmith.hdl.cores.channel_polyphase import ChannelPolyphaseCore  # only what makes hardware loads Amaranth
+        from sosmith.hdl.cores.polyphase import PolyphaseCore
 
+        if self.channels > 1:
+            return ChannelPolyphaseCore(self.datapath, self.channels, self.copies_per_result)
         return PolyphaseCore(self.datapath, self.copies_per_result)
 
     def reason(self, why: str, available: int) -> str:

@@ -6,13 +6,10 @@ from collections import Counter
 from typing import NamedTuple
 
 from sosmith.gen.architectures.cic import Cic
+from sosmith.gen.estimate.decimating import of_channels
 from sosmith.gen.estimate.graphs import clamp
-from sosmith.gen.estimate.memories import of_memory
-from sosmith.gen.estimate.quantities import Quantities, flags_of, of_inputs, of_output_buffer, tree
+from sosmith.gen.estimate.quantities import Quantities, flags_of, of_inputs, of_output_buffer
 from sosmith.gen.fpga.boards import Device
-from sosmith.hdl.plan.decimating.cic import ChannelCicPlan
-from sosmith.hdl.plan.streams import channel_bits
-from sosmith.model.dataflow.datapath import Datapath
 from sosmith.model.dataflow.graph import Op
 
 
@@ -50,28 +47,11 @@ def of_cic(architecture: Cic, device: Device) -> Quantities:
     )
     if last.op is Op.CLAMP:
         made += clamp(last, unlimited) + Counter({"registers": last.width + 2})
-    if isinstance(plan, ChannelCicPlan):
-        made += _of_channels(plan, datapath, device)
+    if plan.channels > 1:
+        made += of_channels(plan, datapath, device, [plan.width] * 2 * plan.order)
+        made["registers"] -= plan.order * plan.width  # a comb leaves what it remembers to its memory
     made["compared"] += 2 * datapath.output.bits * bool(datapath.wear)
     return made + of_inputs(datapath.inputs, datapath.calibrated)
-
-
-def _of_channels(plan: ChannelCicPlan, datapath: Datapath, device: Device) -> Quantities:
-    """Count what several channels take beside one: memories of sums and combs, and what finds the words in them."""
-    bits, count = channel_bits(plan.channels), 2 * plan.order
-    kept = 2 + (plan.factor - 1).bit_length() + plan.settling.bit_length()
-    along = bits + 1 + (plan.settling > 0)  # with each sample at each position
-    made: Quantities = Counter(
-        {
-            "channels": bits,
-            "logic": kept + 2 * tree(2 * bits) + bits,
-            # A comb leaves what it remembers to its memory.
-            "registers": along * (count + 1 + plan.limits) + bits + datapath.inputs[0].bits - plan.order * plan.width,
-        }
-    )
-    for _ in range(count):
-        made += of_memory(device, plan.channels, plan.width)
-    return made + of_memory(device, plan.channels, kept) + of_output_buffer(bits)
 
 
 def of_ladder(ladder: Ladder) -> Quantities:

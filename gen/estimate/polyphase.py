@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 
 from sosmith.gen.architectures.polyphase import Polyphase
+from sosmith.gen.estimate.decimating import of_channels
 from sosmith.gen.estimate.graphs import clamp
 from sosmith.gen.estimate.memories import of_rom
 from sosmith.gen.estimate.products import Product, of_product
@@ -44,7 +45,20 @@ def of_polyphase(architecture: Polyphase, device: Device) -> Quantities:
         made += clamp(last, graph.nodes[last.operands[0]]) + Counter({"registers": last.width + 2})
     made["compared"] += 2 * datapath.output.bits * bool(datapath.wear)
     made += of_output_buffer(datapath.output.bits + flags_of(datapath))
+    if plan.channels > 1:
+        kept = (plan.length - 1) * port.bits
+        made += of_channels(plan, datapath, device, [kept, total])
+        # The line has those places alone that are taken; the rest counts as 0 for a first sample from zero.
+        made["registers"] -= (plan.length - len(_places(plan))) * port.bits
+        made["logic"] += kept * (not plan.filled)
     return made + of_inputs(datapath.inputs, datapath.calibrated)
+
+
+def _places(plan: PolyphasePlan) -> set[int]:
+    """Return the places of the line that a multiplier takes."""
+    taken = [(phase, step) for phase, own in enumerate(plan.by_phase) for step in own if step is not None]
+    seconds = {step.second - phase for phase, step in taken if step.second is not None}
+    return seconds | {step.first - phase for phase, step in taken}
 
 
 def _choices(plan: PolyphasePlan) -> int:

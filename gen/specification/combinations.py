@@ -250,7 +250,6 @@ PARALLEL = Terms(
         (RELOAD, NO_MULTIPLIERS): _FIXED,
         (RELOAD, CIC_DECIMATE): _NO_TAPS,
         (RELOAD, FIR_DECIMATE): LATER,
-        (CHANNELS, FIR_DECIMATE): LATER,
         **dict.fromkeys(((PROTECT, other) for other in (FIR_DECIMATE, CIC_DECIMATE)), LATER),
     },
 )

@@ -34,66 +34,39 @@ from amaranth.lib.memory import Memory
 
 from sosmith.hdl.cores.decimating import DecimatingCore, Entered, Summed
 from sosmith.hdl.memory_ports import read_port
-from sosmith.hdl.plan.decimating.polyphase import polyphase_plan
+from sosmith.hdl.plan.decimating.polyphase import PolyphasePlan, polyphase_plan
 from sosmith.hdl.plan.rounded_sum import finest, rounding, sum_bits
 from sosmith.hdl.plan.tap_steps import TapStep
 from sosmith.model.dataflow.datapath import Datapath
 
 
-class PolyphaseCore(DecimatingCore):
-    """An FIR filter that decimates, for one channel.
+class Multipliers:
+    """The multipliers of an FIR filter that decimates, with the sums of their products: a part of its core.
 
-    Latency: `latency_cycles` of `sosmith.hdl.plan.decimating.polyphase.PolyphasePlan`, without a stall. Throughput: one
-    sample a clock.
-
-    Parameters
+    Attributes
     ----------
     datapath : Datapath
-        What it computes: one FIR section that keeps samples, the output stage, and a downsampler.
-    copies : int
-        Times that each result is handed out.
-
-    Members
-    -------
-    aclk, aresetn, s_axis_*, m_axis_*
-        As those of `sosmith.hdl.shell.shell.Shell`.
+        What the core computes.
+    products : PolyphasePlan
+        Which multiplier takes which product.
     """
 
-    def __init__(self, datapath: Datapath, copies: int = 1) -> None:
-        self._plan = polyphase_plan(datapath)
-        super().__init__(datapath, self._plan, copies)
+    datapath: Datapath
+    products: PolyphasePlan
 
-    def sums(self, m: Module, sample: Entered) -> Summed:
-        """Build the line, the multipliers and the total."""
-        plan, advance = self._plan, sample.advance
-        valid = [self.later(m, advance, sample.valid, "valid1")]
-        phase = [self.later(m, advance, sample.phase, "phase1", reset_less=True)]
-        for k in range(2, plan.clocks):
-            valid.append(self.later(m, advance, valid[-1], f"valid{k}"))
-            phase.append(self.later(m, advance, phase[-1], f"phase{k}", reset_less=True))
-        line = self._line(m, sample)
-        coefficients = self._coefficients(m, advance, phase[1])
+    def multiplied(self, m: Module, advance: Value, line: list[Signal], phases: tuple[Value, Value]) -> Value:
+        """Return the sum of the products of a sample in the line, for its phase and, a clock later, the second one."""
+        phase, later = phases
+        coefficients = self._coefficients(m, advance, later)
         products = [
-            self._product(m, advance, k, (line, phase[0], phase[1]), coefficient)
+            self._product(m, advance, k, (line, phase, later), coefficient)
             for k, coefficient in enumerate(coefficients)
         ]
-        return self._totalled(m, advance, self._summed(m, advance, products), valid[-1], phase[-1])
-
-    def _line(self, m: Module, sample: Entered) -> list[Signal]:
-        """Keep the last samples."""
-        line: list[Signal] = []
-        before: Value = sample.code
-        for k in range(self._plan.length):
-            place = Signal(sample.code.shape(), name=f"line{k}", reset_less=self._plan.filled)
-            with m.If(sample.enters):
-                m.d.sync += place.eq(before)
-            line.append(place)
-            before = place
-        return line
+        return self._summed(m, advance, products)
 
     def _coefficients(self, m: Module, advance: Value, phase: Value) -> list[Value]:
         """Read the coefficients of all multipliers for a phase: with the sums of two samples of that."""
-        plan = self._plan
+        plan = self.products
         bits, count = plan.steps.factor_bits, plan.multipliers
         rows = [0] * plan.factor
         for number, steps in enumerate(plan.by_phase):
@@ -110,7 +83,7 @@ class PolyphaseCore(DecimatingCore):
         self, m: Module, advance: Value, k: int, taken: tuple[list[Signal], Value, Value], coefficient: Value
     ) -> Signal:
         """Build multiplier k behind the places of the line that it takes, each with its phase."""
-        plan, (line, phase, later) = self._plan, taken
+        plan, (line, phase, later) = self.products, taken
         steps = [plan.by_phase[-place % plan.factor][k] for place in range(plan.factor)]
         shape = line[0].shape()
         first = Signal(shape, name=f"first{k}", reset_less=True)
@@ -133,7 +106,7 @@ class PolyphaseCore(DecimatingCore):
 
     def _ahead(self, place: int) -> int:
         """Return how many samples the one at this phase comes before the one that brings the result."""
-        return -place % self._plan.factor
+        return -place % self.products.factor
 
     def _second(self, line: list[Signal], place: int, step: TapStep | None) -> Value | None:
         """Return the second sample of a product; 0 if it has one alone, None if it does not matter."""
@@ -173,7 +146,7 @@ class PolyphaseCore(DecimatingCore):
     def _summed(self, m: Module, advance: Value, products: list[Signal]) -> Value:
         """Add the products of a phase, two by two, a clock for each level."""
         level: list[Value] = [*products]
-        for number in range(1, self._plan.levels + 1):
+        for number in range(1, self.products.levels + 1):
             sums: list[Value] = []
             for k in range(0, len(level), 2):
                 value = level[k] + level[k + 1] if k + 1 < len(level) else level[k]
@@ -184,12 +157,60 @@ class PolyphaseCore(DecimatingCore):
             level = sums
         return level[0]
 
+
+class PolyphaseCore(DecimatingCore, Multipliers):
+    """An FIR filter that decimates, for one channel.
+
+    Latency: `latency_cycles` of `sosmith.hdl.plan.decimating.polyphase.PolyphasePlan`, without a stall. Throughput: one
+    sample a clock.
+
+    Parameters
+    ----------
+    datapath : Datapath
+        What it computes: one FIR section that keeps samples, the output stage, and a downsampler.
+    copies : int
+        Times that each result is handed out.
+
+    Members
+    -------
+    aclk, aresetn, s_axis_*, m_axis_*
+        As those of `sosmith.hdl.shell.shell.Shell`.
+    """
+
+    def __init__(self, datapath: Datapath, copies: int = 1) -> None:
+        self.products = polyphase_plan(datapath)
+        super().__init__(datapath, self.products, copies)
+
+    def sums(self, m: Module, sample: Entered) -> Summed:
+        """Build the line, the multipliers and the total."""
+        plan, advance = self.products, sample.advance
+        valid = [self.later(m, advance, sample.valid, "valid1")]
+        phase = [self.later(m, advance, sample.phase, "phase1", reset_less=True)]
+        for k in range(2, plan.clocks):
+            valid.append(self.later(m, advance, valid[-1], f"valid{k}"))
+            phase.append(self.later(m, advance, phase[-1], f"phase{k}", reset_less=True))
+        line = self._line(m, sample)
+        added = self.multiplied(m, advance, line, (phase[0], phase[1]))
+        return self._totalled(m, advance, added, valid[-1], phase[-1])
+
+    def _line(self, m: Module, sample: Entered) -> list[Signal]:
+        """Keep the last samples."""
+        line: list[Signal] = []
+        before: Value = sample.code
+        for k in range(self.products.length):
+            place = Signal(sample.code.shape(), name=f"line{k}", reset_less=self.products.filled)
+            with m.If(sample.enters):
+                m.d.sync += place.eq(before)
+            line.append(place)
+            before = place
+        return line
+
     def _totalled(self, m: Module, advance: Value, added: Value, valid: Value, phase: Value) -> Summed:
         """Add up the sums of all phases of a result, from the first of them on, and leave out what rounds it."""
         grid, begin = rounding([self.datapath])
         shape = signed(sum_bits([self.datapath], grid))
         # The first sample from zero brings a result by itself: it finds what the samples before would have left.
-        total = Signal(shape, name="total", init=begin, reset_less=self._plan.filled)
+        total = Signal(shape, name="total", init=begin, reset_less=self.products.filled)
         begins, rounded = Signal(name="begins"), self.rounded()
         m.d.comb += begins.eq(phase == 1)
         base = Mux(begins, Const(begin, signed(len(total))), total)

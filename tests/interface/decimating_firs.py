@@ -46,6 +46,6 @@ def draw(seed: int) -> FirDraw:
     }
     if rng.random() < 0.5:
         tree["output"]["max_error"] = round(2 * reach / 2**output_bits * rng.uniform(0.6, 3), 12)
-    if (channels == 1 or seed >= OTHERS) and random.Random(f"architecture of {seed}").random() < 0.5:
+    if random.Random(f"architecture of {seed}").random() < 0.5:
         tree["hardware"]["architecture"] = "parallel"
     return FirDraw(sosmith.Specification.load(tree), tuple(map(Fraction, words)), shape)

@@ -7,7 +7,7 @@ interpolation", 1981): N integrators at each sample, N combs at every R-th, modu
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 from sosmith.hdl.plan.decimating.plan import DecimatingPlan, paced
 from sosmith.hdl.plan.rounded_sum import finest
@@ -28,7 +28,7 @@ class CicPlan(DecimatingPlan):
         Bits of each, in which every result is exact.
     frac : int
         Fraction bits of what leaves the last comb.
-    factor, filled, settling, limits
+    factor, filled, settling, limits, channels
         As of `DecimatingPlan`.
     """
 
@@ -57,55 +57,8 @@ class CicPlan(DecimatingPlan):
         return 3 * self.order * self.width
 
 
-@dataclass(frozen=True, kw_only=True)
-class ChannelCicPlan(CicPlan):
-    """Integrators and combs whose states are in memories, with a word for each channel.
-
-    Attributes
-    ----------
-    channels : int
-        Number of channels, at least 2.
-    order, width, frac, factor, filled, settling, limits
-        As of `CicPlan`.
-    """
-
-    channels: int
-
-    @property
-    def clocks(self) -> int:
-        """One for what is kept of the channel, one for each integrator and comb, and one for the rounding."""
-        return super().clocks + 1
-
-    @property
-    def latency_cycles(self) -> int:
-        """Clocks from the edge that accepts a sample to the one that can output its result.
-
-        That of the first sample of a channel, which may fill the filter before, at every second clock.
-        """
-        return super().latency_cycles + 2 * self.fills * self.factor
-
-    @property
-    def reset_cycles(self) -> int:
-        """Clocks after a reset until a sample is accepted, in which a word for each channel is cleared."""
-        return self.channels
-
-
-def channel_cic_plan(datapath: Datapath, channels: int) -> ChannelCicPlan:
-    """Return the integrators and combs of a datapath that is one FIR filter which decimates, for several channels.
-
-    Raises
-    ------
-    ValueError
-        As `cic_plan`, or if there are no several channels.
-    """
-    if channels < 2:
-        raise ValueError(f"channels must be at least 2, not {channels}")
-    plan = cic_plan(datapath)
-    return ChannelCicPlan(**{each.name: getattr(plan, each.name) for each in fields(plan)}, channels=channels)
-
-
-def cic_plan(datapath: Datapath) -> CicPlan:
-    """Return the integrators and combs of a datapath that is one FIR filter which decimates.
+def cic_plan(datapath: Datapath, channels: int = 1) -> CicPlan:
+    """Return the integrators and combs of a datapath that is one FIR filter which decimates, for so many channels.
 
     Raises
     ------
@@ -129,6 +82,7 @@ def cic_plan(datapath: Datapath) -> CicPlan:
     most = sum(impulse_response(pace.factor, order))
     return CicPlan(
         **pace._asdict(),
+        channels=channels,
         order=order,
         width=max((port.highest * most).bit_length(), (-port.lowest * most - 1).bit_length()) + port.signed,
         frac=finest([datapath]) - (scale.bit_length() - 1),

@@ -25,12 +25,15 @@ class DecimatingPlan(ABC):
         Results that are flagged as settling after a start from zero.
     limits : bool
         Whether results are limited to the range of the output.
+    channels : int
+        Number of channels. Where there are several, a sample waits in front for what is kept of its channel.
     """
 
     factor: int
     filled: bool
     settling: int
     limits: bool
+    channels: int = 1
 
     @property
     @abstractmethod
@@ -40,20 +43,25 @@ class DecimatingPlan(ABC):
     @property
     @abstractmethod
     def clocks(self) -> int:
-        """Clocks from the edge that accepts a sample to the one that loads its result, before that is limited."""
+        """Clocks from the edge at which a sample enters to the one that loads its result, before that is limited."""
 
     @property
     def latency_cycles(self) -> int:
         """Clocks from the edge that accepts a sample to the one that can output its result.
 
-        One more where results are limited, and one for the output buffer.
+        One more where results are limited, and one for the output buffer. Of several channels, one more, and those of
+        a first sample, which may fill the filter before, at every second clock.
         """
-        return self.clocks + self.limits + 1
+        in_front = 1 + 2 * self.fills * self.factor if self.channels > 1 else 0
+        return in_front + self.clocks + self.limits + 1
 
     @property
     def reset_cycles(self) -> int:
-        """Clocks after a reset until the first sample is accepted, which is on offer."""
-        return self.fills * self.factor
+        """Clocks after a reset until the first sample is accepted, which is on offer.
+
+        With several channels, a word for each of them is cleared.
+        """
+        return self.channels if self.channels > 1 else self.fills * self.factor
 
 
 class Paced(NamedTuple):

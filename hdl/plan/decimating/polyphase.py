@@ -36,7 +36,7 @@ class PolyphasePlan(DecimatingPlan):
     ----------
     steps : TapSteps
         The products, each of one sample or two.
-    factor, filled, settling, limits
+    factor, filled, settling, limits, channels
         As of `DecimatingPlan`.
     """
 
@@ -82,11 +82,11 @@ class PolyphasePlan(DecimatingPlan):
 
     @property
     def clocks(self) -> int:
-        """Clocks from the edge that accepts a sample to the one that adds its products to the result."""
+        """Clocks from the edge at which a sample enters to the one that adds its products to the result."""
         return _BEFORE_SUMS + self.levels + 1
 
 
-def polyphase_plan(datapath: Datapath) -> PolyphasePlan:
+def polyphase_plan(datapath: Datapath, channels: int = 1) -> PolyphasePlan:
     """Return which multiplier takes which product of a datapath that is one FIR filter which decimates.
 
     Raises
@@ -94,4 +94,4 @@ def polyphase_plan(datapath: Datapath) -> PolyphasePlan:
     ValueError
         If the datapath is another one, or keeps no samples.
     """
-    return PolyphasePlan(**paced(datapath)._asdict(), steps=tap_steps(datapath))
+    return PolyphasePlan(**paced(datapath)._asdict(), channels=channels, steps=tap_steps(datapath))

@@ -10,7 +10,7 @@ import pytest
 import sosmith
 from sosmith.gen.estimate.estimate import estimated
 from sosmith.gen.fpga.boards import find_board
-from sosmith.hdl.plan.decimating.cic import channel_cic_plan, cic_plan
+from sosmith.hdl.plan.decimating.cic import cic_plan
 from sosmith.model.dataflow.cic import impulse_response
 
 
@@ -76,7 +76,7 @@ def test_several_channels_have_memories() -> None:
     )
     architecture = made.core.architecture
     filled = 2 * 2 * 4  # the first sample of a channel, at every second clock
-    assert (architecture.plan.clocks, architecture.latency_cycles) == (6, 6 + 1 + filled)
+    assert (architecture.plan.clocks, architecture.latency_cycles) == (5, 1 + 5 + 1 + filled)
     assert (architecture.reset_cycles, architecture.cycles_per_sample) == (3, 1)
     found = estimated(architecture, find_board("ulx3s_25f"))
     assert found is not None
@@ -106,12 +106,6 @@ def test_memories_of_channels_are_estimated(channels: int) -> None:
     luts, flip_flops = (640, 630) if channels == 4 else (840, 442)
     assert found.luts == pytest.approx(luts, rel=0.15)
     assert found.flip_flops == pytest.approx(flip_flops, rel=0.15)
-
-
-def test_one_channel_has_no_memories() -> None:
-    datapath = sosmith.design(specification(MEANS)).core.datapath
-    with pytest.raises(ValueError, match=r"^channels must be at least 2, not 1$"):
-        channel_cic_plan(datapath, 1)
 
 
 def test_taps_must_be_exact() -> None:

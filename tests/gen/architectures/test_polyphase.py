@@ -69,3 +69,33 @@ def test_it_is_estimated_with_its_multipliers() -> None:
     assert found is not None
     assert found.multiplier_blocks == 6
     assert len(made.core.architecture.cost.multipliers) == 11  # each product counts, as of a program
+
+
+def several(channels: int, taps: list[float] = LINE, decimate: int = 3, **hardware: Any) -> sosmith.Specification:
+    tree = specification(taps, decimate).as_dict()
+    return sosmith.Specification.load(tree | {"channels": channels, "sample_rate": 1e5, "hardware": hardware})
+
+
+def test_several_channels_share_the_multipliers() -> None:
+    made = sosmith.design(several(3, clock=3e5))
+    assert made.architecture == "parallel"
+    assert made.reasons["architecture"].endswith("; 2 multipliers for 4 products of a result, a sample a clock")
+    architecture = made.core.architecture
+    plan = architecture.plan
+    assert architecture.latency_cycles == 1 + 2 * plan.fills * 3 + plan.clocks + plan.limits + 1
+    assert (architecture.reset_cycles, architecture.cycles_per_sample) == (3, 1)
+    assert sosmith.design(several(3, clock=1e7)).architecture == "folded"
+    with pytest.raises(sosmith.ShortfallError, match=r"the parallel architecture takes 3 clocks for 3 samples: at a "):
+        sosmith.design(several(3, clock=2.9e5, architecture="parallel"))
+
+
+def test_memories_of_channels_are_estimated() -> None:
+    """Synthesis for an ECP5 takes 523 LUT4, LUT RAM among them, and 626 flip-flops for four channels of 22 taps."""
+    half = [0.01 * (k + 1) for k in range(11)]
+    taps = [round(tap, 3) for tap in (*half, *half[::-1])]
+    made = sosmith.design(several(4, taps, 2, clock=1e7, architecture="parallel"))
+    found = estimated(made.core.architecture, find_board("ulx3s_25f"))
+    assert found is not None
+    assert (found.multiplier_blocks, found.memory_bits) == (6, 924)
+    assert found.luts == pytest.approx(523, rel=0.15)
+    assert found.flip_flops == pytest.approx(626, rel=0.15)

@@ -135,7 +135,7 @@ class ChannelLadder:
         word = now.word(read_of(f"{kind}{k}_memory"))
         if self.entrance.fills:
             return word
-        first = now.bit(f"first{position}") if position else self.entrance.is_first(now)
+        first = now.bit(f"fresh{position}") if position else self.entrance.is_first(now)
         return {} if first else word
 
     def _channel(self, now: Logic, position: int) -> Form:

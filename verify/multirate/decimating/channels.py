@@ -10,9 +10,9 @@ the output buffer is free, and only then any register behind the sample in front
                       since the last result was at an end of its range, and how many results were flagged as settling
     filled            how often R of a first sample went in, which fill the filter with a steady start
     valid(1)          whether a sample has entered at the last clock
-    channel(k), rail(k), settling(k), counts(k), first(k)
+    channel(k), rail(k), settling(k), counts(k), fresh(k)
                       of the sample at position k, from 1 on: its channel, the flags of its result, whether that counts,
-                      and whether sums and combs count as 0 for it
+                      and whether it is the first one of its channel, from zero
 
 `near` is 1 while the sample at position 1 has the channel of the one in front, which then waits. So no two samples of
 one channel are in neighbouring positions, and of the words that are read,
@@ -23,8 +23,9 @@ one channel are in neighbouring positions, and of the words that are read,
 - any other one is read for a sample at one position, and written when that leaves the next one. A sample of the same
   channel that is further on has left that by then, and one behind has not come there yet.
 
-So no word counts that is read while it is written, and each channel has sums, combs and what is kept for itself, as if
-there were no others.
+So no word counts that is read while it is written, and each channel has what is kept for itself, as if there were no
+others: beside what is said here, integrators and combs (`sosmith.verify.multirate.decimating.channel_ladder`), or a
+line of samples and a total (`sosmith.verify.multirate.decimating.channel_line`).
 """
 
 from __future__ import annotations
@@ -215,6 +216,10 @@ class ChannelEntrance:
         """Whether its channel has not started."""
         return now.limits(_STARTED) == (0, 0)
 
+    def phase(self, now: Logic) -> Form:
+        """Return its phase."""
+        return now.signal(_PHASE)
+
     def completes(self, now: Logic) -> int:
         """Whether it brings a result."""
         return int(now.limits(_PHASE) == (0, 0))
@@ -265,10 +270,13 @@ class ChannelBeside:
     entrance : ChannelEntrance
     positions : int
         How many there are before the register of results, but for the one in front.
+    fresh : int
+        At how many of them it counts whether a sample is the first one of its channel.
     """
 
     entrance: ChannelEntrance
     positions: int
+    fresh: int
 
     @property
     def nets(self) -> Mapping[str, int]:
@@ -286,7 +294,7 @@ class ChannelBeside:
             for kind, bits in kinds.items()
             for k in range(1, self.positions + 1)
         }
-        return along | ({} if fills else {f"first{k}": RegisterShape(1, None) for k in range(1, self.positions)})
+        return along | ({} if fills else {f"fresh{k}": RegisterShape(1, None) for k in range(1, self.fresh + 1)})
 
     @property
     def ranges(self) -> Mapping[str, Ranges]:
@@ -308,7 +316,7 @@ class ChannelBeside:
             "rail": self.entrance.at_rail,
             "counts": lambda now: not self.entrance.fill(now),
             "settling": self.entrance.is_settling,
-            "first": self.entrance.is_first,
+            "fresh": self.entrance.is_first,
         }
         return constant(int(front[kind](now)))
 

@@ -127,6 +127,11 @@ class _Check(ResultCheck):
         """One for each of them."""
         return 2 * self._ladder.order
 
+    @property
+    def fresh(self) -> int:
+        """Up to the last comb."""
+        return self.positions - 1
+
     def comes(self, now: Logic) -> bool:
         """Whether the last difference is new."""
         return bool(now.bit(self._ladder.moved))

@@ -14,8 +14,10 @@ from there, for each phase: all of that is computed of registers of the position
 takes over something when a sample is at the last position, and keeps it otherwise. So what it holds behind each of R
 samples in turn is a sum of products of the samples up to that, from the first of them on, for which nothing may count
 that was there before; behind the last one it is the result. With a start from zero, what a reset leaves in it must be
-what it holds where all samples before were 0, as a reset makes the line. Everything else is as for any core that
-decimates (`sosmith.verify.multirate.decimating.results`).
+what it holds where all samples before were 0, as a reset makes the line. Several channels have lines and totals in
+memories (`sosmith.verify.multirate.decimating.channel_line`): what is read of a total is what it held behind the sample
+before of the channel. Everything else is as for any core that decimates
+(`sosmith.verify.multirate.decimating.results`).
 """
 
 from __future__ import annotations
@@ -23,11 +25,12 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterator, Mapping, Sequence, Set
 
 from sosmith.verify.certificate_file import Certificate, ItemEntry
-from sosmith.verify.graph import require
-from sosmith.verify.multirate.decimating.entrance import Entrance
+from sosmith.verify.graph import RejectedError, require
+from sosmith.verify.multirate.decimating.channel_line import TOTALS, ChannelLine, line_found
+from sosmith.verify.multirate.decimating.channels import ChannelEntrance, read_of
 from sosmith.verify.multirate.decimating.line import Line
 from sosmith.verify.multirate.decimating.results import ResultCheck, decimating_netlist
-from sosmith.verify.multirate.logic import Logic, Part
+from sosmith.verify.multirate.logic import Logic, MemoryPart, Part, Signals
 from sosmith.verify.multirate.ring.verdict import RingVerdict
 from sosmith.verify.parallel.equality import same_word
 from sosmith.verify.parallel.netlist import Netlist
@@ -54,7 +57,6 @@ def check_polyphase(text: str, certificate: Certificate, item: ItemEntry) -> Rin
     RejectedError
         If it computes anything else, or has anything that is not known here.
     """
-    require(item.channels == 1, "a filter that takes a sample at each clock must have one channel")
     netlist = decimating_netlist(text, certificate, item.channels)
     with deep_recursion():
         return _Check(netlist, certificate, item).checked()
@@ -70,16 +72,19 @@ class _Check(ResultCheck):
             positions += 1
         require(positions > 0, "the core must have a register valid1")
         require(_TOTAL in self.netlist.registers, f"the core must have a register {_TOTAL}")
-        first = self.netlist.registers[_TOTAL].first
-        require(first is not None, f"{_TOTAL} must have a value before the first clock")
-        length = 0
-        while f"line{length}" in self.netlist.registers:
+        first, several = self.netlist.registers[_TOTAL].first, isinstance(self.entrance, ChannelEntrance)
+        require(several or first is not None, f"{_TOTAL} must have a value before the first clock")
+        length, places = line_found(self.netlist, self.port.bits) if several else (0, ())
+        while not several and f"line{length}" in self.netlist.registers:
             length += 1
         require(
             length <= self.remembered + 1, f"the line must hold at most {self.remembered + 1} samples, not {length}"
         )
-        assert isinstance(self.entrance, Entrance)  # that of one channel
-        self._line = Line(self.entrance, length, positions)
+        self._line: Line | ChannelLine
+        if isinstance(self.entrance, ChannelEntrance):
+            self._line = ChannelLine(self.entrance, length, places, positions, self.netlist.widths[_TOTAL])
+        else:
+            self._line = Line(self.entrance, length, positions)
 
     def fills_for(self, factor: int) -> int:
         """Return how often R of the first sample must go in: until all of the line has it, and a total has begun."""
@@ -89,6 +94,21 @@ class _Check(ResultCheck):
     def parts(self) -> Sequence[Part]:
         """The line."""
         return [self._line]
+
+    @property
+    def signals(self) -> Signals:
+        """What inputs and registers are made of."""
+        return self._line.signals if isinstance(self._line, ChannelLine) else self.entrance.signals
+
+    @property
+    def memories(self) -> MemoryPart | None:
+        """Those of several channels."""
+        return self._line if isinstance(self._line, ChannelLine) else None
+
+    @property
+    def fresh(self) -> int:
+        """All of them."""
+        return self.positions
 
     @property
     def positions(self) -> int:
@@ -110,19 +130,27 @@ class _Check(ResultCheck):
 
     def last_position(self, inside: Set[str]) -> Mapping[str, Form]:
         """Follow the samples of a result through all positions, one after the other; return what is at the last."""
-        last = f"valid{self.positions}"
-        self.check_kept_without(_TOTAL, last)
+        held, beside = _TOTAL, dict[str, Form]()
+        if isinstance(self._line, ChannelLine):
+            held = read_of(TOTALS)
+            beside = {} if self.entrance.fills else {f"fresh{self.positions}": {}}
+        else:
+            self.check_kept_without(_TOTAL, f"valid{self.positions}")
         before: Mapping[str, Form] = {}
         for phase in (*range(1, self.entrance.factor), 0):
-            known = {**self._at_last(inside - {_TOTAL}, phase), **before}
+            known = {**self._at_last(inside - {_TOTAL}, phase), **before, **beside}
             if phase == 0:
-                self._check_start(before)
+                self._check_start(before[held], known)
                 return known
-            total = self.after({_TOTAL}, {**known, self.buffer.full: {}}).get(_TOTAL)
-            require(total is not None, f"{_TOTAL} must follow from the samples of a result alone")
-            assert total is not None
-            before = {_TOTAL: self._a_sample_later(total)}
+            before = {held: self._a_sample_later(self._totalled(known))}
         raise AssertionError  # as one phase is 0
+
+    def _totalled(self, known: Mapping[str, Form]) -> Form:
+        """Return the total behind a sample at the last position."""
+        total = self.after({_TOTAL}, {**known, self.buffer.full: {}}).get(_TOTAL)
+        if total is None:
+            raise RejectedError(f"{_TOTAL} must follow from the samples of a result alone")
+        return total
 
     def _at_last(self, inside: Set[str], phase: int) -> dict[str, Form]:
         """Return what registers hold of a sample with a phase at the last position."""
@@ -150,17 +178,28 @@ class _Check(ResultCheck):
         # By way of other names, as each sample takes the place of the next one.
         return self.forms.settled(self.forms.settled(form, names), samples)
 
-    def _check_start(self, before: Mapping[str, Form]) -> None:
+    def _check_start(self, before: Form, known: Mapping[str, Form]) -> None:
         """Check what a start from zero leaves in the total, which the first sample finds there."""
         if self.entrance.fills:
             return
         width, register = self.netlist.widths[_TOTAL], self.netlist.registers[_TOTAL]
-        zero = self.forms.settled(before[_TOTAL], {(self.input, ago): {} for ago in range(self.remembered + 1)})
+        zero = self.forms.settled(before, {(self.input, ago): {} for ago in range(self.remembered + 1)})
         require(not zero.keys() - {ONE}, f"{_TOTAL} must be a number where all samples are 0")
         number = int(zero.get(ONE, 0)) % (1 << width)
+        if isinstance(self._line, ChannelLine):
+            self._check_first(known, number, width)
+            return
         require(register.first == number, f"{_TOTAL} must be {number} before the first clock, not {register.first}")
         right = same_word(self.forms, self.after_reset(_TOTAL), constant(number), width)
         require(right, f"{_TOTAL} must be {number} after a reset, not another value")
+
+    def _check_first(self, known: Mapping[str, Form], number: int, width: int) -> None:
+        """Check that the first sample of a channel finds what samples that are 0 would have left, whatever is there."""
+        anything = self.forms.variable("any total", 0, (1 << width) - 1)
+        fresh = {f"fresh{self.positions}": constant(1), read_of(TOTALS): anything}
+        found, wanted = (self._totalled({**known, **own}) for own in (fresh, {read_of(TOTALS): constant(number)}))
+        right = same_word(self.forms, found, wanted, width)
+        require(right, f"{_TOTAL} must begin with {number} for the first sample of a channel, not with another value")
 
     def checked(self) -> RingVerdict:
         """Check everything; return what is proven."""

@@ -33,7 +33,7 @@ from sosmith.verify.multirate.decimating.channels import ChannelBeside, ChannelE
 from sosmith.verify.multirate.decimating.entrance import READY, Beside, Entrance, Others
 from sosmith.verify.multirate.decimating.held import LEAVES, Held, let_out
 from sosmith.verify.multirate.followed import Followed
-from sosmith.verify.multirate.logic import Logic, MemoryPart, Part, check_parts
+from sosmith.verify.multirate.logic import Logic, MemoryPart, Part, Signals, check_parts
 from sosmith.verify.multirate.ring.machine import State
 from sosmith.verify.multirate.ring.verdict import RingVerdict
 from sosmith.verify.parallel.channels import DEST
@@ -142,6 +142,11 @@ class ResultCheck(Followed, ABC):
         """Parts of the hardware inside."""
 
     @property
+    def signals(self) -> Signals:
+        """What inputs and registers are made of."""
+        return self.entrance.signals
+
+    @property
     def memories(self) -> MemoryPart | None:
         """That of the parts inside that has memories."""
         return None
@@ -150,6 +155,11 @@ class ResultCheck(Followed, ABC):
     @abstractmethod
     def positions(self) -> int:
         """Positions of a sample before the register of its result, but for the one in front of several channels."""
+
+    @property
+    @abstractmethod
+    def fresh(self) -> int:
+        """At how many positions it counts whether a sample of several channels is the first one of its own."""
 
     @abstractmethod
     def comes(self, now: Logic) -> bool:
@@ -198,7 +208,7 @@ class ResultCheck(Followed, ABC):
             require(known, f"{name} must have a value before the first clock")
         valid = self._positions_of_results()
         others = self.netlist.registers.keys() - named.keys()
-        check_parts(self._whole, [*parts, Others(frozenset(others))], self.entrance.signals, self.memories)
+        check_parts(self._whole, [*parts, Others(frozenset(others))], self.signals, self.memories)
         inside = others - {self.buffer.valid, self.buffer.full, *valid}
         for case in self._cases():
             self._check_result(case, valid, inside)
@@ -208,7 +218,7 @@ class ResultCheck(Followed, ABC):
     def _beside(self) -> Part:
         """What goes along with samples."""
         if isinstance(self.entrance, ChannelEntrance):
-            return ChannelBeside(self.entrance, self.positions)
+            return ChannelBeside(self.entrance, self.positions, self.fresh)
         return Beside(self.entrance, self.positions, self.left, self.comes)
 
     def verdict(self, states: int) -> RingVerdict:
