@@ -50,6 +50,7 @@ def of_cic(architecture: Cic, device: Device) -> Quantities:
     if plan.channels > 1:
         made += of_channels(plan, datapath, device, [plan.width] * 2 * plan.order)
         made["registers"] -= plan.order * plan.width  # a comb leaves what it remembers to its memory
+        made["chosen"] += 2 * plan.order * plan.width * (not plan.filled)  # 0 for a first sample from zero
     made["compared"] += 2 * datapath.output.bits * bool(datapath.wear)
     return made + of_inputs(datapath.inputs, datapath.calibrated)
 

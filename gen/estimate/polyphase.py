@@ -50,7 +50,7 @@ def of_polyphase(architecture: Polyphase, device: Device) -> Quantities:
         made += of_channels(plan, datapath, device, [kept, total])
         # The line has those places alone that are taken; the rest counts as 0 for a first sample from zero.
         made["registers"] -= (plan.length - len(_places(plan))) * port.bits
-        made["logic"] += kept * (not plan.filled)
+        made["chosen"] += kept * (not plan.filled)
     return made + of_inputs(datapath.inputs, datapath.calibrated)
 
 

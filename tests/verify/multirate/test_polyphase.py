@@ -127,12 +127,6 @@ def test_a_certificate_that_says_otherwise() -> None:
         check_polyphase(core.text, filled, core.item)
 
 
-def test_what_it_is_not_for() -> None:
-    core = made()
-    with pytest.raises(RejectedError, match=r"^a filter that takes a sample at each clock must have one channel$"):
-        check_polyphase(core.text, core.certificate, core.item.model_copy(update={"channels": 2}))
-
-
 @pytest.mark.parametrize(
     ("port", "bits", "first"), [("s_axis_tdata", "[7:0] ", "8'h00"), ("s_axis_tvalid", "", "1'h0")]
 )
