@@ -218,7 +218,7 @@ def plan(structure: Structure, wanted: Wanted, device: Device) -> Plan:
     made = Plan(structure=structure, stages=[])
     rate = wanted.rate
     for step in structure.steps:
-        each_clock = wanted.each_clock and step.kind == "cic"
+        each_clock = wanted.each_clock and step.kind == "cic" and wanted.channels == 1
         made.stages.append(Planned(kind=step.kind, factor=step.factor, rate=rate, each_clock=each_clock))
         rate /= step.factor
     droop = _plan_cic(made, wanted)
