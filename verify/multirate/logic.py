@@ -253,7 +253,7 @@ class Logic:
             total = plus(total, self._part(field), 1 << done)
             done += field.width
         require(done <= width, f"{name} must have {done} bits, not {width}")
-        return plus(total, self.forms.variable("rest", 0, (1 << width - done) - 1), 1 << done)
+        return plus(total, self.forms.variable(("rest", name), 0, (1 << width - done) - 1), 1 << done)
 
     def _field(self, name: str, low: int, width: int) -> Form | None:
         """Return bits of a word that are just one of its parts, of which alone something must be known then."""

@@ -61,3 +61,9 @@ def rejected(check: Check, core: Made, count: int, seed: int) -> int:
 
     edited = random_edits(core.text, count, seed)
     return swept(edited, lambda text: rejection(check, core, text), seen, core.text)["rejected"]
+
+
+def with_more(text: str, more: str) -> str:
+    """Return a core's text with more in its top module, before all that is computed."""
+    start = text.index("  assign ", text.index("module "))
+    return f"{text[:start]}{more}{text[start:]}"

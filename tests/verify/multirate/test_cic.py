@@ -51,7 +51,8 @@ def test_clocks_are_those_of_the_plan(case: tuple[Any, ...]) -> None:
     assert verdict.result_clocks == architecture.cycles_per_result == 3
     assert verdict.interval == architecture.cycles_per_sample == 1
     copies = architecture.copies_per_result
-    assert verdict.progress == (1 + copies, verdict.latency + copies - 1, verdict.clearing)
+    # The result before may still have all of its copies before it.
+    assert verdict.progress == (2 * copies, verdict.latency + 2 * (copies - 1), verdict.clearing)
     assert (verdict.adder_bits, verdict.states) == (4 * architecture.plan.width, 4)
     assert verify(core.certificate).bound == core.certificate.claims.bound
 

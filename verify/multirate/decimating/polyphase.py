@@ -71,8 +71,11 @@ class _Check(ResultCheck):
         while f"valid{positions + 1}" in self.netlist.registers:
             positions += 1
         require(positions > 0, "the core must have a register valid1")
+        several = isinstance(self.entrance, ChannelEntrance)
+        # The total is read for a sample at the position before.
+        require(positions > 1 or not several, "a core with several channels must have a register valid2")
         require(_TOTAL in self.netlist.registers, f"the core must have a register {_TOTAL}")
-        first, several = self.netlist.registers[_TOTAL].first, isinstance(self.entrance, ChannelEntrance)
+        first = self.netlist.registers[_TOTAL].first
         require(several or first is not None, f"{_TOTAL} must have a value before the first clock")
         length, places = line_found(self.netlist, self.port.bits) if several else (0, ())
         while not several and f"line{length}" in self.netlist.registers:
@@ -140,7 +143,7 @@ class _Check(ResultCheck):
         for phase in (*range(1, self.entrance.factor), 0):
             known = {**self._at_last(inside - {_TOTAL}, phase), **before, **beside}
             if phase == 0:
-                self._check_start(before[held], known)
+                self._check_start(before[held], known, inside)
                 return known
             before = {held: self._a_sample_later(self._totalled(known))}
         raise AssertionError  # as one phase is 0
@@ -178,7 +181,7 @@ class _Check(ResultCheck):
         # By way of other names, as each sample takes the place of the next one.
         return self.forms.settled(self.forms.settled(form, names), samples)
 
-    def _check_start(self, before: Form, known: Mapping[str, Form]) -> None:
+    def _check_start(self, before: Form, known: Mapping[str, Form], inside: Set[str]) -> None:
         """Check what a start from zero leaves in the total, which the first sample finds there."""
         if self.entrance.fills:
             return
@@ -187,19 +190,31 @@ class _Check(ResultCheck):
         require(not zero.keys() - {ONE}, f"{_TOTAL} must be a number where all samples are 0")
         number = int(zero.get(ONE, 0)) % (1 << width)
         if isinstance(self._line, ChannelLine):
-            self._check_first(known, number, width)
+            self._check_first(known, number, width, inside)
             return
         require(register.first == number, f"{_TOTAL} must be {number} before the first clock, not {register.first}")
         right = same_word(self.forms, self.after_reset(_TOTAL), constant(number), width)
         require(right, f"{_TOTAL} must be {number} after a reset, not another value")
 
-    def _check_first(self, known: Mapping[str, Form], number: int, width: int) -> None:
-        """Check that the first sample of a channel finds what samples that are 0 would have left, whatever is there."""
-        anything = self.forms.variable("any total", 0, (1 << width) - 1)
-        fresh = {f"fresh{self.positions}": constant(1), read_of(TOTALS): anything}
-        found, wanted = (self._totalled({**known, **own}) for own in (fresh, {read_of(TOTALS): constant(number)}))
-        right = same_word(self.forms, found, wanted, width)
+    def _check_first(self, known: Mapping[str, Form], number: int, width: int, inside: Set[str]) -> None:
+        """Check that the first sample of a channel finds what samples that are 0 would have left, whatever is there.
+
+        So must all registers behind it: what they take over is followed for other samples alone.
+        """
+        anything, last = self.forms.variable("any total", 0, (1 << width) - 1), f"{self.positions}"
+        along = [name for name in self._beside.registers if name.endswith(last) and not name.startswith("fresh")]
+        beside = {
+            name: self.forms.variable(("beside", name), 0, (1 << self.netlist.widths[name]) - 1) for name in along
+        }
+        first, later = (
+            self.after(inside, {**known, **beside, **own, self.buffer.full: {}})
+            for own in ({f"fresh{last}": constant(1), read_of(TOTALS): anything}, {read_of(TOTALS): constant(number)})
+        )
+        right = _TOTAL in first and same_word(self.forms, first[_TOTAL], later[_TOTAL], width)
         require(right, f"{_TOTAL} must begin with {number} for the first sample of a channel, not with another value")
+        for name, word in later.items():
+            same = name in first and same_word(self.forms, first[name], word, self.netlist.widths[name])
+            require(same, f"{name} must take over for the first sample of a channel what it does for others")
 
     def checked(self) -> RingVerdict:
         """Check everything; return what is proven."""

@@ -104,6 +104,7 @@ class ResultCheck(Followed, ABC):
         followed, sink = (let_out(self._whole), LEAVES) if self._copies > 1 else (self._whole, SINK)
         self._search = Search(followed)
         full = _FULL if self._several else None
+        require(full is None or full in followed.registers, f"a core with several channels must have a register {full}")
         super().__init__(followed, certificate, _buffer_found(self._search, sink, full), self._channels)
         (self.input,) = self.graph.lanes[0].inputs
         self._counter: int | None = None
@@ -226,7 +227,10 @@ class ResultCheck(Followed, ABC):
         latency, factor = self.check(), self.entrance.factor
         filled = self.entrance.fills * factor
         cleared, waits = (self._channels, 2 * filled) if self._several else (filled, 0)
-        stands = self._copies + (self._copies - 1) * (self.positions + _MOST_POSITIONS) * self._several
+        # Results that may all have to leave before one: of one channel, that in the output buffer; of several, one at
+        # each position, as many as there are clocks on the way.
+        ahead = latency if self._several else 1
+        stands = self._copies + (self._copies - 1) * ahead
         return RingVerdict(
             registers=len(self.netlist.registers),
             memories=len(self.netlist.memories),

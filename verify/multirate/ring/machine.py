@@ -131,6 +131,8 @@ class Machine:
 
         It is known if the address is that of a word of the channel for every pointer.
         """
+        if name not in self._words:
+            return None
         words, forms = self._words[name], self.forms
         if words == 1:
             return 0 if address == self.channel else None

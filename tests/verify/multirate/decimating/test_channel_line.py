@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from typing import Any
 
 import pytest
-from tests.verify.multirate.single_cores import Made, changed, proven_alone, rejected, rejection
+from tests.verify.multirate.single_cores import Made, changed, proven_alone, rejected, rejection, with_more
 from tests.verify.parallel.simulated import outputs
 
 import sosmith
@@ -127,3 +128,45 @@ def test_another_core_is_refused() -> None:
 def test_whatever_is_edited_is_found(case: dict[str, Any], seed: int) -> None:
     """What is accepted all the same does the same in simulation."""
     assert rejected(check_polyphase, made(**case), 20, seed) > 8
+
+
+_OF_FIRST_SAMPLES = {
+    "another result": (
+        r"if \(below\) limited <= 7'h40;",
+        "if (flip) limited <= 7'h00;\n      else if (below) limited <= 7'h40;",
+        "  reg flip = 1'h0;\n  always_ff @(posedge aclk)\n    if (advance) flip <= fresh5;\n",
+    ),
+    "another channel": (
+        r"if \(advance\) channel6 <= channel5;",
+        "if (advance) if (fresh5) channel6 <= 2'h0; else channel6 <= channel5;",
+        "",
+    ),
+    "another flag": (
+        r"if \(advance\) settling <= settling5;",
+        "if (advance) if (fresh5) settling <= 1'h0; else settling <= settling5;",
+        "",
+    ),
+}
+
+
+@pytest.mark.parametrize(("pattern", "by", "more"), _OF_FIRST_SAMPLES.values(), ids=_OF_FIRST_SAMPLES)
+def test_what_the_first_sample_of_a_channel_does_otherwise_is_found(pattern: str, by: str, more: str) -> None:
+    """It is followed by itself, as it finds nothing before it."""
+    core = made()
+    text = with_more(changed(core.text, pattern, by), more)
+    assert "must take over for the first sample of a channel what it does for others" in rejection(
+        check_polyphase, core, text
+    )
+
+
+def test_a_total_is_read_for_the_sample_at_the_position_before() -> None:
+    core = made()
+    text = re.sub(r"\bvalid2\b", "behind", core.text)
+    with pytest.raises(RejectedError, match=r"^a core with several channels must have a register valid2$"):
+        check_polyphase(text, core.certificate, core.item)
+
+
+def test_a_second_reader_of_totals_that_nothing_uses_changes_nothing() -> None:
+    core = made()
+    more = "  reg [20:0] extra;\n  always_ff @(posedge aclk)\n    if (advance) extra <= total_memory[channel4];\n"
+    assert rejection(check_polyphase, core, core.text.replace("endmodule", f"{more}endmodule", 1)) == ""

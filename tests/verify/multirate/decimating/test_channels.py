@@ -7,7 +7,7 @@ from functools import cache
 from typing import Any
 
 import pytest
-from tests.verify.multirate.single_cores import Made, changed, proven_alone, rejected, rejection
+from tests.verify.multirate.single_cores import Made, changed, proven_alone, rejected, rejection, with_more
 from tests.verify.parallel.simulated import outputs
 
 import sosmith
@@ -211,3 +211,31 @@ def test_names_count(pattern: str, by: str, sentence: str) -> None:
 def test_whatever_is_edited_is_found(case: dict[str, Any], seed: int) -> None:
     """What is accepted all the same does the same in simulation."""
     assert rejected(check_cic, made(**case), 25, seed) > 12
+
+
+def test_a_register_called_rest_is_one_of_its_own() -> None:
+    """It is no part of a word that others are read from."""
+    core = made()
+    text = changed(core.text, r"rail1 <= rail_now", "rail1 <= rail_more")
+    more = "  reg rest = 1'h0;\n  always_ff @(posedge aclk)\n    if (advance) rest <= s_axis_tdata[0];\n"
+    more += "  wire same;\n  wire same_and_rest;\n  wire rail_more;\n"
+    more += "  assign same = control_read_data == control_read_data;\n  assign same_and_rest = same & rest;\n"
+    more += "  assign rail_more = same_and_rest | rail_now;\n"
+    assert "rail1" in rejection(check_cic, core, with_more(text, more))
+
+
+def test_a_second_reader_of_sums_that_nothing_uses_changes_nothing() -> None:
+    core = made()
+    more = "  reg [8:0] extra;\n  always_ff @(posedge aclk)\n    if (advance) extra <= sum2_memory[channel];\n"
+    assert rejection(check_cic, core, core.text.replace("endmodule", f"{more}endmodule", 1)) == ""
+
+
+def test_an_output_buffer_that_is_never_full_is_refused() -> None:
+    core = made()
+    full = r"  reg full = 1'h0;\n"
+    text = changed(core.text, full, "  wire full;\n  assign full = 1'h0;\n")
+    text = changed(
+        text, r"  always_ff @\(posedge \w+\)\n    if \(\w+\) full <=[^;]*;\n(    else[^;]*full <=[^;]*;\n)*", ""
+    )
+    with pytest.raises(RejectedError, match=r"^a core with several channels must have a register output_buffer.full$"):
+        check_cic(text, core.certificate, core.item)
