@@ -21,7 +21,6 @@ from sosmith.verify.graph import require
 from sosmith.verify.multirate.decimating.channels import CONTROL, ChannelEntrance, read_of
 from sosmith.verify.multirate.decimating.entrance import by_ends
 from sosmith.verify.multirate.logic import Field, Logic, MemoryShape, Ranges, RegisterShape, Signals, Written
-from sosmith.verify.parallel.forms import shifted
 from sosmith.verify.parallel.netlist import Netlist
 from sosmith.verify.program.normal_form import Form, constant, plus
 
@@ -73,7 +72,7 @@ class ChannelLine:
     def signals(self) -> Signals:
         """What is kept of a channel, and the line of one: side by side, the newest sample lowest."""
         name, bits = read_of(_LINES), self.entrance.port.bits
-        places = [Field(name, bits, bits * k) for k in range(self.length - 1)]
+        places = [Field(_place(k), bits) for k in range(self.length - 1)]
         return Signals({**self.entrance.signals.layout, **({name: places} if places else {})})
 
     @property
@@ -102,8 +101,10 @@ class ChannelLine:
 
     @property
     def ranges(self) -> Mapping[str, Ranges]:
-        """The phase at the last position by its ends; before, it is passed on as it is."""
-        return {f"phase{self.positions}": by_ends(self.entrance.factor - 1)}
+        """The phase at the last position by its ends; before, it is passed on as it is. Places may have any code."""
+        codes = ((0, (1 << self.entrance.port.bits) - 1),)
+        places: dict[str, Ranges] = {_place(k): codes for k in range(self.length - 1)}
+        return {**places, f"phase{self.positions}": by_ends(self.entrance.factor - 1)}
 
     def wanted(self, now: Logic, name: str) -> Form:
         """Return what the text at the top of this file says."""
@@ -141,5 +142,9 @@ class ChannelLine:
         """Return the code in place k of the line that the sample in front finds, as bits."""
         if not self.entrance.fills and self.entrance.is_first(now):
             return {}
-        bits = self.entrance.port.bits
-        return now.forms.unsigned(now.forms.floor(shifted(now.signal(read_of(_LINES)), -bits * k)), bits)
+        return now.signal(_place(k))
+
+
+def _place(k: int) -> str:
+    """Return the name of what place k of a channel's line holds: a signal of its own, so that forms stay short."""
+    return f"place {k} of the line"
