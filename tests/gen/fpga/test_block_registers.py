@@ -44,8 +44,10 @@ _NAMES = {"REG_INPUTA_CLK": "A", "REG_INPUTB_CLK": "B", "REG_OUTPUT_CLK": "P", "
 @pytest.fixture(scope="module")
 def netlists(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """Return the netlist of every case that runs; one Yosys makes them all, as starting one takes longest."""
-    tests = [item for item in request.session.items if isinstance(item, pytest.Function) and hasattr(item, "callspec")]
-    asked = {item.callspec.params.get("case") for item in tests}
+    tests = [
+        each for each in request.session.items if isinstance(each, pytest.Function) and each.module is request.module
+    ]
+    asked = {test.callspec.params.get("case") for test in tests if hasattr(test, "callspec")}
     cases = {case: CASES[case] for case in CASES if case in asked}
     folder = tmp_path_factory.mktemp("netlists")
     synthesis = find_board("ulx3s_25f").device.synthesis
