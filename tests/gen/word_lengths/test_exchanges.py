@@ -68,7 +68,8 @@ def test_the_other_order_is_proven_to_the_same_bound() -> None:
     quantized = prove(better())
     assert quantized.bound <= 1
     assert audio().objective.of_datapath(quantized.datapath) < audio().size
-    assert [tuple(row) for row in quantized.filter.rows] == rows_of(better())  # type: ignore[union-attr]
+    assert quantized.filter is not None
+    assert [tuple(row) for row in quantized.filter.rows] == rows_of(better())
 
 
 def test_an_order_that_is_larger_once_it_is_proven_is_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -143,10 +143,8 @@ def test_plans_are_equal_for_equal_datapaths() -> None:
 
 
 def test_a_product_of_several_blocks_takes_longer_for_the_wires_between_them() -> None:
-    of_one, of_two = (
-        merged([Named(f"section{k}", section(constant + k, frac=24)) for k in range(2)])  # type: ignore[misc]
-        for constant in (1000, 1 << 22)
-    )
+    of_one = merged([Named("a", section(1000, frac=24)), Named("b", section(1001, frac=24))])
+    of_two = merged([Named("a", section(1 << 22, frac=24)), Named("b", section((1 << 22) + 1, frac=24))])
     assert of_one is not None
     assert of_two is not None
     assert of_two.period(1) == of_one.period(1) + 10  # 2 for adding up their results
