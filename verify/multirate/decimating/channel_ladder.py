@@ -20,6 +20,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from sosmith.verify.multirate.decimating.channels import CONTROL, ChannelEntrance, read_of
+from sosmith.verify.multirate.decimating.ladder import Combs
 from sosmith.verify.multirate.logic import Logic, MemoryShape, Ranges, RegisterShape, Written
 from sosmith.verify.program.normal_form import Form, constant, plus
 
@@ -27,7 +28,7 @@ _NAME = re.compile(r"([a-z]+)(\d+)(_memory(_read)?)?")
 
 
 @dataclass(frozen=True)
-class ChannelLadder:
+class ChannelLadder(Combs):
     """Integrators and combs, and all memories: a part of the hardware.
 
     Attributes
@@ -40,21 +41,6 @@ class ChannelLadder:
     entrance: ChannelEntrance
     order: int
     width: int
-
-    @property
-    def last(self) -> str:
-        """The last difference."""
-        return f"difference{self.order}"
-
-    @property
-    def moved(self) -> str:
-        """Whether it is that of a new result."""
-        return f"moved{self.order}"
-
-    @property
-    def nets(self) -> Mapping[str, int]:
-        """None."""
-        return {}
 
     @property
     def registers(self) -> Mapping[str, RegisterShape]:

@@ -22,20 +22,10 @@ from sosmith.verify.program.normal_form import Form, constant, plus
 _NAME = re.compile(r"([a-z]+)(\d+)")
 
 
-@dataclass(frozen=True)
-class Ladder:
-    """Integrators and combs: a part of the hardware.
+class Combs:
+    """What combs leave, whatever holds the words of integrators and combs."""
 
-    Attributes
-    ----------
-    entrance : Entrance
-    order, width : int
-        N, and the bits of each sum.
-    """
-
-    entrance: Entrance
     order: int
-    width: int
 
     @property
     def last(self) -> str:
@@ -51,6 +41,22 @@ class Ladder:
     def nets(self) -> Mapping[str, int]:
         """None."""
         return {}
+
+
+@dataclass(frozen=True)
+class Ladder(Combs):
+    """Integrators and combs: a part of the hardware.
+
+    Attributes
+    ----------
+    entrance : Entrance
+    order, width : int
+        N, and the bits of each sum.
+    """
+
+    entrance: Entrance
+    order: int
+    width: int
 
     @property
     def registers(self) -> Mapping[str, RegisterShape]:
