@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from sosmith.gen.fpga.block_paths import with_block_paths
 from sosmith.gen.fpga.block_registers import cells_of, with_block_registers
 from sosmith.gen.fpga.boards import Board, find_board
 from sosmith.gen.fpga.gatemate import PLACER_OPTIONS
@@ -175,7 +176,9 @@ def place(folder: Path, target: Board, seed: int) -> Placement:
     """
     device, file = target.device, f"report{seed}.json"
     wishes = ("--seed", str(seed), "--freq", str(GOAL), "--timing-allow-fail")
-    done = run(folder, placer(target), *_part(target), "--json", "netlist.json", "--report", file, *wishes)
+    blocks = device.multiplier == "SB_MAC16"
+    delays = ("--sdf", f"delays{seed}.sdf") if blocks else ()
+    done = run(folder, placer(target), *_part(target), "--json", "netlist.json", "--report", file, *delays, *wishes)
     found = _UTILIZATION.findall(done.stderr + done.stdout)
     logic = next((int(count) for cell, count, _ in found if cell == _LOGIC[device.family]), 0)
     if done.returncode:
@@ -185,12 +188,14 @@ def place(folder: Path, target: Board, seed: int) -> Placement:
         excess = [f"{cell} {count} of {there}" for cell, count, there in found if int(count) > int(there)]
         return Placement(logic, f"{', '.join(excess) or 'no room'}: {errors[0]}", 0.0, [])
     report = json.loads((folder / file).read_text(encoding="utf-8"))
+    netlist = json.loads((folder / "netlist.json").read_text(encoding="utf-8"))
+    if blocks:
+        report = with_block_paths(report, (folder / f"delays{seed}.sdf").read_text(encoding="utf-8"), netlist)
     if len(report["fmax"]) != 1:
         raise RuntimeError(f"the design must have one clock, not {', '.join(report['fmax'])}")
     (clock,) = report["fmax"].values()
     if device.family != "ecp5":
         return Placement(logic, None, clock["achieved"], [])
-    netlist = json.loads((folder / "netlist.json").read_text(encoding="utf-8"))
     return Placement(logic, None, clock["achieved"], _slowest(report, netlist))
 
 

@@ -12,11 +12,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from sosmith.gen.fpga.block_paths import with_block_paths
 from sosmith.gen.fpga.block_registers import with_block_registers
 from sosmith.gen.fpga.boards import Board
 from sosmith.gen.fpga.kept_bitstreams import Made, kept_or_made
 from sosmith.gen.fpga.lost_drivers import check_drivers
-from sosmith.gen.fpga.platform_plan import SEED, board_plan, text_of
+from sosmith.gen.fpga.platform_plan import DELAYS, SEED, board_plan, text_of
 from sosmith.gen.fpga.tools import Tool, find_tool
 from sosmith.gen.fpga.wiring import PLAIN, Wiring
 from sosmith.model.errors import ShortfallError, ToolError
@@ -203,6 +204,9 @@ def _made(
             if command[0] == "yosys":
                 _pack(place / f"{name}.json")
         report = json.loads((place / "report.json").read_text(encoding="utf-8"))
+        if board.device.multiplier == "SB_MAC16":
+            netlist = json.loads((place / f"{name}.json").read_text(encoding="utf-8"))
+            report = with_block_paths(report, (place / DELAYS).read_text(encoding="utf-8"), netlist)
         bitstream = place / f"{name}.{_SUFFIX[board.device.family]}"
         return Made(bitstream.read_bytes(), report, _read(place / _LOG))
 

@@ -17,6 +17,9 @@ from sosmith.model.errors import ToolError
 SEED = 1
 """Seed of the placer: the same input gives the same bitstream."""
 
+DELAYS = "delays.sdf"
+"""File with the delays of a placed iCE40."""
+
 _PIN_ATTRIBUTES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "ice40": ({"IO_STANDARD": "SB_LVCMOS"}, {"PULLUP": 1}),
     "ecp5": ({"IO_TYPE": "LVCMOS33"}, {"PULLMODE": "UP"}),
@@ -55,6 +58,8 @@ def board_plan(verilog: str, top: str, name: str, board: Board, wiring: Wiring) 
         ) from None
     _, _, options = board.device.synthesis.partition(" ")
     wishes = f"--seed {SEED} --freq {float(wiring.clock(board)) / 1e6:g} --timing-allow-fail --report report.json"
+    if board.device.family == "ice40":
+        wishes += f" --sdf {DELAYS}"
     platform.add_file(f"{top}.sv", verilog)
     for resource, signals in pins.items():
         if signals:

@@ -113,7 +113,7 @@ def test_a_second_clock_hides_a_path(monkeypatch: pytest.MonkeyPatch, tmp_path: 
     says(monkeypatch, tmp_path, 0, UTILIZATION, ("clk", "$PACKER_GND_NET"))
     sentence = "the design must have one clock, not clk, $PACKER_GND_NET"
     with pytest.raises(RuntimeError, match=f"^{re.escape(sentence)}$"):
-        place(tmp_path, TARGETS["up5k"], 1)
+        place(tmp_path, TARGETS["hx8k"], 1)
 
 
 def test_growth_is_told_beyond_five_percent() -> None:

@@ -25,6 +25,8 @@ REPORT = {
     ],
 }
 
+NETLIST = {"modules": {"top": {"attributes": {"top": "1"}, "ports": {}, "cells": {}}}}
+
 
 @dataclass(frozen=True)
 class Stub:
@@ -43,6 +45,10 @@ class Stub:
         for place, following in zip(arguments, [*arguments[1:], ""], strict=True):
             if place == "--report":
                 (folder / following).write_text(json.dumps(self.report), encoding="utf-8")
+            if place == "--sdf":
+                (folder / following).write_text("", encoding="utf-8")
+                (netlist,) = (file for file in arguments if file.endswith(".json") and file != "report.json")
+                (folder / netlist).write_text(json.dumps(NETLIST), encoding="utf-8")
         for suffix in ("bin", "bit", "fs"):
             for file in folder.glob("*.json"):
                 if file.name.startswith("build_"):

@@ -78,6 +78,16 @@ def test_what_is_read_off_the_report(install: Install) -> None:
     assert made.met
 
 
+def test_paths_through_blocks_count_where_there_are_such_blocks(
+    install: Install, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    install()
+    slower = {**REPORT, "fmax": {"board.clk": {"achieved": 11.5, "constraint": 12.0}}}
+    monkeypatch.setattr(bitstream, "with_block_paths", lambda report, sdf, netlist: slower)
+    assert not build(TOP, "tiny", find_board("icebreaker")).met
+    assert build(TOP, "tiny", find_board("icestick")).met
+
+
 def test_a_design_that_does_not_fit_falls_short(install: Install) -> None:
     install(nextpnr_ice40="Info:   ICESTORM_LC:  1400/ 1280  109%\nInfo:  SB_IO:  7/ 96  7%\nERROR: no place left\n")
     message = "the design must fit the iCEstick, but: 1,400 ICESTORM_LC of 1,280"
