@@ -11,6 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import sosmith
+from sosmith.gen.fpga.block_paths import with_block_paths
 from sosmith.gen.fpga.tools import find_tool
 from sosmith.model.errors import ToolError
 
@@ -32,10 +33,14 @@ def placed(specification: Path, folder: Path) -> tuple[dict[str, tuple[int, int]
     script = f"read_verilog -sv {files} pins.sv; synth_ice40 -dsp -top pins -json {name}_net.json"
     _run("yosys", ["-q", "-p", script], folder)
     arguments = ["--up5k", "--package", "sg48", "--seed", str(_SEED), "--freq", "24", "--json", f"{name}_net.json"]
-    _run("nextpnr-ice40", [*arguments, "--report", "report.json", "--pcf-allow-unconstrained"], folder)
-    report = json.loads((folder / "report.json").read_text(encoding="utf-8"))
+    wishes = ["--report", "report.json", "--sdf", "delays.sdf", "--pcf-allow-unconstrained"]
+    _run("nextpnr-ice40", [*arguments, *wishes], folder)
+    told, delays, netlist = (
+        (folder / file).read_text(encoding="utf-8") for file in ("report.json", "delays.sdf", f"{name}_net.json")
+    )
+    report = with_block_paths(json.loads(told), delays, json.loads(netlist))
     cells = {kind: (entry["used"], entry["available"]) for kind, entry in report["utilization"].items()}
-    return {kind: cells[kind] for kind in _CELLS}, max(timing["achieved"] for timing in report["fmax"].values())
+    return {kind: cells[kind] for kind in _CELLS}, min(timing["achieved"] for timing in report["fmax"].values())
 
 
 def _pins(name: str, taken: int, given: int) -> str:
