@@ -8,11 +8,12 @@ it measures `adder_graph`, and takes no part in a design.
 from __future__ import annotations
 
 import json
+import math
 import random
 import re
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -21,7 +22,8 @@ from benchmarks.adder_program import NODES, SECONDS, fewest_bits
 from sosmith.gen.core import design_core
 from sosmith.gen.specification.combinations import PARALLEL
 from sosmith.gen.specification.specification import load
-from sosmith.model.dataflow.adder_graph import adder_bits, adder_graph, by_operand, odd_part, scalings
+from sosmith.model.dataflow.adder_graph import Adder, adder_bits, adder_graph, by_operand, odd_part, scalings
+from sosmith.model.dataflow.graph import Graph, Op
 
 ROOT = Path(__file__).resolve().parent.parent
 RECORD = ROOT / "benchmarks" / "constant_products.json"
@@ -49,6 +51,8 @@ class Row:
         Different odd parts but 1.
     sums, bits, seconds
         Of `adder_graph`; seconds of processor time.
+    dropped : int
+        Of these bits, those that lie below all that is kept of what they are in: no truncated sum could save more.
     program_sums, program_bits, bound, program_seconds
         Of the integer program, see `benchmarks.adder_program.Result`.
     """
@@ -57,6 +61,7 @@ class Row:
     constants: int
     sums: int
     bits: int
+    dropped: int
     seconds: float
     program_sums: int
     program_bits: int
@@ -64,8 +69,8 @@ class Row:
     program_seconds: float
 
 
-def sets() -> Iterator[tuple[str, tuple[int, ...], int, int]]:
-    """Yield where constants are from, the constants of each operand, and its range."""
+def sets() -> Iterator[tuple[str, dict[int, int], int, int]]:
+    """Yield where constants are from, those of each operand with the bits dropped of their products, and its range."""
     for name in SPECIFICATIONS:
         spec = load(ROOT / "examples" / f"{name}.toml")
         hardware = replace(spec.hardware, architecture=PARALLEL.name, multipliers=0)
@@ -73,16 +78,52 @@ def sets() -> Iterator[tuple[str, tuple[int, ...], int, int]]:
             graph = stage.graph
             for operand, products in by_operand(graph, scalings(graph)):
                 node = graph.nodes[operand]
-                yield spec.name, tuple(graph.nodes[index].parameter for index in products), node.low, node.high
+                yield spec.name, _dropped(graph, products), node.low, node.high
     draws = random.Random(SEED)
     for count, bits in DRAWN:
         for _ in range(SETS):
             drawn = tuple(draws.randrange(1 << (bits - 1), 1 << bits) for _ in range(count))
-            yield f"{count} of {bits} bits, drawn", drawn, *OPERAND
+            yield f"{count} of {bits} bits, drawn", dict.fromkeys(drawn, 0), *OPERAND
 
 
-def measure(source: str, constants: tuple[int, ...], low: int, high: int) -> Row:
+def _dropped(graph: Graph, products: Iterable[int]) -> dict[int, int]:
+    """Return the constants of products, with the lowest bits that all readers of their product drop."""
+    dropped: dict[int, int] = {}
+    for index in products:
+        node = graph.nodes[index]
+        readers = [other for other in graph.nodes if index in other.operands]
+        bits = min((node.frac - other.frac if other.op is Op.FLOOR else 0 for other in readers), default=0)
+        dropped[node.parameter] = min(bits, dropped.get(node.parameter, bits))
+    return dropped
+
+
+def dropped_bits(adders: Sequence[Adder], dropped: Mapping[int, int], low: int, high: int) -> int:
+    """Return the adder bits below all that is kept: of a sum, what lies below the bits that a product of it keeps.
+
+    >>> dropped_bits(adder_graph((75,)), {75: 3}, -8, 7)  # 75 = 5 * 16 - 5: three bits of 5x, and of the difference
+    5
+    """
+    first: dict[int, int] = {}
+    for constant, bits in dropped.items():
+        odd, power = odd_part(constant)
+        first[odd] = min(max(bits - power, 0), first.get(odd, bits))
+    total = 0
+    for index, adder in reversed([*enumerate(adders, start=1)]):
+        lowest = first.get(adder.multiple, math.inf)
+        for other in adders[index:]:
+            for place, shift in (other.left, other.right):
+                if place == index:
+                    lowest = min(lowest, max(first[other.multiple] - shift, 0))
+        first[adder.multiple] = int(lowest)
+        bits = adder_bits([adder], low, high)
+        width = bits + (adder.right[1] or (0 if adder.subtract else adder.left[1]))
+        total += max(0, int(lowest) - (width - bits))
+    return total
+
+
+def measure(source: str, dropped: Mapping[int, int], low: int, high: int) -> Row:
     """Return a row for the products of an operand in low..high."""
+    constants = tuple(dropped)
     adder_graph.cache_clear()  # the design has asked for it
     start = time.process_time()
     adders = adder_graph(constants)
@@ -93,6 +134,7 @@ def measure(source: str, constants: tuple[int, ...], low: int, high: int) -> Row
         constants=len({odd_part(constant)[0] for constant in constants} - {1}),
         sums=len(adders),
         bits=adder_bits(adders, low, high),
+        dropped=dropped_bits(adders, dropped, low, high),
         seconds=round(between - start, 2),
         program_sums=result.sums,
         program_bits=result.bits,
@@ -106,15 +148,16 @@ def table(rows: list[Row]) -> str:
     lines = [
         f"By `python -m benchmarks.constant_products`; HiGHS stops after {NODES} nodes or {SECONDS:g} seconds.",
         "",
-        "| constants | operands | sums | adder bits | seconds | program: sums | bits | seconds | its bound |",
-        "|---|---|---|---|---|---|---|---|---|",
+        "| constants | operands | sums | adder bits | of them dropped | seconds | program: sums | bits | s | bound |",
+        "|---|---|---|---|---|---|---|---|---|---|",
     ]
     for source in dict.fromkeys(row.source for row in rows):
         of = [row for row in rows if row.source == source]
         lines.append(
             f"| {source} | {len(of)} | {sum(row.sums for row in of)} | {sum(row.bits for row in of)} "
-            f"| {sum(row.seconds for row in of):.1f} | {sum(row.program_sums for row in of)} "
-            f"| {sum(row.program_bits for row in of)} | {sum(row.program_seconds for row in of):.0f} "
+            f"| {sum(row.dropped for row in of)} | {sum(row.seconds for row in of):.1f} "
+            f"| {sum(row.program_sums for row in of)} | {sum(row.program_bits for row in of)} "
+            f"| {sum(row.program_seconds for row in of):.0f} "
             f"| {sum(row.bound for row in of)} |"
         )
     return "\n".join(lines) + "\n"
@@ -134,9 +177,9 @@ def main() -> None:
     """Measure unless asked not to, and write the table."""
     if "--document" not in sys.argv[1:]:
         rows = []
-        for source, constants, low, high in sets():
-            if {odd_part(constant)[0] for constant in constants} - {1}:
-                rows.append(measure(source, constants, low, high))
+        for source, dropped, low, high in sets():
+            if {odd_part(constant)[0] for constant in dropped} - {1}:
+                rows.append(measure(source, dropped, low, high))
                 print(rows[-1], file=sys.stderr, flush=True)
         RECORD.write_text(json.dumps([asdict(row) for row in rows], indent=1) + "\n", encoding="utf-8")
     DOCUMENT.write_text(with_table(DOCUMENT.read_text(encoding="utf-8")), encoding="utf-8")

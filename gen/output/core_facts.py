@@ -25,7 +25,7 @@ from sosmith.gen.word_lengths.cost import Cost
 from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.hdl.plan.streams import Field, dest_width, fields
 from sosmith.model.dataflow.datapath import Datapath
-from sosmith.model.dataflow.graph import Graph, Op
+from sosmith.model.dataflow.graph import Graph
 from sosmith.model.dataflow.program import Program
 from sosmith.model.dataflow.status import STATUS_BITS, Flag
 from sosmith.model.dataflow.structure import Stage
@@ -33,6 +33,7 @@ from sosmith.model.full_scale import is_sound
 from sosmith.model.port import Port
 from sosmith.model.reload.registers import BANK_INPUTS, INTERFACE
 from sosmith.model.sections.horner import HornerStep
+from sosmith.model.sections.truncated_products import PREFIX, constant_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -486,14 +487,9 @@ def _section(name: str, graph: Graph, feedback: tuple[int, ...] | None) -> Secti
     return SectionFacts(
         name=name,
         coefficients=tuple(
-            CoefficientFacts(
-                name=node.name.removeprefix("product_"),
-                integer=node.parameter,
-                frac=node.parameter_frac,
-                value=node.parameter / 2**node.parameter_frac,
-            )
-            for node in nodes
-            if node.op is Op.SCALE
+            CoefficientFacts(name=node.name.removeprefix(PREFIX), integer=integer, frac=frac, value=integer / 2**frac)
+            for index, node in enumerate(nodes)
+            for integer, frac in constant_of(graph, index)
         ),
         states={nodes[i].name: nodes[i].format for i in graph.delays},
         b=b,

@@ -177,8 +177,8 @@ def direct_form(
     x : Range
         Fraction bits and range of the input's code.
     fracs : mapping of str to int
-        Fraction bits kept by the quantizers of v, and of ``taps_A1``, ``product_A1`` and the like. If missing, v keeps
-        as many as x has, and the others keep all.
+        Fraction bits kept by the quantizers of v, and of ``taps_A1``, ``product_A1``, ``product_A1_sums`` and the like.
+        If missing, v keeps as many as x has, and the others keep all.
     ranges : mapping of str to tuple of int
         Smallest and largest code of v and of ``taps_A1`` and the like.
     wide : tuple of int
@@ -190,7 +190,7 @@ def direct_form(
         If the section passes nothing, or its rounded coefficients are unstable.
     """
     made, integer_part = products(row, rounding, name)
-    floored = [replace(p, floored=fracs.get(p.label)) for p in made]
+    floored = [replace(p, floored=fracs.get(p.label), sums=fracs.get(p.sums_label)) for p in made]
     fitted = tuple(
         replace(p, kept=fracs.get(p.operand), range=ranges.get(p.operand, wide)) if p.is_sum else p for p in floored
     )

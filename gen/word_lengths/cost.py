@@ -173,6 +173,16 @@ def cost_of_graphs(
     return Cost(multiplications=tuple(multiplications), adder_bits=adders, register_bits=registers)
 
 
+def passed_bits(graph: Graph) -> int:
+    """Return the bits of all sums that are those of one operand, as the other has none so low: they take no adder."""
+    passed = 0
+    for node in graph.nodes:
+        if (node.op is Op.ADD or node.op is Op.SUBTRACT) and graph.concatenated(node) is None:
+            left, right = (graph.nodes[i].frac for i in node.operands)
+            passed += max(left - right, 0 if node.op is Op.SUBTRACT else right - left)
+    return passed
+
+
 def area_of(graph: Graph) -> int:
     """Return the contribution of a graph to the area of a datapath."""
     return cost_of_graphs([graph]).area

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
 from typing import Protocol
@@ -18,6 +18,7 @@ from sosmith.gen.word_lengths.cost import (
     bits_by_digits,
     cost_of,
     cost_of_graphs,
+    passed_bits,
 )
 from sosmith.hdl.plan.block_products import blocks_of, with_blocks
 from sosmith.hdl.plan.sharing.sharing import sharing
@@ -200,8 +201,13 @@ class FewAdders:
         return area_by_digits(graph)
 
     def of_datapath(self, datapath: Datapath) -> float:
-        """Return the area of all operators, in LUT4, with the adders that products are made of."""
-        return cost_of(datapath, [scalings(stage.graph) for stage in datapath.stages]).area
+        """Return the area of all operators, in LUT4, with the adders that products are made of.
+
+        Bits of sums that take no adder are left out, as they are of the sums of products: some may have been made such.
+        """
+        graphs = [stage.graph for stage in datapath.stages]
+        cost = cost_of(datapath, [*map(scalings, graphs)])
+        return replace(cost, adder_bits=cost.adder_bits - sum(map(passed_bits, graphs))).area
 
     def least(self, graphs: Sequence[Graph]) -> float:
         """Return 0: every constant may turn out to be a power of two."""

@@ -31,6 +31,7 @@ from sosmith.gen.word_lengths.ordering import best_order
 from sosmith.gen.word_lengths.output_stage import output_stage
 from sosmith.gen.word_lengths.quantized import Quantized, assembled
 from sosmith.gen.word_lengths.search import Search
+from sosmith.gen.word_lengths.truncated_sums import with_truncated_sums
 from sosmith.model.errors import ShortfallError
 from sosmith.model.polynomial import Polynomial
 from sosmith.model.port import Port
@@ -43,6 +44,10 @@ _MOST_WORK = 1_000_000
 
 _FINER = 4
 """How much smaller the errors are that trimming starts with where a stage has many coefficients: room to choose."""
+
+_HOPES = (8, 4, 2, 1, 0.5)
+"""What is left of the error allowed is spent so often on truncated sums: errors of different signs, which the estimate
+adds up, nearly balance each other."""
 
 _ATTEMPTS = 4
 """How often formats are chosen again with estimates before exact figures are used."""
@@ -344,17 +349,15 @@ def prove(planned: Plan) -> Quantized:
         for _ in range(_ATTEMPTS + len(instead)):
             if choice == tried:
                 break  # nothing else is to be had
-            before = planned.input_stages[choice.input_stage]
             try:
-                stages = cascade(ideal, planned.realization, choice.formats, before.output, steady=planned.steady)
-                quantized = _assembled(planned, before, *stages)
+                quantized = _with_formats(planned, ideal, choice)
             except ShortfallError:
                 break
             excess = quantized.bound * planned.output.lsb - planned.max_error
             if excess <= 0:
                 # Words that suit stage by stage may not suit as a whole.
                 if not instead or planned.objective.of_datapath(quantized.datapath) < math.inf:
-                    return quantized
+                    return _truncated(planned, ideal, search, choice, quantized)
                 choice, *instead = instead
                 continue
             if planned.is_long:
@@ -363,6 +366,32 @@ def prove(planned: Plan) -> Quantized:
             allowed -= max(2 * excess / planned.output.lsb, allowed / 64)
             choice = search.trimmed(search.start(float(planned.share), MAX_BITS) or start, float(allowed))
     return _equally_shared(planned, ideal)
+
+
+def _with_formats(planned: Plan, ideal: Filter, choice: Choice) -> Quantized:
+    """Build the stages in given formats, and prove them."""
+    before = planned.input_stages[choice.input_stage]
+    stages = cascade(ideal, planned.realization, choice.formats, before.output, steady=planned.steady)
+    return _assembled(planned, before, *stages)
+
+
+def _truncated(planned: Plan, ideal: Filter, search: Search, choice: Choice, proven: Quantized) -> Quantized:
+    """Return a proven design with truncated sums where the error that is left allows it and they make it smaller."""
+    if not planned.objective.few_digits:
+        return proven
+    allowed = planned.max_error / planned.output.lsb
+    for factor in _HOPES:
+        left = factor * float(allowed - proven.bound)
+        shorter = with_truncated_sums(search, choice, proven.sections, left)
+        if shorter is None:
+            return proven
+        try:
+            truncated = _with_formats(planned, ideal, shorter)
+        except ShortfallError:
+            return proven
+        if truncated.bound <= allowed:
+            return min(proven, truncated, key=lambda each: planned.objective.of_datapath(each.datapath))
+    return proven
 
 
 def _smaller_of_two(planned: Plan, otherwise: Plan) -> Quantized:

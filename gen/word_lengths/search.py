@@ -156,6 +156,10 @@ class Search:
         """Ideal coefficients of each section by name."""
         return [estimate.ideal for estimate in self._estimates]
 
+    def gain(self, section: int, quantizer: str) -> float:
+        """Largest centred error in output LSBs of a quantizer of a section, if it rounds to integers."""
+        return self._estimates[section].gains[quantizer]
+
     @property
     def work(self) -> int:
         """Samples of the responses to all coefficients together, which decide how long trimming takes."""

@@ -20,7 +20,14 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 
-from sosmith.model.dataflow.adder_graph import adder_graph, by_operand, multiple_range, odd_part, scalings
+from sosmith.model.dataflow.adder_graph import (
+    adder_graph,
+    by_operand,
+    multiple_name,
+    multiple_range,
+    odd_part,
+    scalings,
+)
 from sosmith.model.dataflow.graph import Graph, GraphBuilder, Op, Wire
 
 
@@ -59,8 +66,7 @@ def _multiples(g: GraphBuilder, operand: Wire, constants: Sequence[int]) -> dict
     for adder in adder_graph(tuple(constants)):
         left, right = (g.shift(values[k], shift) for k, shift in (adder.left, adder.right))
         total = g.subtract(left, right) if adder.subtract else g.add(left, right)
-        sign = "minus_" if adder.multiple < 0 else ""
         limits = multiple_range(adder.multiple, node.low, node.high)
-        values.append(g.bound(total, *limits, f"{name}_times_{sign}{abs(adder.multiple)}"))
+        values.append(g.bound(total, *limits, multiple_name(name, adder.multiple)))
         by_multiple[adder.multiple] = values[-1]
     return by_multiple

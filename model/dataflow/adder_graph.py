@@ -213,6 +213,11 @@ def multiple_range(multiple: int, low: int, high: int) -> tuple[int, int]:
     return min(ends), max(ends)
 
 
+def multiple_name(operand: str, multiple: int) -> str:
+    """Return the name of a sum, from that of the operand."""
+    return f"{operand}_times_{'minus_' * (multiple < 0)}{abs(multiple)}"
+
+
 def _bits(multiple: int, shifts: tuple[int, int], subtract: bool, low: int, high: int) -> int:
     """Return the bits of a sum that take an adder: all but the lowest, where the second has none or is all there is."""
     least, most = multiple_range(multiple, low, high)

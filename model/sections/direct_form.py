@@ -40,8 +40,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
+from math import ceil
 
 from sosmith.model.dataflow.graph import Graph, GraphBuilder, Range, Wire
+from sosmith.model.sections.truncated_products import mean_error, truncated
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,9 @@ class Product:
         Smallest and largest code of the tap sum before bits are dropped, from peak gains.
     floored : int or None
         Fraction bits that are kept of the product. None keeps all.
+    sums : int or None
+        Fraction bits of the product that are kept in the sums which it is made of, at least `floored`. None leaves open
+        what it is made of, and keeps all.
     """
 
     name: str
@@ -79,6 +84,7 @@ class Product:
     kept: int | None = None
     range: tuple[int, int] | None = None
     floored: int | None = None
+    sums: int | None = None
 
     def __post_init__(self) -> None:
         if self.coefficient == 0:
@@ -100,6 +106,11 @@ class Product:
     def label(self) -> str:
         """Name of the product."""
         return f"product_{self.name}"
+
+    @property
+    def sums_label(self) -> str:
+        """Name of what its sums keep."""
+        return f"{self.label}_sums"
 
     @property
     def is_sum(self) -> bool:
@@ -180,7 +191,11 @@ class DirectForm1:
                 early.append((operand, product))
             else:
                 operand = _operand(g, product, *taps)
-            scaled = g.scale(operand, product.coefficient, product.frac, product.label)
+            constant = product.coefficient, product.frac
+            if product.sums is None:
+                scaled = g.scale(operand, *constant, product.label)
+            else:
+                scaled = truncated(g, operand, *constant, product.sums, product.label)
             if product.floored is not None:
                 scaled = g.floor(scaled, min(g[scaled].frac, product.floored))
             products.append((product.y[0] != 0, (1, scaled)))
@@ -207,9 +222,11 @@ class DirectForm1:
         factor, wire = term
         frac = self.total_frac
         halves = sum(Fraction(2) ** (frac - 1 - kept) for kept in self._floored_fracs)
-        if factor <= 0 or halves < 1:
+        halves -= sum(self._mean_error(p) * 2**frac for p in self.products)
+        nearest = ceil(halves - Fraction(3, 4))  # half a unit stays, whatever little the sums lose beside it
+        if factor <= 0 or nearest < 1:
             return term
-        shifted, constant = g.shift(wire, factor.bit_length() - 1), g.constant(int(halves), frac, "centre_of_products")
+        shifted, constant = g.shift(wire, factor.bit_length() - 1), g.constant(nearest, frac, "centre_of_products")
         fits = g[constant].width - frac <= -g[shifted].frac
         return (1, g.add(shifted, constant)) if fits else term
 
@@ -225,10 +242,20 @@ class DirectForm1:
         exact = [(p, self._product_frac(p)) for p in self.products]
         return [p.floored for p, frac in exact if p.floored is not None and p.floored < frac]
 
+    def _mean_error(self, p: Product) -> Fraction:
+        """Error on average of the sums that a product is made of."""
+        if p.sums is None:
+            return Fraction(0)
+        return mean_error(self.kept_frac(p), p.coefficient, p.frac, p.sums)
+
     def _product_frac(self, p: Product) -> int:
         """Fraction bits of a product before it drops any."""
+        return self.kept_frac(p) + p.frac
+
+    def kept_frac(self, p: Product) -> int:
+        """Fraction bits of a tap sum once it has dropped bits."""
         exact = self._operand_frac(p)
-        return (exact if p.kept is None else min(exact, p.kept)) + p.frac
+        return exact if p.kept is None else min(exact, p.kept)
 
     def _operand_frac(self, p: Product) -> int:
         """Fraction bits of a tap sum before it drops any."""

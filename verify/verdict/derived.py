@@ -21,6 +21,7 @@ from sosmith.verify.certificate_file import (
 )
 from sosmith.verify.graph import inputs_of
 from sosmith.verify.multirate.decimation import samples_of_filter
+from sosmith.verify.verdict.coefficients import coefficients
 from sosmith.verify.verdict.figures import Figure
 from sosmith.verify.verdict.operators import bits
 from sosmith.verify.verdict.recursions import Recursion
@@ -120,14 +121,8 @@ def section_of(part: Recursion) -> dict[str, Any]:
     entry = {
         "name": part.name,
         "coefficients": [
-            {
-                "name": node.name.removeprefix("product_"),
-                "integer": node.parameter,
-                "frac": node.parameter_frac,
-                "value": Figure(node.parameter / Fraction(2) ** node.parameter_frac),
-            }
-            for node in nodes
-            if node.op is Operation.SCALE
+            {"name": name, "integer": integer, "frac": frac, "value": Figure(integer / Fraction(2) ** frac)}
+            for name, integer, frac in coefficients(nodes)
         ],
         "states": {node.name: format_of(node) for node in nodes if node.op is Operation.DELAY},
         "b": _padded([fraction(value) for value in numerator.coeffs()]),
