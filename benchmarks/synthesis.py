@@ -10,6 +10,8 @@ import json
 import re
 import subprocess
 import sys
+import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,6 +20,7 @@ from sosmith.gen.fpga.block_paths import with_block_paths
 from sosmith.gen.fpga.block_registers import cells_of, with_block_registers
 from sosmith.gen.fpga.boards import Board, find_board
 from sosmith.gen.fpga.gatemate import PLACER_OPTIONS
+from sosmith.gen.fpga.routing import placed
 
 GOAL = 200
 """Target clock for nextpnr in MHz: above what any design reaches, so that it always optimizes fully."""
@@ -133,7 +136,15 @@ def run(folder: Path, tool: str, *arguments: str) -> subprocess.CompletedProcess
     program = Path(sys.executable).parent / tool
     if not program.exists():
         sys.exit(f"{tool} must be installed: pip install -e '.[boards]'")
-    return subprocess.run([str(program), *arguments], cwd=folder, check=False, capture_output=True, text=True)
+    with tempfile.NamedTemporaryFile(mode="a+b", suffix=".log") as log:
+
+        def start(own: Sequence[str]) -> subprocess.Popen[bytes]:
+            log.truncate(0)
+            return subprocess.Popen([str(program), *own], cwd=folder, stdout=log, stderr=subprocess.STDOUT)
+
+        status = placed(start, arguments, Path(log.name))
+        said = Path(log.name).read_text(encoding="utf-8", errors="replace")
+    return subprocess.CompletedProcess([tool, *arguments], status, "", said)
 
 
 def version(tool: str) -> str:

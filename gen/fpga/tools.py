@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
+from sosmith.gen.fpga.routing import placed, waited
 from sosmith.gen.fpga.yowasp import compile_first, own_temporary_folder
 from sosmith.model.errors import ToolError
 
@@ -72,17 +73,17 @@ class Tool:
         if self.package is not None:
             compile_first((str(self.path),), self.name, self.package)
         with log.open("ab") as output, own_temporary_folder() as environment:
-            output.write(f"$ {self.name} {' '.join(arguments)}\n".encode())
-            output.flush()
-            done = subprocess.run(
-                [self.path, *arguments],
-                cwd=folder,
-                env=environment,
-                stdout=output,
-                stderr=subprocess.STDOUT,
-                check=False,
-            )
-        return done.returncode
+
+            def start(own: Sequence[str]) -> subprocess.Popen[bytes]:
+                output.write(f"$ {self.name} {' '.join(own)}\n".encode())
+                output.flush()
+                command = [str(self.path), *own]
+                return subprocess.Popen(command, cwd=folder, env=environment, stdout=output, stderr=subprocess.STDOUT)
+
+            if self.name.startswith("nextpnr"):
+                return placed(start, arguments, log)
+            with start(arguments) as process:
+                return waited(process)
 
 
 def find_tool(name: str) -> Tool:
