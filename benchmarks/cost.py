@@ -117,7 +117,7 @@ def measure(processes: int, only: str = "") -> None:
     RECORD.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
     for core, key in jobs():
         targets = targets_in(record, core)
-        recorded_so = key in targets and not targets[key]["earlier"] and has_all_seeds(targets[key])
+        recorded_so = key in targets and not targets[key]["earlier"]
         if only not in f"{core.label} on {key}" if only else recorded_so:
             continue
         with tempfile.TemporaryDirectory() as scratch:
@@ -149,11 +149,6 @@ def try_others() -> None:
     areas |= {wish: area(plain, wish).all_luts for wish in WISHES}
     record["tries"] = {"realization": realization_on(plain, "ecp5"), "auto": asdict(area(plain)), "areas": areas}
     RECORD.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
-
-
-def has_all_seeds(figures: Figures) -> bool:
-    """Whether a core was placed with every seed, or cannot be placed."""
-    return bool(figures["refusal"]) or len(figures["fmax"]) == len(SEEDS)
 
 
 def placed(folder: Path, key: str, cells: dict[str, int], processes: int) -> Figures:

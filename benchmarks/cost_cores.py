@@ -317,16 +317,6 @@ def outdated(record: Figures) -> list[str]:
     return _listed(lambda core, key: targets_in(record, core).get(key, {}).get("earlier", False))
 
 
-def with_fewer_seeds(record: Figures) -> list[str]:
-    """List the cores in the tables of all, and their targets, for which placing did not end with each seed."""
-
-    def asked(core: Core, key: str) -> bool:
-        seeds = len(targets_in(record, core).get(key, {}).get("fmax", ()))
-        return core not in OF_THEIR_OWN and 0 < seeds < len(record["seeds"])
-
-    return _listed(asked)
-
-
 def _listed(asked: Callable[[Core, str], bool]) -> list[str]:
     left = {core: [title(TARGETS[key]) for key in core.targets if asked(core, key)] for core in CORES}
     return [f"{core.label} on {'; '.join(titles)}" for core, titles in left.items() if titles]

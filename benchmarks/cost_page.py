@@ -27,7 +27,6 @@ from benchmarks.cost_cores import (
     rate,
     recorded,
     targets_in,
-    with_fewer_seeds,
 )
 from benchmarks.cost_estimate_record import recorded as estimated
 from benchmarks.cost_estimate_record import section
@@ -372,7 +371,6 @@ def document(record: Figures) -> dict[str, str]:
         left = f"\n## Not measured\n\n{left}"
     if earlier := "".join(f"- {core}.\n" for core in outdated(record)):
         left += f"\n## Measured on an earlier version of the core\n\n{earlier}"
-    fewer = "".join(f"{core}: placing did not end with every seed.\n" for core in with_fewer_seeds(record))
     text = f"""# What the cores cost
 
 Written by `python -m benchmarks.cost` from the figures that it records in `benchmarks/cost.json`. `--check` synthesizes
@@ -391,8 +389,10 @@ Realization, as `auto` chooses: {", ".join(realizations)}.
 Tools: {", ".join(record["tools"])}.
 fmax is the median of {len(record["seeds"])} seeds, with nextpnr asked for {GOAL} MHz. Clock and reset are the only
 pins; the streams are kept, but end inside the FPGA. The pins of a package are therefore no limit here, and wires to
-them are not timed. Nothing has run on a board.
-{fewer}
+them are not timed. Nothing has run on a board. On a UP5K, paths through multiplier blocks count, which nextpnr leaves
+out ([boards.md](boards.md#from-a-specification-to-a-live-value)); where its first router does not come to an end, the
+second one routes.
+
 How cells are counted:
 
 - LC: logic cells as placed on an iCE40, each a LUT4 with a carry and a flip-flop. MAC16 is the multiplier block, which

@@ -30,9 +30,9 @@ from sosmith.gen.specification.specification import Specification, load
 from sosmith.gen.word_lengths.cost import LUTS_OF_A_BLOCK
 from sosmith.instrument.scenarios.traces import traces_for
 from sosmith.model.arrays import Codes
-from sosmith.model.dataflow.graph import Op
 from sosmith.model.errors import ShortfallError
 from sosmith.model.reference.golden import entering_filter, filtered
+from sosmith.model.sections.truncated_products import constant_of
 
 ROOT = Path(__file__).resolve().parent.parent
 SPECIFICATIONS = ("audio_lowpass", "flange_wear_locomotive")
@@ -82,8 +82,9 @@ def measure(design: CoreDesign) -> Row:
     values = entering_filter(codes, datapath, None)
     golden = filtered(values, quantized.filter.sos, datapath.output, steady=quantized.steady)
     error = (datapath.output.decode(datapath.compute(codes)) - golden) / float(datapath.output.lsb)
-    nodes = [node for section in quantized.sections for node in section.graph.nodes]
-    coefficients = [abs(node.parameter).bit_length() for node in nodes if node.op is Op.SCALE]
+    graphs = [section.graph for section in quantized.sections]
+    constants = [made for graph in graphs for index in range(len(graph.nodes)) for made in constant_of(graph, index)]
+    coefficients = [abs(integer).bit_length() for integer, _ in constants]
     states = [section.graph.nodes[i].width for section in quantized.sections for i in section.graph.delays]
     return Row(
         coefficient_bits=f"{min(coefficients)}..{max(coefficients)}" if coefficients else "none",
