@@ -17,7 +17,7 @@ import numpy.typing as npt
 from sosmith.gen.core import CoreDesign
 from sosmith.gen.filter.design import decay_length
 from sosmith.gen.proof.linear_model import quantized_nodes
-from sosmith.gen.word_lengths.error_paths import error_paths
+from sosmith.gen.stimuli.error_paths import error_paths
 from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.model.arithmetic.recursive_filters import sosfilt
 from sosmith.model.arrays import Codes

@@ -6,8 +6,8 @@ import numpy as np
 
 from sosmith.gen.core import CoreDesign, chosen_core, inputs_of, response_of
 from sosmith.gen.specification.specification import Specification
+from sosmith.gen.stimuli.error_paths import error_responses
 from sosmith.gen.stimuli.run import Bench
-from sosmith.gen.word_lengths.error_paths import error_responses
 
 
 def bench_of(design: CoreDesign, *, errors: bool = True) -> Bench:

@@ -18,7 +18,7 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property, lru_cache
 from itertools import combinations, pairwise, zip_longest
@@ -32,7 +32,8 @@ from sosmith.gen.realizations.registry import realization_of
 from sosmith.gen.realizations.section_format import MIN_BITS, SectionFormat, unknown_range
 from sosmith.gen.realizations.tied_formats import Group, groups_of, tied_start, tied_step
 from sosmith.gen.word_lengths.cost import MULTIPLIER_BITS
-from sosmith.gen.word_lengths.estimates import Array, Estimate, estimates_of, largest_magnitude
+from sosmith.gen.word_lengths.estimates import Estimate, estimates_of
+from sosmith.gen.word_lengths.format_errors import FormatErrors
 from sosmith.gen.word_lengths.input_stage import InputStage
 from sosmith.gen.word_lengths.objective import SMALL_AREA, Objective
 from sosmith.model.dataflow.graph import Op, Range
@@ -68,21 +69,6 @@ class _Input(NamedTuple):
     x: Range
     error: float
     size: float
-
-
-@dataclass(frozen=True, eq=False)
-class _Base:
-    """Reference formats, which others differ from in a few places, and their deviation and errors.
-
-    `roundings` holds the errors of each section's quantizers, `error` that of all coefficients. `errors` holds those of
-    the others that are known, by the sections and coefficients in which they differ.
-    """
-
-    formats: tuple[SectionFormat, ...]
-    roundings: tuple[float, ...]
-    deviation: Array
-    error: float
-    errors: dict[tuple[object, ...], float]
 
 
 class Search:
@@ -126,7 +112,6 @@ class Search:
         low, high = x.low * 2.0**-x.frac, x.high * 2.0**-x.frac
         self._windows = [(0.0, high), (low, 0.0)] if steady else [(low, high)]
         self._realization = realization
-        self._base: _Base | None = None
         self._ranges: dict[tuple[object, ...], dict[str, tuple[int, int]]] = {}
         self._known: dict[tuple[object, ...], tuple[float, Range, dict[str, int]]] = {}
         self._saved: dict[tuple[object, ...], list[float]] = {}
@@ -150,6 +135,10 @@ class Search:
     @cached_property
     def _estimates(self) -> list[Estimate]:
         return estimates_of(self._parts, self._realization, self._windows)
+
+    @cached_property
+    def _errors(self) -> FormatErrors:
+        return FormatErrors(self._estimates, self._windows)
 
     @property
     def _ideals(self) -> list[dict[str, float]]:
@@ -178,6 +167,7 @@ class Search:
         if objective == self._objective:
             return self
         other = copy.copy(self)
+        other.__dict__.pop("_errors", None)
         other._objective = objective
         other._inputs = other._sized_inputs()
         other._known = {}
@@ -282,7 +272,7 @@ class Search:
     def _trimmed_once(self, start: Choice, allowed: float, *, calibration: bool = True) -> Choice:
         choice, error, size = start, self.error(start), self.size(start)
         while error <= allowed:
-            self._base = self._based(choice.formats)
+            self._errors.refer_to(choice.formats)
             steps: list[tuple[float, Choice, float, float]] = []
             for candidate in self._all_tied(choice, self._steps(choice, calibration=calibration)):
                 after = self.error(candidate)
@@ -398,7 +388,7 @@ class Search:
         """Take what lowers the error and costs at most `more` in all, the best first, until nothing does."""
         size = self.size(choice) + more
         while True:
-            self._base = self._based(choice.formats)
+            self._errors.refer_to(choice.formats)
             error = self.error(choice)
             if error <= _WORTH:
                 return choice
@@ -486,58 +476,12 @@ class Search:
 
     def error(self, choice: Choice) -> float:
         """Estimated sum of the errors of input stage, coefficients and rounding, in output LSBs."""
-        rounding = sum(self._roundings(choice.formats))
+        rounding = self._errors.of_rounding(choice.formats)
         return self._inputs[choice.input_stage].error + rounding + self.coefficient_error(choice)
-
-    def _roundings(self, formats: tuple[SectionFormat, ...]) -> tuple[float, ...]:
-        """Estimated error of the quantizers of each section, in output LSBs."""
-        base = self._base
-        return tuple(
-            base.roundings[k]
-            if base is not None and form.fracs is base.formats[k].fracs
-            else self._estimates[k].rounding(form.fracs)
-            for k, form in enumerate(formats)
-        )
 
     def coefficient_error(self, choice: Choice) -> float:
         """Estimated error of the coefficients in output LSBs."""
-        base = self._base
-        if base is None:
-            return largest_magnitude(self._deviation(choice.formats, None), self._windows)
-        changed = tuple(
-            (k, *form.coefficients.items())
-            for k, (form, before) in enumerate(zip(choice.formats, base.formats, strict=True))
-            if form.coefficients is not before.coefficients
-        )
-        if not changed:
-            return base.error
-        if changed not in base.errors:
-            base.errors[changed] = largest_magnitude(self._deviation(choice.formats, base), self._windows)
-        return base.errors[changed]
-
-    def _based(self, formats: tuple[SectionFormat, ...]) -> _Base:
-        """Take formats as the reference; what is known of others stays so if only quantizers have changed."""
-        base = self._base
-        if base is not None and all(
-            form.coefficients is before.coefficients for form, before in zip(formats, base.formats, strict=True)
-        ):
-            return replace(base, formats=formats, roundings=self._roundings(formats))
-        deviation = self._deviation(formats, None)
-        return _Base(formats, self._roundings(formats), deviation, largest_magnitude(deviation, self._windows), {})
-
-    def _deviation(self, formats: Sequence[SectionFormat], base: _Base | None) -> Array:
-        """Deviation of the impulse response due to the coefficients, updated from that of `base`."""
-        response = np.zeros(1, dtype=np.float32) if base is None else base.deviation
-        for k, (estimate, form) in enumerate(zip(self._estimates, formats, strict=True)):
-            before = None if base is None else base.formats[k].coefficients
-            for name, (integer, frac) in form.coefficients.items():
-                start = estimate.ideal[name]
-                if before is not None:
-                    if before[name] == (integer, frac):
-                        continue
-                    start = before[name][0] * 2.0 ** -before[name][1]
-                response = response + (integer * 2.0**-frac - start) * estimate.slopes[name]
-        return response
+        return self._errors.of_coefficients(choice.formats)
 
     def _is_stable(self, choice: Choice) -> bool:
         return self.size(choice) < math.inf

@@ -29,7 +29,7 @@ from sosmith.gen.realizations.lattice import LatticePair, LatticeSigns, Row, lat
 from sosmith.gen.realizations.registry import REALIZATIONS
 from sosmith.gen.realizations.section_format import SectionFormat
 from sosmith.gen.specification.specification import load
-from sosmith.gen.word_lengths.error_paths import error_paths
+from sosmith.gen.stimuli.error_paths import error_paths
 from sosmith.model.dataflow.graph import Graph, Op, Range
 from sosmith.model.dataflow.structure import Stage
 from sosmith.model.errors import ShortfallError

@@ -17,8 +17,8 @@ from tests.gen.word_lengths.sweep_designs import REFUSED
 from sosmith.gen.filter.design import decay_length, design, impulse_response
 from sosmith.gen.realizations.registry import CASCADES, SECTIONS
 from sosmith.gen.specification.specification import FilterSpec
+from sosmith.gen.stimuli.error_paths import error_responses
 from sosmith.gen.stimuli.worst_case_inputs import sign_matched
-from sosmith.gen.word_lengths.error_paths import error_responses
 from sosmith.gen.word_lengths.quantize import quantize
 from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.model.errors import ShortfallError
