@@ -32,8 +32,7 @@ from sosmith.gen.realizations.registry import realization_of
 from sosmith.gen.realizations.section_format import MIN_BITS, SectionFormat, unknown_range
 from sosmith.gen.realizations.tied_formats import Group, groups_of, tied_start, tied_step
 from sosmith.gen.word_lengths.cost import MULTIPLIER_BITS
-from sosmith.gen.word_lengths.estimates import Estimate, estimates_of
-from sosmith.gen.word_lengths.format_errors import FormatErrors
+from sosmith.gen.word_lengths.estimates import Estimate, FormatErrors, estimates_of
 from sosmith.gen.word_lengths.input_stage import InputStage
 from sosmith.gen.word_lengths.objective import SMALL_AREA, Objective
 from sosmith.model.dataflow.graph import Op, Range
