@@ -317,6 +317,15 @@ def outdated(record: Figures) -> list[str]:
     return _listed(lambda core, key: targets_in(record, core).get(key, {}).get("earlier", False))
 
 
+def with_fewer_seeds(record: Figures) -> list[str]:
+    """List the cores, and their targets, that were not placed with each seed."""
+
+    def asked(core: Core, key: str) -> bool:
+        return 0 < len(targets_in(record, core).get(key, {}).get("fmax", ())) < len(record["seeds"])
+
+    return _listed(asked)
+
+
 def _listed(asked: Callable[[Core, str], bool]) -> list[str]:
     left = {core: [title(TARGETS[key]) for key in core.targets if asked(core, key)] for core in CORES}
     return [f"{core.label} on {'; '.join(titles)}" for core, titles in left.items() if titles]

@@ -27,6 +27,7 @@ from benchmarks.cost_cores import (
     rate,
     recorded,
     targets_in,
+    with_fewer_seeds,
 )
 from benchmarks.cost_estimate_record import recorded as estimated
 from benchmarks.cost_estimate_record import section
@@ -371,6 +372,9 @@ def document(record: Figures) -> dict[str, str]:
         left = f"\n## Not measured\n\n{left}"
     if earlier := "".join(f"- {core}.\n" for core in outdated(record)):
         left += f"\n## Measured on an earlier version of the core\n\n{earlier}"
+    fewer = "".join(f"- {core}.\n" for core in with_fewer_seeds(record))
+    if fewer:
+        left += f"\n## Placed with fewer seeds, as each takes a quarter of an hour\n\n{fewer}"
     text = f"""# What the cores cost
 
 Written by `python -m benchmarks.cost` from the figures that it records in `benchmarks/cost.json`. `--check` synthesizes

@@ -172,11 +172,12 @@ def test_figures_of_an_earlier_version_are_told() -> None:
 
 
 @pytest.mark.slow
-def test_each_core_is_placed_with_every_seed() -> None:
+def test_what_was_not_placed_with_every_seed_is_named() -> None:
     record = json.loads(cost_cores.RECORD.read_text(encoding="utf-8"))
-    for core in cost_cores.CORES:
-        for figures in cost_cores.targets_in(record, core).values():
-            assert figures["refusal"] or len(figures["fmax"]) == len(record["seeds"]), core.label
+    figures, line = record["cores"]["audio_lowpass folded 1"]["targets"]["ecp5"], "- audio_lowpass folded on ECP5"
+    assert line not in cost_page.document(record)["docs/cost.md"].partition("Placed with fewer seeds")[2]
+    del figures["fmax"][0]
+    assert line in cost_page.document(record)["docs/cost.md"].partition("Placed with fewer seeds")[2]
 
 
 @pytest.mark.slow
