@@ -11,7 +11,9 @@ fmax leaves out what passes through, and a block without a clock even counts as 
 paths are timed from the delays that nextpnr writes of the placed design (`--sdf`), with those of the blocks from the
 timing of the UP5K that Project IceStorm has from the vendor's tools
 (https://github.com/YosysHQ/icestorm/blob/master/icefuzz/timings_up5k.txt, cell SB_MAC16): of each kind of path through
-a block the longest. So what a clock achieves is a lower bound, as far as nextpnr's own delays hold.
+a block the longest. So what a clock achieves is a lower bound, as far as nextpnr's own delays hold. All registers are
+taken to have the same edge of their clock, and clocks to reach all of them at the same time; a path that ends in a
+register whose clock has another name in the report counts for each clock there.
 """
 
 from __future__ import annotations
@@ -19,28 +21,35 @@ from __future__ import annotations
 import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from graphlib import TopologicalSorter
+from graphlib import CycleError, TopologicalSorter
 from typing import Any, NamedTuple
 
-_LONGEST = {"A": (7.4, 8.9), "B": (7.4, 8.9), "D": (3.4, 4.0), "C": (0.0, 3.0)}
-"""From a factor or an addend to the lower and to the upper half of the output, in ns.
+from sosmith.model.errors import ToolError
+
+_LONGEST = {"A": (7.4, 8.9), "B": (7.4, 8.9), "D": (3.4, 4.0), "C": (0.0, 3.0), "": (4.0, 4.0)}
+"""From a factor or an addend to the lower and to the upper half of the output, in ns; "" is what controls the adder.
 
 Of the delays there, from B[1] to O[14] 7.308 and to O[31] 8.813, from D[1] to O[14] 3.226, from D[5] to O[31] 3.862,
 and from C[1] to O[31] 2.947. The upper addend does not reach the lower half.
 """
 
+_FROM_OUTPUT = 1.6
+"""From the clock to a registered output in ns: 1.582 to O[31]."""
+
+_SETUP_TIME = 0.1
+"""That of a registered input in ns, as nextpnr has it."""
+
 _UNCLOCKED = "$PACKER_GND_NET"
 """What blocks without a clock have for one."""
 
-_CLOCKS = frozenset({"CLK", "RCLK", "WCLK"})
+_CLOCKS = frozenset({"CLK", "RCLK", "WCLK", "CLOCK", "INPUT_CLK", "OUTPUT_CLK"})
 _FACTORS = "AB"
 _DATA = re.compile(r"([ABCDO])_(\d+)")
-_PRODUCT_REGISTERS = (
-    "TOP_8x8_MULT_REG",
-    "BOT_8x8_MULT_REG",
-    "PIPELINE_16x16_MULT_REG1",
-    "PIPELINE_16x16_MULT_REG2",
-)
+_CONTROL = re.compile(r"ADDSUB(TOP|BOT)|OLOAD(TOP|BOT)|CI|ACCUMCI|SIGNEXTIN")
+_HALVES = ("TOP_8x8_MULT_REG", "BOT_8x8_MULT_REG", "PIPELINE_16x16_MULT_REG1")
+_WHOLE = "PIPELINE_16x16_MULT_REG2"
+"""Registers of the product: of its parts, which cut all ways through it if all are there, and of all of it."""
+
 _HALF = 16
 _REGISTERED = "01"
 """What selects the register behind the adder as the upper or lower half of the output."""
@@ -79,20 +88,28 @@ def with_block_paths(report: dict[str, Any], sdf: str, netlist: dict[str, Any]) 
     blocks = {f"{name}_DSP": cell["parameters"] for name, cell in top["cells"].items() if cell["type"] == "SB_MAC16"}
     if not blocks:
         return report
-    slowest = _Timing(sdf, blocks).slowest()
+    try:
+        slowest = _Timing(sdf, blocks).slowest()
+    except CycleError:
+        raise ToolError("paths through multiplier blocks must have an end, not lead back to where they begin") from None
     clocks = {name: dict(timing) for name, timing in report["fmax"].items() if _UNCLOCKED not in name}
     paths = {
         (path["from"], path["to"]): path
         for path in report["critical_paths"]
         if _UNCLOCKED not in path["from"] + path["to"]
     }
+    elsewhere = [path for clock, path in slowest.items() if clock not in clocks]
     for name, timing in clocks.items():
-        path = slowest.get(name, [])
-        if path and (achieved := 1e3 / sum(step["delay"] for step in path)) < timing["achieved"]:
+        path = max((*elsewhere, slowest.get(name, [])), key=_length)
+        if path and (achieved := 1e3 / _length(path)) < timing["achieved"]:
             timing["achieved"] = achieved
             edge = f"posedge {name}"
             paths[edge, edge] = {"from": edge, "to": edge, "path": path}
     return report | {"fmax": clocks, "critical_paths": list(paths.values())}
+
+
+def _length(path: Sequence[Mapping[str, Any]]) -> float:
+    return float(sum(step["delay"] for step in path))
 
 
 class _Timing:
@@ -119,34 +136,47 @@ class _Timing:
 
     def _block(self, cell: str, parameters: dict[str, str], body: str) -> None:
         """Add the ways through a block, those to its registers, and those from them."""
-        product = any(parameters[register] == "1" for register in _PRODUCT_REGISTERS)
-        inputs = [(pin, _data(pin[1])) for pin in self._steps if pin[0] == cell and _DATA.fullmatch(pin[1])]
         clock = (cell, "CLK")
-        for pin, (side, _) in inputs:
-            if side in _FACTORS and product:
-                start = clock if parameters[f"{side}_REG"] == "1" else pin
-                self._ends[pin].append(_Step(start, max(_LONGEST[side]), unseen=True))
+        cut = parameters[_WHOLE] == "1" or all(parameters[register] == "1" for register in _HALVES)
+        product = cut or any(parameters[register] == "1" for register in _HALVES)
+        inputs: list[tuple[Pin, str, int]] = []
+        for pin in [pin for pin in self._steps if pin[0] == cell]:
+            found = _DATA.fullmatch(pin[1])
+            if found or _CONTROL.fullmatch(pin[1]):
+                side, place = (found[1], int(found[2])) if found else ("", 0)
+                inputs.append((pin, side, place))
+            if not found or parameters[f"{found[1]}_REG"] == "1":
+                self._ends[pin].append(_Step(pin, _SETUP_TIME))
+        starts = {pin: clock if side and parameters[f"{side}_REG"] == "1" else pin for pin, side, _ in inputs}
+        for pin, side, _ in inputs:
+            if side and side in _FACTORS and product:
+                self._ends[pin].append(_Step(starts[pin], max(_LONGEST[side]), unseen=True))
         for end in {end for _, end, *_ in _STEP.findall(body) if _DATA.fullmatch(end)}:
-            _, bit = _data(end)
+            bit = int(end[2:])
             inside = [_Step(clock, max(_LONGEST["A"]), unseen=True)] if product else []
-            for pin, (side, place) in inputs:
-                if _reaches(side, place, bit) and not (side in _FACTORS and product):
-                    start = clock if parameters[f"{side}_REG"] == "1" else pin
-                    inside.append(_Step(start, _LONGEST[side][bit >= _HALF], unseen=True))
+            inside += [
+                _Step(starts[pin], _LONGEST[side][bit >= _HALF], unseen=True)
+                for pin, side, place in inputs
+                if _reaches(side, place, bit) and not (cut and side and side in _FACTORS)
+            ]
             if parameters["TOPOUTPUT_SELECT" if bit >= _HALF else "BOTOUTPUT_SELECT"] == _REGISTERED:
                 self._ends[cell, end] += inside
-                self._steps[cell, end].append(_Step(clock, 0.0))
+                self._steps[cell, end].append(_Step(clock, _FROM_OUTPUT, unseen=True))
             else:
                 self._steps[cell, end] += inside
 
     def slowest(self) -> dict[str, list[dict[str, Any]]]:
         """Return the slowest path with a way that nextpnr does not see, step by step, by the clock of its end."""
-        seen: dict[Pin, _Arrival] = {}
+        # Only what comes from a register: pins of the FPGA and constants have no clock.
+        every = [step.source for steps in (*self._steps.values(), *self._ends.values()) for step in steps]
+        seen = {pin: _Arrival(0.0) for pin in every if pin[1] in _CLOCKS}
         unseen: dict[Pin, _Arrival] = {}
         before = {pin: {step.source for step in of} for pin, of in self._steps.items()}
         for pin in TopologicalSorter(before).static_order():
             steps = self._steps.get(pin, ())
-            seen[pin] = max((seen[step.source].after(step) for step in steps), default=_Arrival(0.0))
+            arrivals = [seen[step.source].after(step) for step in steps if step.source in seen]
+            if arrivals:
+                seen[pin] = max(arrivals)
             if (last := _last(steps, seen, unseen)) is not None:
                 unseen[pin] = last
         slowest: dict[str, tuple[Pin, _Arrival]] = {}
@@ -171,9 +201,10 @@ class _Arrival(NamedTuple):
 def _last(steps: Iterable[_Step], seen: Mapping[Pin, _Arrival], unseen: Mapping[Pin, _Arrival]) -> _Arrival | None:
     """Return when the last signal arrives that has passed a way that nextpnr does not see; None if none does."""
     arrivals = [
-        (seen if step.unseen else unseen)[step.source].after(step)
+        ways[step.source].after(step)
         for step in steps
-        if step.unseen or step.source in unseen
+        for ways in (seen if step.unseen else unseen,)
+        if step.source in ways
     ]
     return max(arrivals, default=None)
 
@@ -198,15 +229,10 @@ def _told(
         arrival = ways[pin]
 
 
-def _data(port: str) -> tuple[str, int]:
-    """Return the letter of a port of a block, and its bit."""
-    found = _DATA.fullmatch(port)
-    assert found
-    return found[1], int(found[2])
-
-
 def _reaches(side: str, place: int, bit: int) -> bool:
     """Whether a bit of a factor or addend can change one of the output; two bits of a factor are recoded as one."""
+    if not side:
+        return True
     if side in _FACTORS:
         return bit >= place - 1
     return bit >= place + (_HALF if side == "C" else 0)

@@ -5,6 +5,7 @@ from typing import Any
 import pytest
 
 from sosmith.gen.fpga.block_paths import with_block_paths
+from sosmith.model.errors import ToolError
 
 REGISTERS = (
     "A_REG",
@@ -116,6 +117,61 @@ def test_two_blocks_after_one_another_take_the_time_of_both() -> None:
         ("p_DSP/O_20", "two/I0", 3000),
     )
     assert slowest(sdf, netlist()) == pytest.approx(1.390 + 2 + 7.4 + 1 + 3.0 + 3 + 1.234)
+
+
+def test_a_clock_of_another_name_counts_for_all() -> None:
+    """The net behind a PLL has a name of its own, which the delays do not tell."""
+    pll = [(r"\$gbuf_pll_pllout_a/GLOBAL_BUFFER_OUTPUT", sink, ps) for _, sink, ps in CLOCKS]
+    sdf = delays(*pll, ("one/O", "p_DSP/A_3", 2000), ("p_DSP/O_20", "two/I0", 3000))
+    assert slowest(sdf, netlist()) == pytest.approx(1.390 + 2 + 8.9 + 3 + 1.234)
+
+
+def test_a_registered_input_of_another_block_ends_a_path() -> None:
+    placed = netlist()
+    (top,) = placed["modules"].values()
+    parameters = {**top["cells"]["p"]["parameters"], "A_REG": "1"}
+    top["cells"]["q"] = {"type": "SB_MAC16", "parameters": parameters}
+    wires = (*CLOCKS, ("one/O", "p_DSP/A_3", 2000), ("p_DSP/O_20", "q_DSP/A_0", 3000))
+    sdf = delays(*wires)
+    sdf += sdf[sdf.index('(CELL (CELLTYPE "ICESTORM_DSP")') :].replace("p_DSP", "q_DSP")
+    sdf += r"(INTERCONNECT \$gbuf_clk/GLOBAL_BUFFER_OUTPUT q_DSP/CLK (9:9:9) (9:9:9))"
+    assert slowest(sdf, placed) == pytest.approx(1.390 + 2 + 8.9 + 3 + 0.1)
+
+
+def test_registers_of_a_part_of_the_product_cut_no_path() -> None:
+    sdf = delays(*CLOCKS, ("one/O", "p_DSP/A_3", 2000), ("p_DSP/O_20", "two/I0", 3000))
+    whole = 1.390 + 2 + 8.9 + 3 + 1.234
+    assert slowest(sdf, netlist(BOT_8x8_MULT_REG=1)) == pytest.approx(whole)
+    parts = {"TOP_8x8_MULT_REG": 1, "BOT_8x8_MULT_REG": 1, "PIPELINE_16x16_MULT_REG1": 1}
+    assert slowest(sdf, netlist(**parts)) == pytest.approx(8.9 + 3 + 1.234)
+    assert slowest(sdf, netlist(PIPELINE_16x16_MULT_REG2=1)) == pytest.approx(8.9 + 3 + 1.234)
+
+
+def test_what_controls_the_adder_passes_too() -> None:
+    sdf = delays(*CLOCKS, ("one/O", "p_DSP/ADDSUBTOP", 2000), ("p_DSP/O_20", "two/I0", 3000))
+    assert slowest(sdf, netlist()) == pytest.approx(1.390 + 2 + 4.0 + 3 + 1.234)
+
+
+def test_a_registered_output_begins_later_than_nextpnr_says() -> None:
+    sdf = delays(*CLOCKS, ("p_DSP/O_20", "two/I0", 3000))
+    assert slowest(sdf, netlist(top="01")) == pytest.approx(1.6 + 3 + 1.234)
+
+
+def test_pins_and_constants_begin_no_path() -> None:
+    sdf = delays(*CLOCKS, ("pin/D_IN_0", "p_DSP/A_3", 20_000), ("p_DSP/O_20", "two/I0", 3000))
+    assert slowest(sdf, netlist()) == pytest.approx(5.0)
+
+
+def test_a_block_without_outputs_is_no_trouble() -> None:
+    sdf = delays(*CLOCKS, ("one/O", "p_DSP/A_3", 2000))
+    assert slowest(sdf, netlist(A_REG=1, TOP_8x8_MULT_REG=1)) == pytest.approx(8.9)
+
+
+def test_a_circle_has_no_slowest_path() -> None:
+    sdf = delays(*CLOCKS, ("p_DSP/O_20", "p_DSP/A_0", 3000))
+    sentence = "paths through multiplier blocks must have an end, not lead back to where they begin"
+    with pytest.raises(ToolError, match=f"^{sentence}$"):
+        with_block_paths(report(), sdf, netlist())
 
 
 def test_the_path_that_nextpnr_sees_stays_where_it_is_slower() -> None:
