@@ -32,7 +32,7 @@ from sosmith.instrument.scenarios.traces import traces_for
 from sosmith.model.arrays import Codes
 from sosmith.model.errors import ShortfallError
 from sosmith.model.reference.golden import entering_filter, filtered
-from sosmith.model.sections.truncated_products import constant_of
+from sosmith.model.sections.truncated_products import constants_of
 
 ROOT = Path(__file__).resolve().parent.parent
 SPECIFICATIONS = ("audio_lowpass", "flange_wear_locomotive")
@@ -83,8 +83,7 @@ def measure(design: CoreDesign) -> Row:
     golden = filtered(values, quantized.filter.sos, datapath.output, steady=quantized.steady)
     error = (datapath.output.decode(datapath.compute(codes)) - golden) / float(datapath.output.lsb)
     graphs = [section.graph for section in quantized.sections]
-    constants = [made for graph in graphs for index in range(len(graph.nodes)) for made in constant_of(graph, index)]
-    coefficients = [abs(integer).bit_length() for integer, _ in constants]
+    coefficients = [abs(integer).bit_length() for graph in graphs for integer, _ in constants_of(graph).values()]
     states = [section.graph.nodes[i].width for section in quantized.sections for i in section.graph.delays]
     return Row(
         coefficient_bits=f"{min(coefficients)}..{max(coefficients)}" if coefficients else "none",

@@ -17,7 +17,9 @@ from sosmith.hdl.plan import parallel_clocks
 from sosmith.hdl.plan.look_ahead import Products, in_pieces
 from sosmith.model.dataflow.adder_graph import scalings
 from sosmith.model.dataflow.datapath import Datapath
+from sosmith.model.dataflow.graph import Op
 from sosmith.model.reload.constants import with_room
+from sosmith.model.sections.truncated_products import constants_of
 
 if TYPE_CHECKING:
     from amaranth.lib.wiring import Component
@@ -122,8 +124,13 @@ class Parallel(Architecture):
         several = f", {lanes} samples a clock" if lanes > 1 else ""
         return f"{self.name}: {why}{several}{self._made_of_adders()}"
 
+    @property
+    def _truncated(self) -> int:
+        """Products that are sums in the graphs themselves."""
+        return sum(graph.nodes[index].op is not Op.SCALE for graph in self.graphs for index in constants_of(graph))
+
     def _made_of_adders(self) -> str:
-        count, there = sum(map(len, self.adders)), self.blocks.available
+        count, there = sum(map(len, self.adders)) + self._truncated, self.blocks.available
         if not count:
             return ""
         products = f"{count} product{'s' * (count > 1)} by constants made of adders"

@@ -33,7 +33,7 @@ from sosmith.model.full_scale import is_sound
 from sosmith.model.port import Port
 from sosmith.model.reload.registers import BANK_INPUTS, INTERFACE
 from sosmith.model.sections.horner import HornerStep
-from sosmith.model.sections.truncated_products import PREFIX, constant_of
+from sosmith.model.sections.truncated_products import constants_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -487,9 +487,10 @@ def _section(name: str, graph: Graph, feedback: tuple[int, ...] | None) -> Secti
     return SectionFacts(
         name=name,
         coefficients=tuple(
-            CoefficientFacts(name=node.name.removeprefix(PREFIX), integer=integer, frac=frac, value=integer / 2**frac)
-            for index, node in enumerate(nodes)
-            for integer, frac in constant_of(graph, index)
+            CoefficientFacts(
+                name=nodes[index].name.removeprefix("product_"), integer=integer, frac=frac, value=integer / 2**frac
+            )
+            for index, (integer, frac) in constants_of(graph).items()
         ),
         states={nodes[i].name: nodes[i].format for i in graph.delays},
         b=b,

@@ -7,6 +7,7 @@ from fractions import Fraction
 
 from sosmith.gen.quantity import MINUS, power_of_ten
 from sosmith.model.dataflow.graph import Graph, Op
+from sosmith.model.sections.truncated_products import constants_of
 
 _ROUNDING = {Op.FLOOR: "⌊{}⌋", Op.TRUNCATE: "trunc({})", Op.FRACTION: "frac({})"}
 _SUBSCRIPT = str.maketrans("-0123456789", "₋₀₁₂₃₄₅₆₇₈₉")
@@ -82,6 +83,7 @@ class _Reader:
 
     def __init__(self, graph: Graph) -> None:
         self._nodes = graph.nodes
+        self._constants = constants_of(graph)
         unnamed = {Op.INPUT, Op.DELAY, Op.SCALE, Op.CONSTANT}
         self._names = {i: node.name for i, node in enumerate(graph.nodes) if node.name and node.op not in unnamed}
         self._equations: dict[int, Equation] = {}
@@ -93,9 +95,8 @@ class _Reader:
             if node.op is Op.DELAY:
                 self._signal(node.operands[0])
         coefficients = {
-            node.name: Coefficient(_coefficient_name(node.name, index), node.parameter, node.parameter_frac)
-            for index, node in enumerate(self._nodes)
-            if node.op is Op.SCALE
+            self._nodes[index].name: Coefficient(_coefficient_name(self._nodes[index].name, index), integer, frac)
+            for index, (integer, frac) in self._constants.items()
         }
         ordered = sorted(self._equations.items())
         return Recursion(section, tuple(equation for _, equation in ordered), tuple(coefficients.values()))

@@ -15,6 +15,7 @@ from sosmith.gen.proof.peak_gain import Extent
 from sosmith.gen.realizations.registry import Section, realization_of
 from sosmith.gen.realizations.section_format import SectionFormat, unknown_range
 from sosmith.model.dataflow.graph import Range
+from sosmith.model.sections.direct_form import DirectForm1
 
 
 def parts_of(ideal: Filter, realization: str) -> Sequence[Any]:
@@ -60,9 +61,12 @@ def chosen_formats(sections: Sequence[Section]) -> list[SectionFormat]:
     """Return the coefficients of all sections and the fraction bits that their quantizers keep."""
     formats = []
     for section in sections:
-        models = linear_models(section.graph)
-        kept = {s.name: s.kept for model in models for s in model.sources if s.kept is not None}
-        fracs = {"v": section.graph.output_ranges[0].frac} | kept
+        if isinstance(section, DirectForm1):
+            fracs = section.fracs
+        else:
+            models = linear_models(section.graph)
+            kept = {s.name: s.kept for model in models for s in model.sources if s.kept is not None}
+            fracs = {"v": section.graph.output_ranges[0].frac} | kept
         formats.append(SectionFormat(coefficients=section.coefficients, fracs=fracs))
     return formats
 

@@ -278,6 +278,12 @@ class DirectForm1:
         return {p.name: (p.coefficient, p.frac) for p in self.products}
 
     @property
+    def fracs(self) -> dict[str, int]:
+        """Fraction bits that are kept, by the names that formats have for them."""
+        each = [((p.operand, p.kept), (p.label, p.floored), (p.sums_label, p.sums)) for p in self.products]
+        return {"v": self.y_frac} | {name: kept for names in each for name, kept in names if kept is not None}
+
+    @property
     def optional_quantizers(self) -> tuple[str, ...]:
         """Names of the nodes that may be quantized but need not be."""
         return (*(p.operand for p in self.products if p.is_sum), *(p.label for p in self.products))

@@ -29,9 +29,6 @@ from fractions import Fraction
 from sosmith.model.dataflow.adder_graph import Adder, adder_graph, multiple_name, odd_part
 from sosmith.model.dataflow.graph import Graph, GraphBuilder, Op, Wire
 
-PREFIX = "product_"
-"""What the names of products begin with."""
-
 _OF_SUMS = frozenset({Op.ADD, Op.SUBTRACT, Op.SHIFT})
 
 
@@ -49,31 +46,41 @@ def truncated(g: GraphBuilder, operand: Wire, coefficient: int, frac: int, kept:
     return g.named(g.shift(last, power - frac), name)
 
 
-def constant_of(graph: Graph, index: int) -> list[tuple[int, int]]:
-    """Return the constant of a product, whole or made of sums, with its fraction bits; nothing for another node."""
-    node = graph.nodes[index]
-    if node.op is Op.SCALE:
-        return [(node.parameter, node.parameter_frac)]
-    if not node.name.startswith(PREFIX) or node.op not in _OF_SUMS:
-        return []
-    _, multiple = _multiple(graph, index)
-    frac = multiple.denominator.bit_length() - 1
-    return [(int(multiple * 2**frac), frac)]
+def constants_of(graph: Graph) -> dict[int, tuple[int, int]]:
+    """Return the constants that products of a graph multiply by, with their fraction bits, by the node of the product.
 
-
-def _multiple(graph: Graph, index: int) -> tuple[int, Fraction]:
-    """Return what a node is a multiple of, but for the bits that are dropped on the way, and which."""
-    node = graph.nodes[index]
-    if node.op is Op.FLOOR:
-        return _multiple(graph, node.operands[0])
-    if node.op is Op.SHIFT:
-        of, multiple = _multiple(graph, node.operands[0])
-        return of, multiple * Fraction(2) ** node.parameter
-    if node.op is Op.ADD or node.op is Op.SUBTRACT:
-        (left, first), (right, second) = (_multiple(graph, i) for i in node.operands)
-        if left == right:
-            return left, first + second if node.op is Op.ADD else first - second
-    return index, Fraction(1)
+    A product is one multiplication, or a sum of multiples of one node, whatever these drop, that is no part of another
+    such sum.
+    """
+    multiples: list[tuple[int, Fraction]] = []
+    for index, node in enumerate(graph.nodes):
+        multiple = index, Fraction(1)
+        if node.op is Op.FLOOR:
+            multiple = multiples[node.operands[0]]
+        elif node.op is Op.SHIFT:
+            of, factor = multiples[node.operands[0]]
+            multiple = of, factor * Fraction(2) ** node.parameter
+        elif node.op is Op.ADD or node.op is Op.SUBTRACT:
+            (left, first), (right, second) = (multiples[i] for i in node.operands)
+            if left == right:
+                multiple = left, first + second if node.op is Op.ADD else first - second
+        multiples.append(multiple)
+    parts = {
+        i
+        for index, node in enumerate(graph.nodes)
+        if node.op in _OF_SUMS and multiples[index][0] != index
+        for operand in node.operands
+        for i in (operand, *(graph.nodes[operand].operands if graph.nodes[operand].op is Op.FLOOR else ()))
+    }
+    made: dict[int, tuple[int, int]] = {}
+    for index, node in enumerate(graph.nodes):
+        of, factor = multiples[index]
+        if node.op is Op.SCALE:
+            made[index] = node.parameter, node.parameter_frac
+        elif node.op in _OF_SUMS and of != index and index not in parts and abs(factor.numerator).bit_count() > 1:
+            frac = factor.denominator.bit_length() - 1
+            made[index] = factor.numerator, frac
+    return made
 
 
 def mean_error(operand_frac: int, coefficient: int, frac: int, kept: int) -> Fraction:

@@ -1,7 +1,8 @@
 """The coefficients of a recursion in a certificate: what its products multiply by.
 
-A product is a node of its own, or is made of sums of one operand, each of which may drop bits: then its constant is
-what they come to if none does.
+A product is a node of its own, or a sum of multiples of one node that is no part of another such sum; its operands may
+drop bits. Then its constant is what they come to if none does. What is a product is seen from the graph, whatever the
+nodes are called.
 """
 
 from __future__ import annotations
@@ -17,28 +18,41 @@ _OF_SUMS = frozenset({Operation.ADD, Operation.SUBTRACT, Operation.SHIFT})
 
 def coefficients(nodes: Sequence[NodeEntry]) -> list[tuple[str, int, int]]:
     """Return name, integer and fraction bits of each coefficient, in the order of the products."""
+    of, factors = _multiples(nodes)
+    parts: set[int] = set()
+    for index, node in enumerate(nodes):
+        if node.op in _OF_SUMS and of[index] != index:
+            parts |= {*node.operands}
+            parts |= {k for i in node.operands if nodes[i].op is Operation.FLOOR for k in nodes[i].operands}
     found = []
     for index, node in enumerate(nodes):
-        name = node.name.removeprefix(_PREFIX)
+        factor = factors[index]
         if node.op is Operation.SCALE:
-            found.append((name, node.parameter, node.parameter_frac))
-        elif node.name.startswith(_PREFIX) and node.op in _OF_SUMS:
-            constant = _times(nodes, index)[1]
-            frac = constant.denominator.bit_length() - 1
-            found.append((name, int(constant * 2**frac), frac))
+            made = node.parameter, node.parameter_frac
+        elif node.op in _OF_SUMS and of[index] != index and index not in parts and _is_sum(factor):
+            made = factor.numerator, factor.denominator.bit_length() - 1
+        else:
+            continue
+        found.append((node.name.removeprefix(_PREFIX), *made))
     return found
 
 
-def _times(nodes: Sequence[NodeEntry], index: int) -> tuple[int, Fraction]:
-    """Return the node that a node is a multiple of, whatever bits are dropped on the way, and the factor."""
-    node = nodes[index]
-    if node.op is Operation.FLOOR:
-        return _times(nodes, node.operands[0])
-    if node.op is Operation.SHIFT:
-        of, factor = _times(nodes, node.operands[0])
-        return of, factor * Fraction(2) ** node.parameter
-    if node.op in {Operation.ADD, Operation.SUBTRACT}:
-        (left, first), (right, second) = (_times(nodes, i) for i in node.operands)
-        if left == right:
-            return left, first + second if node.op is Operation.ADD else first - second
-    return index, Fraction(1)
+def _is_sum(factor: Fraction) -> bool:
+    """Whether a factor is no power of two, nor 0."""
+    return abs(factor.numerator).bit_count() > 1
+
+
+def _multiples(nodes: Sequence[NodeEntry]) -> tuple[list[int], list[Fraction]]:
+    """Return of each node what it is a multiple of, whatever bits are dropped on the way, and the factor."""
+    of, factors = [*range(len(nodes))], [Fraction(1)] * len(nodes)
+    for index, node in enumerate(nodes):
+        if node.op in {Operation.FLOOR, Operation.SHIFT}:
+            (operand,) = node.operands
+            scale = Fraction(2) ** node.parameter if node.op is Operation.SHIFT else 1
+            of[index], factors[index] = of[operand], factors[operand] * scale
+        elif node.op in _OF_SUMS:
+            left, right = node.operands
+            if of[left] == of[right]:
+                sign = 1 if node.op is Operation.ADD else -1
+                of[index], factors[index] = of[left], factors[left] + sign * factors[right]
+    return of, factors

@@ -11,6 +11,7 @@ from tests.gen.word_lengths.filters import OUT, SIGNED, butterworth
 from sosmith.gen.realizations.kept_formats import Choice
 from sosmith.gen.word_lengths import quantize
 from sosmith.gen.word_lengths.objective import FEW_ADDERS, SMALL_AREA, Objective
+from sosmith.gen.word_lengths.other_realization import with_realization
 from sosmith.gen.word_lengths.quantize import Plan, plan, prove
 from sosmith.gen.word_lengths.quantized import Quantized
 from sosmith.gen.word_lengths.truncated_sums import with_truncated_sums
@@ -88,3 +89,11 @@ def test_nothing_is_spent_where_nothing_is_left() -> None:
     assert with_truncated_sums(planned.search, planned.start, sections, 0.0) is None
     assert with_truncated_sums(planned.search, planned.start, sections, 1e-9) is None
     assert with_truncated_sums(planned.search, planned.start, sections, 0.1) is not None
+
+
+def test_the_same_widths_are_those_of_the_sums_too() -> None:
+    proven = prove(trimmed())
+    again = with_realization(proven, "df1_ef2")
+    assert again.bound == proven.bound
+    assert products(again) == products(proven)
+    assert with_realization(proven, "df1_ef1").bound > proven.bound
