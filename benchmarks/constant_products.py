@@ -13,7 +13,7 @@ import random
 import re
 import sys
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -24,6 +24,7 @@ from sosmith.gen.specification.combinations import PARALLEL
 from sosmith.gen.specification.specification import load
 from sosmith.model.dataflow.adder_graph import Adder, adder_bits, adder_graph, by_operand, odd_part, scalings
 from sosmith.model.dataflow.graph import Graph, Op
+from sosmith.model.sections.truncated_products import Constant, constants_of
 
 ROOT = Path(__file__).resolve().parent.parent
 RECORD = ROOT / "benchmarks" / "constant_products.json"
@@ -76,9 +77,13 @@ def sets() -> Iterator[tuple[str, dict[int, int], int, int]]:
         hardware = replace(spec.hardware, architecture=PARALLEL.name, multipliers=0)
         for stage in design_core(replace(spec, hardware=hardware)).datapath.stages:
             graph = stage.graph
+            made = constants_of(graph)
             for operand, products in by_operand(graph, scalings(graph)):
                 node = graph.nodes[operand]
-                yield spec.name, _dropped(graph, products), node.low, node.high
+                yield spec.name, _dropped(graph, {index: made[index] for index in products}), node.low, node.high
+            for index in made.keys() - scalings(graph):  # whose sums drop bits: as if they did not
+                node = graph.nodes[made[index].operand]
+                yield spec.name, _dropped(graph, {index: made[index]}), node.low, node.high
     draws = random.Random(SEED)
     for count, bits in DRAWN:
         for _ in range(SETS):
@@ -86,14 +91,15 @@ def sets() -> Iterator[tuple[str, dict[int, int], int, int]]:
             yield f"{count} of {bits} bits, drawn", dict.fromkeys(drawn, 0), *OPERAND
 
 
-def _dropped(graph: Graph, products: Iterable[int]) -> dict[int, int]:
+def _dropped(graph: Graph, products: Mapping[int, Constant]) -> dict[int, int]:
     """Return the constants of products, with the lowest bits that all readers of their product drop."""
     dropped: dict[int, int] = {}
-    for index in products:
-        node = graph.nodes[index]
+    for index, by in products.items():
+        whole = graph.nodes[by.operand].frac + by.frac
         readers = [other for other in graph.nodes if index in other.operands]
-        bits = min((node.frac - other.frac if other.op is Op.FLOOR else 0 for other in readers), default=0)
-        dropped[node.parameter] = min(bits, dropped.get(node.parameter, bits))
+        fracs = [other.frac if other.op is Op.FLOOR else graph.nodes[index].frac for other in readers]
+        bits = max(0, whole - max(fracs, default=whole))
+        dropped[by.integer] = min(bits, dropped.get(by.integer, bits))
     return dropped
 
 

@@ -83,7 +83,7 @@ def measure(design: CoreDesign) -> Row:
     golden = filtered(values, quantized.filter.sos, datapath.output, steady=quantized.steady)
     error = (datapath.output.decode(datapath.compute(codes)) - golden) / float(datapath.output.lsb)
     graphs = [section.graph for section in quantized.sections]
-    coefficients = [abs(integer).bit_length() for graph in graphs for integer, _ in constants_of(graph).values()]
+    coefficients = [abs(by.integer).bit_length() for graph in graphs for by in constants_of(graph).values()]
     states = [section.graph.nodes[i].width for section in quantized.sections for i in section.graph.delays]
     return Row(
         coefficient_bits=f"{min(coefficients)}..{max(coefficients)}" if coefficients else "none",

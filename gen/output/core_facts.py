@@ -488,9 +488,12 @@ def _section(name: str, graph: Graph, feedback: tuple[int, ...] | None) -> Secti
         name=name,
         coefficients=tuple(
             CoefficientFacts(
-                name=nodes[index].name.removeprefix("product_"), integer=integer, frac=frac, value=integer / 2**frac
+                name=nodes[index].name.removeprefix("product_"),
+                integer=by.integer,
+                frac=by.frac,
+                value=by.integer / 2**by.frac,
             )
-            for index, (integer, frac) in constants_of(graph).items()
+            for index, by in constants_of(graph).items()
         ),
         states={nodes[i].name: nodes[i].format for i in graph.delays},
         b=b,

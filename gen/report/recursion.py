@@ -95,8 +95,8 @@ class _Reader:
             if node.op is Op.DELAY:
                 self._signal(node.operands[0])
         coefficients = {
-            self._nodes[index].name: Coefficient(_coefficient_name(self._nodes[index].name, index), integer, frac)
-            for index, (integer, frac) in self._constants.items()
+            self._nodes[index].name: Coefficient(_coefficient_name(self._nodes[index].name, index), by.integer, by.frac)
+            for index, by in self._constants.items()
         }
         ordered = sorted(self._equations.items())
         return Recursion(section, tuple(equation for _, equation in ordered), tuple(coefficients.values()))

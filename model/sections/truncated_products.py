@@ -25,6 +25,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
+from typing import NamedTuple
 
 from sosmith.model.dataflow.adder_graph import Adder, adder_graph, multiple_name, odd_part
 from sosmith.model.dataflow.graph import Graph, GraphBuilder, Op, Wire
@@ -46,8 +47,16 @@ def truncated(g: GraphBuilder, operand: Wire, coefficient: int, frac: int, kept:
     return g.named(g.shift(last, power - frac), name)
 
 
-def constants_of(graph: Graph) -> dict[int, tuple[int, int]]:
-    """Return the constants that products of a graph multiply by, with their fraction bits, by the node of the product.
+class Constant(NamedTuple):
+    """What a product multiplies which node by: ``integer * 2**-frac``."""
+
+    operand: int
+    integer: int
+    frac: int
+
+
+def constants_of(graph: Graph) -> dict[int, Constant]:
+    """Return the constants that products of a graph multiply by, by the node of the product.
 
     A product is one multiplication, or a sum of multiples of one node, whatever these drop, that is no part of another
     such sum.
@@ -72,14 +81,13 @@ def constants_of(graph: Graph) -> dict[int, tuple[int, int]]:
         for operand in node.operands
         for i in (operand, *(graph.nodes[operand].operands if graph.nodes[operand].op is Op.FLOOR else ()))
     }
-    made: dict[int, tuple[int, int]] = {}
+    made: dict[int, Constant] = {}
     for index, node in enumerate(graph.nodes):
         of, factor = multiples[index]
         if node.op is Op.SCALE:
-            made[index] = node.parameter, node.parameter_frac
+            made[index] = Constant(node.operands[0], node.parameter, node.parameter_frac)
         elif node.op in _OF_SUMS and of != index and index not in parts and abs(factor.numerator).bit_count() > 1:
-            frac = factor.denominator.bit_length() - 1
-            made[index] = factor.numerator, frac
+            made[index] = Constant(of, factor.numerator, factor.denominator.bit_length() - 1)
     return made
 
 

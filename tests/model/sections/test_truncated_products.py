@@ -107,6 +107,7 @@ def test_the_constant_is_read_off_the_sums(coefficient: int) -> None:
     graph = product(coefficient, 20, 9)
     constants = constants_of(graph)
     assert constants.keys() == {graph.outputs[0]}
-    integer, frac = constants[graph.outputs[0]]
+    operand, integer, frac = constants[graph.outputs[0]]
+    assert graph.nodes[operand].name == "x"
     assert Fraction(integer, 1 << frac) == Fraction(coefficient, 1 << 20)
     assert integer % 2 or frac == 0
