@@ -62,6 +62,8 @@ def placed(start: Start, arguments: Sequence[str], log: Path) -> int:
         status = waited(process, endless)
     if not endless():
         return status
+    with log.open("ab") as output:
+        output.write(b"The first router has tried too often for these connections; the second one takes over.\n")
     with start([*arguments, *OTHER_ROUTER]) as process:
         return waited(process)
 

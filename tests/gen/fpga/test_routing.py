@@ -52,6 +52,8 @@ def test_the_other_router_is_taken_by_the_number_of_tries_alone(
     placer = Placer(log, tries, forever=forever)
     assert placed(placer, ["--seed", "1"], log) == status
     assert placer.calls[0] == ["--seed", "1"]
+    said = "The first router has tried too often for these connections; the second one takes over."
+    assert (said in log.read_text(encoding="utf-8")) is (status == 4)
     assert placer.calls[1:] == ([["--seed", "1", *OTHER_ROUTER]] if status == 4 else [])
 
 
